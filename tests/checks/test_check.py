@@ -82,6 +82,7 @@ def test_reports_count_the_limits_by_mark() -> None:
     assert (marks([name.described(1.0)]), basis_note([name.described(1.0)])) == ("-", [])
 
 
+@pytest.mark.campaign
 def test_the_document_counts_every_basis_in_the_source() -> None:
     found = limits()
     assert {each.mark for each in found} == MARKS.keys()

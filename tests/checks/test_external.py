@@ -99,6 +99,7 @@ def test_a_file_that_is_not_toml_is_refused(tmp_path: Path) -> None:
         _read(tmp_path, _GOOD.replace("[body]", "[body"))
 
 
+@pytest.mark.campaign
 def test_problems_of_the_package_agree_with_every_method() -> None:
     """Check some of the problems; `verify` checks all of them."""
     some = [f"external/{name}" for name in ("detest-b5", "fresnel", "jacobi-parameter-half")]
@@ -114,6 +115,7 @@ def test_problems_of_the_package_agree_with_every_method() -> None:
     assert {"detest-b5", "hairer-rigid-body"} <= {problem.name for problem in problems()}
 
 
+@pytest.mark.campaign
 def test_one_check_alone_is_the_same_check() -> None:
     wanted = "external/jacobi-half/1.25/gauss-4"
     alone = list(external_checks(problems(), [wanted]))
@@ -123,6 +125,7 @@ def test_one_check_alone_is_the_same_check() -> None:
     assert list(external_checks(problems(), ["cells"])) == []
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("problem", problems(), ids=lambda problem: problem.name)
 def test_a_last_digit_that_counts_is_caught_in_every_problem(problem: Problem) -> None:
     value = problem.values[-1]
@@ -219,6 +222,7 @@ def test_a_long_motion_gets_the_tolerance_that_is_claimed_for_it(time: str, tmp_
         assert (check.limit or 1.0) < 3e-9
 
 
+@pytest.mark.campaign
 def test_a_far_time_leaves_the_excuse_of_a_near_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -241,6 +245,7 @@ def test_beyond_the_series_a_closed_form_tells_what_rounding_does(tmp_path: Path
     assert all((check.value or 0.0) > 1e-8 and (check.limit or 1.0) < 1e-5 for check in checks)
 
 
+@pytest.mark.campaign
 def test_programs_in_steps_far_too_long_are_no_fault_of_a_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -295,6 +300,7 @@ def _with_attitudes(folder: Path, entries: Sequence[tuple[str, str]]) -> Problem
     return _read(folder, text, "brick.toml")
 
 
+@pytest.mark.campaign
 def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
     (shipped,) = (each for each in problems() if each.name == "nasa-brick-attitude")
     entries = []
@@ -320,6 +326,7 @@ def test_published_attitudes_of_the_brick_agree(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.campaign
 def test_attitudes_may_be_angles_and_stand_beside_omega(tmp_path: Path) -> None:
     scene = _with_attitudes(tmp_path, [("1", "attitude = ['1', '0', '0', '0']")]).scene
     found = solve(scene, [2.0], "reference", attitude=True)

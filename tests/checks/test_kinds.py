@@ -50,6 +50,7 @@ def test_every_cell_has_a_name_of_its_own() -> None:
     assert len(names) == (16 * 2 + 8 + 128 * 2) * 8
 
 
+@pytest.mark.campaign
 def test_checks_have_names_of_their_own_and_all_pass() -> None:
     """Make a part of the checks; `verify` itself makes all of them."""
     checks = list(verify(Selection(seed="fixed", draws=4, thin=True)))
@@ -72,6 +73,7 @@ def test_selection_is_by_whole_parts() -> None:
     assert selected("cells", [])
 
 
+@pytest.mark.campaign
 def test_json_is_as_agreed(capsys: pytest.CaptureFixture[str]) -> None:
     only = "cells/two-term/case-3,orders/rk4"
     assert main(["verify", "--format", "json", "--only", only]) == 0
@@ -81,6 +83,7 @@ def test_json_is_as_agreed(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(record["checks"]) == 32 + 7
 
 
+@pytest.mark.campaign
 def test_failure_is_told_with_the_command_that_repeats_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -158,6 +161,7 @@ def test_replay_of_a_draw_is_read_by_the_shell_as_it_was_given(seed: str, draws:
 _produced = cache(update)
 
 
+@pytest.mark.campaign
 def test_record_is_what_is_produced() -> None:
     files, news = _produced(RECORD)
     if {file["mathematics"] for file in read_record(RECORD).values()} == {mathematics()}:
@@ -173,6 +177,7 @@ def _written(folder: Path) -> Path:
     return folder / "two-term.toml"
 
 
+@pytest.mark.campaign
 def test_record_that_was_changed_fails_and_is_mended(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -234,6 +239,7 @@ def test_no_record_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 # One plant in both languages and one in a prepared solver; `verify --self-test` makes them all.
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["sign-in-both", "stale-solver"])
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     plant = BY_NAME[name]
@@ -244,6 +250,7 @@ def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     assert not caught.example.startswith("golden")
 
 
+@pytest.mark.campaign
 def test_plant_that_nothing_catches_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
     harmless = replace(ONE_BIT, name="harmless", size=0.0)
 
@@ -289,6 +296,7 @@ def _off(run: Trajectory) -> Trajectory:
     return replace(run, omega=run.omega * factors)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("change", "only", "note"),
     [

@@ -26,6 +26,7 @@ def test_the_axial_top_is_the_reference() -> None:
     assert np.abs(found - truth.omega).max() <= 2.0 * truth.error
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "only",
     [
@@ -47,6 +48,7 @@ def test_bounds_hold(only: str) -> None:
     assert worst(checks)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", length.INTEGRATORS)
 def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Integrate 1e4 revolutions, where 4-stage Gauss drifts if its weights lose their low parts."""
@@ -57,6 +59,7 @@ def test_brouwers_law_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(checks) == 3 * 8
 
 
+@pytest.mark.campaign
 def test_the_power_tells_chance_from_a_preference() -> None:
     """Classify 1000 random walks and 1000 drifts: at most 5 are taken for the other kind."""
     source = np.random.default_rng(1)

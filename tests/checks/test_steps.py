@@ -113,7 +113,7 @@ def test_the_limit_of_the_punched_runge_kutta_is_in_its_matrix() -> None:
 
 
 def test_weights_of_moved_points() -> None:
-    """Two points extrapolate s**2 to -2/9 of t**2 (derived in docs/explanation/findings.md)."""
+    """Two points extrapolate s**2 to -2/9 of t**2 (derived in docs/article/article.md)."""
     assert weight_of_squares(Listing.corrected("two-term"), 50) == Fraction(5, 18)
     for n in (1, 7, 100):
         assert weight_of_squares(Listing.original("two-term"), n) == Fraction(n, 2) - Fraction(

@@ -37,6 +37,7 @@ def case_2() -> room.Comparison:
     return compare_programs(case_scene(2))
 
 
+@pytest.mark.campaign
 def test_all_is_as_expected_in_every_case() -> None:
     for case in range(1, 8):
         found = compare_programs(case_scene(case))
@@ -162,6 +163,7 @@ def test_error_of_attitudes_is_an_angle() -> None:
     assert pushed.angle is pushed.momentum_in_space is None
 
 
+@pytest.mark.campaign
 def test_compare_shows_attitudes_where_they_are_asked_for() -> None:
     found = compare_programs(case_scene(4), attitude=True)
     corrected_ones = {
@@ -198,6 +200,7 @@ def test_compare_asks_for_no_attitude_by_itself(case_2: room.Comparison) -> None
     assert "angle" not in _text(case_2)
 
 
+@pytest.mark.campaign
 def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unexpected results give exit code 1: plant a one-bit difference, a program of no order."""
     real = Program.run
@@ -247,6 +250,7 @@ def test_number_that_is_not_finite_is_null() -> None:
     assert json.loads(text) == {"a": [1.0, None, {"b": None}], "c": [2.5], "d": "x"}
 
 
+@pytest.mark.campaign
 def test_picture_and_its_numbers(case_2: room.Comparison) -> None:
     files = saved(comparison_picture(case_2), "x.svg", "x.pdf")
     for name, start in (("x.svg", b"<?xml"), ("x.pdf", b"%PDF")):

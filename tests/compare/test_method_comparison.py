@@ -37,6 +37,7 @@ def damped() -> Comparison:
     return compare_methods(read_scene(DAMPED))
 
 
+@pytest.mark.campaign
 def test_methods_agree_with_the_reference_and_the_known_solution(damped: Comparison) -> None:
     assert [each.method for each in damped.methods] == ["auto", *SCIPY_METHODS]
     assert damped.unexpected == ()
@@ -55,6 +56,7 @@ def test_methods_agree_with_the_reference_and_the_known_solution(damped: Compari
         assert np.abs(each.trajectory.omega - known).max() <= 3e-7
 
 
+@pytest.mark.campaign
 def test_views_have_the_same_numbers(damped: Comparison) -> None:
     report = comparison_report(damped)
     text, record = render(report, "table"), json.loads(render(report, "json"))

@@ -44,6 +44,7 @@ WAVE = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e4),))
 SLOW = scaled(case_scene(4), 1e-8)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize(
     "scene",
@@ -64,6 +65,7 @@ def test_step_far_too_long_is_halved_until_the_order_shows(program: str, scene: 
     assert (order.value or 0.0) >= order.due - 0.5
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("scene", "program", "state", "words"),
     [
@@ -172,6 +174,7 @@ def test_a_motion_whose_conditioning_is_unknown_is_not_judged(
     assert _order(*given).state == "sensitive"
 
 
+@pytest.mark.campaign
 def test_compare_tells_what_it_does_not_judge() -> None:
     found = compare_programs(_steps(5, 1e-5, 100), [Listing.corrected("four-term")])
     report = comparison_report(found)

@@ -44,6 +44,7 @@ def _whole(sweep: Sweep) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", draw.PICTURES)
 def test_every_sweep_has_its_picture(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -87,6 +88,7 @@ def test_bodies_of_the_thesis_have_their_place_in_the_square() -> None:
     assert place_of((41.0, 39.0, 20.0)) == pytest.approx((11.0 / 30.0, 9.0 / 11.0))
 
 
+@pytest.mark.campaign
 def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "torque", 6)
     found = _whole(sweep)["flips"][0]
@@ -99,6 +101,7 @@ def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> No
     assert (found.ravel() == expected)[~near].all()
 
 
+@pytest.mark.campaign
 def test_torque_along_the_middle_axis_holds_nobody(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "torque", 6)
     found = _whole(sweep)["flips"]
@@ -165,6 +168,7 @@ def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
     return total
 
 
+@pytest.mark.campaign
 def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "stops", 41)
     found = _whole(sweep)
@@ -196,6 +200,7 @@ def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
     assert 0.5 < np.isin(stops, (4, 5, 6)).mean() < 0.95
 
 
+@pytest.mark.campaign
 def test_collocation_diverges_where_a_wobble_grows(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "collocation", 25)
     found = _whole(sweep)

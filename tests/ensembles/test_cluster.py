@@ -45,6 +45,7 @@ def run(folder: Path, text: str, **more: str) -> None:
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.campaign
 def test_parts_of_an_array_are_joined(tmp_path: Path) -> None:
     shutil.copy(SCRIPTS / "parts.toml.in", tmp_path)
     for part in range(2):
@@ -57,6 +58,7 @@ def test_parts_of_an_array_are_joined(tmp_path: Path) -> None:
     assert 0.0 < float(found["tilted-time"].mean()) < 30.0
 
 
+@pytest.mark.campaign
 def test_cluster_in_one_job_writes_the_bytes_of_this_process(tmp_path: Path) -> None:
     text = (SCRIPTS / "parts.toml.in").read_text().replace("PART", "7")
     (tmp_path / "sweep.toml").write_text(text)

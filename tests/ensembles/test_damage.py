@@ -99,6 +99,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", DAMAGES)
 def test_damaged_chunk_is_one_line_and_is_repaired(
     name: str, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
@@ -180,6 +181,7 @@ def test_store_of_the_first_schema_is_refused(sweep: Sweep, store: Path) -> None
         run_sweep(sweep, str(store))
 
 
+@pytest.mark.campaign
 def test_command_line_repairs(
     store: Path, intact: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

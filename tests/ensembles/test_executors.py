@@ -40,6 +40,7 @@ def cluster() -> Iterator[Any]:
         yield found
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("executor", ["processes", "dask"])
 def test_every_executor_writes_the_same_bytes(executor: str, sweep: Sweep, tmp_path: Path) -> None:
     run_sweep(sweep, str(tmp_path / "here"))
@@ -47,6 +48,7 @@ def test_every_executor_writes_the_same_bytes(executor: str, sweep: Sweep, tmp_p
     assert files(tmp_path / "here") == files(tmp_path / "other")
 
 
+@pytest.mark.campaign
 def test_killed_worker_of_dask_costs_its_chunks_and_nothing_else(
     cluster: Any, sweep: Sweep, tmp_path: Path
 ) -> None:
@@ -69,6 +71,7 @@ def test_killed_worker_of_dask_costs_its_chunks_and_nothing_else(
     assert files(tmp_path / "here") == files(tmp_path / "dask")
 
 
+@pytest.mark.campaign
 def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
     by_pool, started = executors._by_pool, []
 
@@ -83,6 +86,7 @@ def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatc
     assert len(started) == 1
 
 
+@pytest.mark.campaign
 def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
     found = {}
     with engine("processes", 2) as own:
@@ -124,6 +128,7 @@ def test_chunks_whose_processes_die_are_tried_three_times(
     assert started == [4, 3, 3, 1, 1]
 
 
+@pytest.mark.campaign
 def test_a_chunk_at_work_does_not_outlive_its_sweep(
     sweep: Sweep, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,6 +151,7 @@ def test_a_chunk_at_work_does_not_outlive_its_sweep(
     assert not running
 
 
+@pytest.mark.campaign
 def test_address_where_nobody_answers_is_refused_soon(sweep: Sweep, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         port = silent.getsockname()[1]
@@ -157,6 +163,7 @@ def test_address_where_nobody_answers_is_refused_soon(sweep: Sweep, tmp_path: Pa
     assert not (tmp_path / "store").exists()
 
 
+@pytest.mark.campaign
 def test_scheduler_without_workers_is_refused(sweep: Sweep, tmp_path: Path) -> None:
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty,

@@ -36,6 +36,7 @@ def _tilted(sweep: Sweep) -> list[Scene]:
     return [Scene("", (np.sin(t), np.cos(t), 0.0), moments=(1.0, 2.0, 3.0)) for t in tilts]
 
 
+@pytest.mark.campaign
 def test_reductions_say_what_the_motion_does(tmp_path: Path) -> None:
     asked = ", ".join(
         f'{{name = "{name}", samples = {SAMPLES}}}' for name in ("largest-tilt", "flips", "drift")
@@ -113,6 +114,7 @@ def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) 
         assert found["pointing-error"][i] == pytest.approx(np.arccos(axis3), abs=1e-7)
 
 
+@pytest.mark.campaign
 def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
     top = 'reductions = ["drift", "error", {name = "error", samples = 4, as = "on-the-way"}]'
     axis = '[[axis]]\nfield = "method"\nvalues = ["rk4", "improved-euler", "rk45"]'

@@ -92,6 +92,7 @@ FIELDS: dict[str, tuple[list[float], Callable[[float], tuple[Scene, float]]]] = 
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("field", FIELDS)
 @pytest.mark.parametrize("solver", ["", 'method = "dop853"'])
 def test_each_scene_has_its_own_solution(field: str, solver: str, tmp_path: Path) -> None:
@@ -163,6 +164,7 @@ def _matrix(q: Any) -> Any:
 OMEGA = axis("omega.1", [0.2])
 
 
+@pytest.mark.campaign
 def test_store_has_the_torque_and_refuses_another(tmp_path: Path) -> None:
     scene = tmp_path / "damped.toml"
     scene.write_text(SCENE.replace("scene.", ""))

@@ -30,6 +30,7 @@ from tests.ensembles.killed import ATTITUDE, OMEGA, kill_and_resume
 from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("executor", "reductions"), [("here", OMEGA), ("processes", OMEGA), ("processes", ATTITUDE)]
 )
@@ -43,6 +44,7 @@ def test_killed_at_half_way_it_resumes_and_does_nothing_twice(
     assert found.different == []
 
 
+@pytest.mark.campaign
 def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     sweep = read_sweep(written(tmp_path, PROGRAM))
@@ -63,6 +65,7 @@ def test_xarray_opens_it_without_a_warning(tmp_path: Path) -> None:
     assert (one >= 0).all()
 
 
+@pytest.mark.campaign
 def test_draws_and_results_do_not_depend_on_the_chunks(tmp_path: Path) -> None:
     found = []
     for chunk in (20, 7, 1000):
@@ -82,6 +85,7 @@ def opened_after(sweep: Any, path: Path) -> Any:
     return opened(sweep, str(path))
 
 
+@pytest.mark.campaign
 def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,6 +117,7 @@ def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
     assert files(tmp_path / "full") == files(tmp_path / "whole")
 
 
+@pytest.mark.campaign
 def test_files_that_may_not_grow_end_in_a_line(tmp_path: Path) -> None:
     path = written(tmp_path, text(SQUARE, TILT.replace("count = 6", "count = 2000")))
     command = [sys.executable, "-m", "pyharness", "sweep", path, "--out", str(tmp_path / "store")]
@@ -176,6 +181,7 @@ def test_store_that_another_process_makes_meanwhile_is_taken(
     assert sorted(each.name for each in tmp_path.iterdir()) == ["store", "sweep.toml"]
 
 
+@pytest.mark.campaign
 def test_sweeps_that_start_at_once_leave_one_at_work(tmp_path: Path) -> None:
     path = written(tmp_path, text(TILT))
     command = [sys.executable, "-m", "pyharness", "sweep", path, "--out", str(tmp_path / "store")]
@@ -193,6 +199,7 @@ def test_sweeps_that_start_at_once_leave_one_at_work(tmp_path: Path) -> None:
     assert run_sweep(read_sweep(path), str(tmp_path / "store")).computed == 0
 
 
+@pytest.mark.campaign
 def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     axis = TILT.replace("count = 6", "count = 100000")
     sweep = read_sweep(written(tmp_path, text(axis, top='chunk = 1\nreductions = ["end"]')))
@@ -267,6 +274,7 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
+@pytest.mark.campaign
 def test_memory_is_refused_where_the_half_of_it_ends(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -284,6 +292,7 @@ def test_memory_is_refused_where_the_half_of_it_ends(
             run_sweep(sweep, str(tmp_path / "kept"))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("samples", [1, 40])
 def test_memory_of_the_estimate_is_what_a_chunk_takes(samples: int, tmp_path: Path) -> None:
     top = f'chunk = 20000\nreductions = ["end", "status", {{name = "flips", samples = {samples}}}]'
@@ -308,6 +317,7 @@ def test_what_is_not_computed_yet_is_no_number(tmp_path: Path) -> None:
         assert not any(found_store.done())
 
 
+@pytest.mark.campaign
 def test_chunk_without_a_number_in_it_is_done_all_the_same(tmp_path: Path) -> None:
     sweep = read_sweep(written(tmp_path, PROGRAM))
     run_sweep(sweep, str(tmp_path / "store"))

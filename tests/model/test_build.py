@@ -118,6 +118,7 @@ def test_arithmetic_that_can_not_be_tested_is_no_fault(
     assert "'cc' does not compile" in fault(str(source), ["cc"])
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.skipif(_build.COMPILER != "gcc", reason="the options are those of gcc")
 @pytest.mark.parametrize("variable", ["CFLAGS", "FFLAGS"])

@@ -92,6 +92,7 @@ def test_frame_has_every_quantity_with_its_unit() -> None:
     assert found.omega[0, 0] != 7.0
 
 
+@pytest.mark.campaign
 def test_recorded_time_is_there_where_it_differs() -> None:
     found = solved()
     late = replace(found, recorded_time=found.time + 1.0)
@@ -136,6 +137,7 @@ def pyplot() -> Iterator[Any]:
     pyplot.close("all")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("times", [TIMES, TIMES[::-1], [-1.0, 1.0], [2.0]])
 def test_diagram_shows_omega_in_the_order_of_time(pyplot: Any, times: list[float]) -> None:
     found = solve(case_scene(5), times)

@@ -83,6 +83,7 @@ def _advised(message: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", LIMITED)
 def test_limit_is_lifted_as_far_as_it_says(name: str) -> None:
     """The advised effort suffices; without its slack of two it is at most three times too large."""
@@ -133,6 +134,7 @@ def test_compare_refuses_at_once_what_takes_long(capsys: pytest.CaptureFixture[s
     assert _advised(said.strip()) > 1.0
 
 
+@pytest.mark.campaign
 def test_forecast_of_the_reference_is_not_taken_in_by_a_blow_up() -> None:
     """Shrinking steps end soon, because the solution grows without bound."""
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))

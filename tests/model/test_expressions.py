@@ -144,6 +144,7 @@ _PIECES = (
 )  # fmt: skip
 
 
+@pytest.mark.campaign
 @settings(max_examples=300, deadline=2000, derandomize=True, database=None)
 @given(st.text(max_size=200))
 def test_any_text_is_a_torque_or_one_line(text: str) -> None:

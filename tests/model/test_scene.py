@@ -80,6 +80,7 @@ def test_torque_about_the_axes_of_space_is_read_written_and_told(tmp_path: Path)
     assert "no torque; omega(0)" in heading(rest)[1]
 
 
+@pytest.mark.campaign
 def test_torque_about_the_axes_of_space_stays_as_the_axes_of_the_body_turn() -> None:
     law = TorqueLaw((1, 2, 3), (0, 0, 1), [((1, 0, 0), 3)], [((0, 1, 0), 4)], "space")
     scene = Scene("", (1, 2, 3), (4, 5, 6), torque=law, attitude=(0, 1, 0, 0))

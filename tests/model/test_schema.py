@@ -166,6 +166,7 @@ def test_every_kind_is_tried() -> None:
     assert FILES.keys() == SCHEMAS.keys()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", FILES)
 def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
     if kind == "port request":

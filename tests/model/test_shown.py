@@ -25,6 +25,7 @@ def test_a_trajectory_of_any_size(rows: int) -> None:
     assert "velocity" not in text  # this run has none
 
 
+@pytest.mark.campaign
 def test_a_comparison() -> None:
     text = " ".join(_lines(comparison := compare_programs(case_scene(3))))
     assert text.startswith("Comparison(scene=<Scene 'Case 2, slightly perturbed'>")

@@ -57,6 +57,7 @@ def test_derivatives_of_recorded_functions(name: str, seed: int) -> None:
     check(scene.torque, source)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", READY)
 @pytest.mark.parametrize("seed", range(3))
 def test_derivatives_of_ready_terms(name: str, seed: int) -> None:

@@ -103,6 +103,7 @@ def test_a_file_is_refused_with_the_words_of_python(
     assert str(in_file.value) == f"scene file '{path}': {in_python.value}"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("method", ["auto", "taylor", "dop853", "gauss-4", "rk4", "reference"])
 def test_times_on_both_sides_are_two_marches(method: str) -> None:
     tolerance = max(1e-9, METHODS[method].finest)

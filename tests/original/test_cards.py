@@ -74,6 +74,7 @@ def test_scan_of_the_tables_is_explained(scan: str) -> None:
     assert unexplained(scan) == []
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("change", ["replaced", "removed", "added"])
 def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
     """For every k, change the k-th characters of all lines at once; each line must be found."""
@@ -193,6 +194,7 @@ def test_scan_is_told_in_a_line_each(
     assert "two-term:300" in fault
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("asked", ["1260", "two-term:330-380", "runge-kutta:1010-1040", ""])
 def test_cards_are_told_in_100_columns(asked: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cards", *([asked] if asked else [])]) == 0
@@ -200,6 +202,7 @@ def test_cards_are_told_in_100_columns(asked: str, capsys: pytest.CaptureFixture
     assert max(map(len, lines)) <= 100
 
 
+@pytest.mark.campaign
 def test_record_of_a_card(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cards", "two-term:1650-1660", "--format", "json"]) == 0
     first, second = json.loads(capsys.readouterr().out)["cards"]

@@ -96,6 +96,7 @@ def test_binary64_by_bytes_is_the_run_in_floats() -> None:
         assert differences(run_program(scene, listing), by_bytes) == []
 
 
+@pytest.mark.campaign
 def test_public_call_runs_both_languages() -> None:
     scene, listing = case_scene(5), Listing.corrected("four-term")
     for word in HERE:
@@ -242,6 +243,7 @@ def test_names_of_words() -> None:
     assert {"binary32", "binary64"} <= set(HERE)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("word", HERE)
 def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(case_scene(4), steps=20)

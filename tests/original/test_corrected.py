@@ -51,6 +51,7 @@ def _misses(listings: list[Listing]) -> Iterator[tuple[Listing, int]]:
             yield listing, case
 
 
+@pytest.mark.campaign
 def test_corrected_programs_have_their_orders_under_every_reading_and_conjecture() -> None:
     assert len(ASSUMED) == 4 + 8 + 8
     assert not list(_misses([_listing(each) for each in ASSUMED]))
@@ -70,6 +71,7 @@ def test_the_faults_that_readings_and_conjectures_are_cost_an_order_where_they_a
     assert set(kept) == {*readings, *conjectures}
 
 
+@pytest.mark.campaign
 def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
     """Compare Fortran, twin and JavaScript, whose sines may differ in Case 7."""
     cells = list(itertools.product(ASSUMED, case_numbers()))
@@ -120,6 +122,7 @@ def test_laboratory_has_the_same_listing(program: str) -> None:
         assert Listing(program, found["state"]["active"]) == Listing.corrected(program)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("case", case_numbers())
 def test_compare_judges_them_and_says_what_was_asked_for_in_vain(
     case: int, capsys: pytest.CaptureFixture[str]

@@ -110,6 +110,7 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
         assert "I=2  " not in text
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     found = list(decks(Selection(thin=True)))

@@ -44,6 +44,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
     return scene, drawn.listing, options
 
 
+@pytest.mark.campaign
 @pytest.mark.property
 def test_random_bodies_have_the_bits_of_their_single_runs(level: int) -> None:
     """Test scenes plain and nasty, every program, torques of any kind, listings of any flags.
@@ -56,6 +57,7 @@ def test_random_bodies_have_the_bits_of_their_single_runs(level: int) -> None:
         assert_alike(run_many(scene, listing, **options), scene, listing, options)
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_listing_has_the_bits_of_its_single_runs(program: str) -> None:
@@ -83,6 +85,7 @@ def test_every_listing_has_the_bits_of_its_single_runs(program: str) -> None:
             assert_alike(found, case_scene(7), assumed, options)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("n", [1, 7, 8, 9, 64, 1000])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_blocks_and_threads_change_no_bit(

@@ -37,6 +37,7 @@ def is_chosen(listing: Listing) -> bool:
     return min(len(active), len(every - active)) + len(listing.readings) <= 1
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
     """Compare every program, case, defect and reading; unnecessary exemptions fail."""
@@ -90,6 +91,7 @@ NASTY = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", NASTY)
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -186,6 +188,7 @@ def test_evaluations_count_right_hand_sides() -> None:
     assert counts == {"two-term": 300, "four-term": 500, "runge-kutta": 400}
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
     """Run every cell again without the translational block, which the plan may skip."""

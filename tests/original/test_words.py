@@ -27,6 +27,7 @@ from tests.original.exact_words import disagreements
 CDC, ROUNDED = WORDS["cdc48"], WORDS["cdc48-rounded"]
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", FLOATS)
 def test_bits_are_those_of_numpy(name: str) -> None:
@@ -72,6 +73,7 @@ def test_literals_beside_a_tie_go_to_their_own_side() -> None:
     assert {each: Word(4)(tie + each).fraction() for each in due} == due
 
 
+@pytest.mark.campaign
 def test_pages_do_not_hang_on_how_literals_are_rounded() -> None:
     """FTN's conversion of literals is not known; truncated or rounded, they print the same page."""
     cut = Word(48, "FX", cut_literals=True)
@@ -168,6 +170,7 @@ SCENES = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.bitwise
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -208,6 +211,7 @@ def test_page_is_printed_from_the_exact_value() -> None:
         assert line.split().count(due) == 6
 
 
+@pytest.mark.campaign
 def test_words_change_what_they_should() -> None:
     """Case 2 stops alike in every word, has IER = 129 in 24 bits, and differs in its last digit."""
     assert tuple(WORDS) == WORD_NAMES

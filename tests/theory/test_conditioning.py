@@ -99,6 +99,7 @@ def test_limit_says_nothing_beyond_two_and_is_none_without_a_number() -> None:
     assert replace(flow, rounding=math.nan).limit(1e-9) == 0.0
 
 
+@pytest.mark.campaign
 def test_flow_between_nodes_is_that_of_the_middle() -> None:
     """The error falls with the square of the distance of nodes; taken at an end, linearly."""
     scene, time = _SCENES["any body"]

@@ -37,6 +37,7 @@ def test_is_half_the_period_of_the_exact_motion() -> None:
         assert time == pytest.approx(float(period / 2), rel=1e-14)
 
 
+@pytest.mark.campaign
 def test_middle_component_changes_its_sign_once_in_it() -> None:
     moments, omega, middle = _drawn(2000, 1e-3)
     times = flip_times(moments, omega)

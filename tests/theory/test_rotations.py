@@ -416,6 +416,7 @@ def test_disturbance_is_what_the_times_hang_on(printed: Printed) -> None:
         assert told == _rotations(case_scene(4), disturbance)[1].flip_interval
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("case", [1, 4, 6])
 def test_picture_has_its_numbers(case: int, printed: Printed, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")

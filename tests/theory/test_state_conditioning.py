@@ -15,6 +15,7 @@ from pyharness.theory.conditioning import conditioning
 from pyharness.theory.state_conditioning import conditioning_at
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("number", range(12))
 def test_perturbations_grow_by_at_most_the_amplification(number: int) -> None:
     scene, time = (draw, draw_ready)[number % 2](Random(f"perturbed {number}"))

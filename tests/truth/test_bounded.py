@@ -40,6 +40,7 @@ def hide(monkeypatch: pytest.MonkeyPatch) -> Hide:
     return lambda: monkeypatch.setattr(enclosure, "find_spec", lambda name: None)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("case", range(1, 8))
 def test_proved_error_of_omega_needs_no_library(case: int, hide: Hide) -> None:
     scene = case_scene(case)
@@ -212,6 +213,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("command", COMMANDS)
 def test_numbers_do_not_depend_on_the_library(command: str, printed: Printed, hide: Hide) -> None:
     before = json.loads(printed(f"{command} --format json"))
@@ -225,6 +227,7 @@ def test_numbers_do_not_depend_on_the_library(command: str, printed: Printed, hi
         Draft202012Validator(schema_of(command.split()[0])).validate(record)
 
 
+@pytest.mark.campaign
 def test_verbs_print_the_bound_and_its_basis(printed: Printed, hide: Hide) -> None:
     hide()
     assert "error of any w at most 8.9e-16 rad/s (proved)" in printed("compare --case 3")
@@ -247,6 +250,7 @@ MODULES = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("command", MODULES)
 def test_verbs_warn_of_a_wrong_reference(
     command: str, printed: Printed, monkeypatch: pytest.MonkeyPatch

@@ -119,6 +119,7 @@ def test_rows_contain_the_solution_of_another_prover(name: str) -> None:
         assert high - low < Fraction(row["radius"])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", SCENES)
 def test_balls_contain_the_reference(name: str) -> None:
     scene, end = SCENES[name]
@@ -400,6 +401,7 @@ def test_falsified_certificate_is_refused(kind: str, seed: int) -> None:
     assert refused(record)
 
 
+@pytest.mark.campaign
 def test_rows_take_no_steps() -> None:
     """The steps and their balls do not depend on the rows within them."""
     for name, (scene, end) in SCENES.items():

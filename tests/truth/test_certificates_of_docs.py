@@ -30,6 +30,7 @@ def _check(*files: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.campaign
 def test_the_checker_verifies_all_certificates() -> None:
     files = sorted(HERE.glob("*.json"))
     assert {each.name for each in files} == {each.name for each in PLANNED}
@@ -83,6 +84,7 @@ def test_the_command_makes_the_same_bytes(name: str) -> None:
     assert each.text() == (HERE / name).read_text()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("each", PLANNED, ids=lambda each: each.name)
 def test_the_reference_is_within_its_error_of_proved_rows(each: Planned) -> None:
     found = reference(each.scene, each.times, precise=True)
@@ -98,6 +100,7 @@ def test_the_reference_is_within_its_error_of_proved_rows(each: Planned) -> None
             assert abs(whole - x) <= Fraction(found.estimate) + radius + rounding
 
 
+@pytest.mark.campaign
 def test_the_order_of_the_programs_is_proved() -> None:
     """As printed, both collocation errors are the smaller ones; as corrected, the larger ones."""
     original, corrected = page.errors(True), page.errors(False)
@@ -108,6 +111,7 @@ def test_the_order_of_the_programs_is_proved() -> None:
         assert all(low > third[1] for low, _ in collocation)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("original", [True, False])
 def test_proved_errors_are_those_of_the_verdict(original: bool) -> None:
     """The verdict compares with the reference, whose rounding is the difference."""
@@ -123,6 +127,7 @@ def test_proved_errors_are_those_of_the_verdict(original: bool) -> None:
             assert float(low) - spare <= error <= float(high) + spare
 
 
+@pytest.mark.campaign
 def test_proved_limits_are_those_of_the_original_program() -> None:
     rows = {(case, time): row for case, time, row in page.limit_rows()}
     assert {case for case, _ in rows} == set(case_numbers()) - {7}

@@ -279,6 +279,7 @@ def test_certificate_with_the_least_radii_is_accepted(trial: Record, tmp_path: P
     assert accepts(certificate_checker, forged(certificate_checker, **trial), tmp_path)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("old", "new", "name"), WEAKER, ids=range(len(WEAKER)))
 def test_weaker_line_accepts_a_certificate_that_is_refused(
     old: str, new: str, name: str, tmp_path: Path

@@ -168,6 +168,7 @@ def test_balls_contain_the_reference_of_a_ready_torque(name: str) -> None:
     assert outside(found.omega, scene, times) <= 0.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("kind", "side"), [("held", 1.0), ("linear", -1.0), ("cubic", 1.0)])
 def test_breakpoints_of_a_table(kind: str, side: float) -> None:
     """Steps end at breakpoints, some of which are requested times."""
@@ -189,6 +190,7 @@ def test_attitude_agrees_with_the_closed_form() -> None:
         assert sum(x * x for x in steps.attitude[0].middle) == pytest.approx(1.0, rel=1e-15)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["in space", "law and attitude", "functions", "full inertia"])
 def test_attitude_and_velocity_agree_with_the_reference(name: str) -> None:
     scene = replace(SCENES[name], attitude=TURN, masses=(2.0, 1.0, 1.0), forces=(1.0, -2.0, 0.5))

@@ -64,6 +64,7 @@ def momentum(scene: Scene, omega: Balls, attitude: Balls) -> Balls:
     return list(product(product(attitude, [ball(0), *body]), back))[1:]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_contains_the_decimal_solutions(kind: str) -> None:
     """Few digits leave radii far above the errors of the decimal solutions."""
@@ -147,6 +148,7 @@ def test_separatrix(omega: Triple) -> None:
     assert max(abs(first).upper(), abs(third).upper()) < flint.arb(10) ** -1000
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("omega", "end"),
     [
@@ -173,6 +175,7 @@ def test_separatrix_with_coefficients_that_are_not_decimals(end: float) -> None:
     assert away(enclosed(scene, end, 60), torque_free(scene, end)) < 1e-60
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("small", [1e-15, 1e-150, 5e-324])
 def test_near_the_separatrix(small: float) -> None:
     """With 1 - m of 1e-30 and less, the working precision has more bits."""

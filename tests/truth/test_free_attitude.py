@@ -14,6 +14,7 @@ from pyharness.truth.free_attitude import conjugate, free_attitude, is_steady, p
 from tests.exact_attitude import DIGITS, exact
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_attitude_agrees_however_far(kind: str) -> None:
     source = random.Random(f"truth {kind}")
@@ -29,6 +30,7 @@ def test_attitude_agrees_however_far(kind: str) -> None:
             assert max(abs(mpmath.mpf(str(x)) - y) for x, y in pairs) < mpmath.mpf("1e-30")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("omega", "steady", "endless"),
     [
@@ -51,6 +53,7 @@ def test_separatrix_and_rest_are_told(omega: Triple, steady: bool, endless: bool
         assert sum(abs(x - y) for x, y in zip(near, far, strict=True)) < Decimal("1e-3")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("end", [-400.0, 1e6])
 def test_a_settled_motion_on_the_separatrix_is_a_steady_rotation(end: float) -> None:
     """The limit of omega2 is above 0 before the flip, and below 0 after it."""

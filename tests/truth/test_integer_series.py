@@ -15,6 +15,7 @@ BODY = (40.0, 30.0, 20.0)
 REST = (0.0, 0.0, 0.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("case", "sign"), [*zip(range(1, 8), [1.0, -1.0] * 4, strict=False), (5, -1.0)]
 )
@@ -26,6 +27,7 @@ def test_both_references_agree_to_the_last_bit_but_one(case: int, sign: float) -
     assert np.abs(first.omega - second.omega).max() <= np.spacing(np.abs(first.omega).max())
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("frequency", [1e-300, 1e-30, 1e-8, 1.0, 700.0])
 @pytest.mark.parametrize("is_sine", [True, False])
 def test_wave_on_one_axis_is_its_integral(frequency: float, is_sine: bool) -> None:
@@ -63,6 +65,7 @@ def test_way_passes_through_the_largest_omega() -> None:
     assert (np.diff(path.nodes) > 0.0).all()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("scene", "time", "steps"),
     [

@@ -101,6 +101,7 @@ def test_a_sphere_after_any_time(frequency: float, time: float) -> None:
     np.testing.assert_allclose(found.omega[0], wanted, rtol=2e-16)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("case", "times", "precise"), [(3, [0.37, 1.0, 3.0], False), (4, [3.0, 20.0], True)]
 )
@@ -126,6 +127,7 @@ def test_torque_free_top_agrees_with_jacobis_elliptic_functions(
                 assert abs(value - wanted) < (1e-25 if precise else found.estimate + 1e-30)
 
 
+@pytest.mark.campaign
 def test_case_7_agrees_with_mpmaths_own_integrator_to_25_digits() -> None:
     """Test a torque that varies."""
     scene = case_scene(7)
@@ -183,6 +185,7 @@ def test_velocity_of_a_steady_spin_goes_round_as_it_must() -> None:
         assert row == pytest.approx(wanted, abs=1e-15)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("case", "time"), [(2, 7.0), (3, -4.0), (4, 7.0)])
 def test_attitude_is_that_of_the_series_in_whole_numbers(case: int, time: float) -> None:
     scene = replace(case_scene(case), attitude=(0.5, -0.1, 0.7, 0.5))

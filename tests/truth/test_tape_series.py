@@ -104,6 +104,7 @@ def _omega(found: Reference, row: int) -> list[Any]:
     return [mpmath.mpf(high) + mpmath.mpf(low) for high, low in pairs]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("time", [0.5, -0.25])
 @pytest.mark.parametrize(
     ("function", "attitude"),
@@ -136,6 +137,7 @@ def test_all_operations_are_tested() -> None:
     assert kinds == {"linear", "product", "quotient", "sqrt", "exp", "tanh", "sine", "cosine"}
 
 
+@pytest.mark.campaign
 def test_the_less_precise_series_states_its_error() -> None:
     """The series of 20 and 24 terms has an estimate that bounds its true error."""
     scene = Scene("", _OMEGA, _MOMENTS, torque=_torque(_pointing), attitude=_ATTITUDE)
@@ -154,6 +156,7 @@ _LAW = TorqueLaw(
 )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("times", [[0.5, 4.0], [-0.5, -4.0]])
 @pytest.mark.parametrize("attitude", [None, _ATTITUDE])
 def test_a_torque_law_on_a_tape_has_the_digits_of_the_law(
@@ -207,6 +210,7 @@ def _one(component: Any) -> list[Any]:
     return [component, 0.0 * component, 0.0 * component]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("function", "rows"),
     [

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,8 @@ def true_motion(scene: Scene, times: Sequence[float]) -> Motion:
     exact = turned
     if scene.inertia is not None and scene.changing is None:
         # As a matrix that changes, if by nothing, it needs no principal axes.
-        exact = replace(turned, inertia=ChangingInertia([scene.inertia, 1e-300 * np.eye(3)]))
+        matrices: Any = ChangingInertia([scene.inertia, 1e-300 * np.eye(3)])
+        exact = replace(turned, inertia=matrices)
     truth = reference(exact, times)
     assert truth.time.tolist() == list(times)
     assert truth.attitude is not None

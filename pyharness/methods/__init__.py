@@ -1,1 +1,1 @@
-"""Methods that solve a scene: choice of a method, list of all methods, and their solvers."""
+"""Methods that solve a scene."""

@@ -1,4 +1,4 @@
-"""Pictures of an attitude: paths of axes and omega in space, and an animation of a brick."""
+"""Pictures of an attitude, and an animation of a brick."""
 
 import io
 from pathlib import Path
@@ -116,7 +116,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Return the function that draws a frame, a row of `found`, at `rate` times true speed."""
+    """Return the function that draws a frame, a row of `found`."""
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
     assert found.attitude is not None
@@ -145,7 +145,7 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners, shape (8, 3), of a brick whose sides are at least 1 % of the longest."""
+    """Return the corners, (8, 3), of a brick with sides of at least 1 % of the longest."""
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -103,7 +103,6 @@ class _Run:
         self._check_waves()
 
     def _check_waves(self) -> None:
-        """Raise InputError if the highest frequency of the torque's waves is too high."""
         self.fastest = fastest_of(self.scene.torque)  # rad/s
         slow = _FASTEST * self.pace
         if self.fastest > slow:
@@ -230,7 +229,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles that orbits of this squared modulus need."""
+        """Return the number of angles that this squared modulus needs."""
         # The oscillation has singularities at the angles i times this width.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:
@@ -248,6 +247,6 @@ class _Run:
         return bool(is_slow and late <= max(_FLOOR * self.phase, allowed))
 
     def _relative(self, step: MacroStep) -> Array:
-        """Return the largest relative error of the slow components, and of the phase (rad)."""
+        """Return the relative error of slow components, and of the phase (rad)."""
         slow = np.abs(step.error[:3]).max(axis=1) / step.scale[:3]
         return np.array([slow.max(), np.abs(step.error[3]).max() * self.pace])

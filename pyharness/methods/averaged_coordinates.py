@@ -27,7 +27,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """The coordinates of motions about one axis; a point is (p1, p2, p3, t), t the time (s)."""
+    """Coordinates about one axis; a point is (p1, p2, p3, t), t the time (s)."""
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x over w_b
@@ -58,7 +58,7 @@ class Coordinates(NamedTuple):
         return min(found)[1] if found else None
 
     def point(self, omega: Triple) -> Array:
-        """Return the point with this omega (rad/s) at psi = 0 and t = 0, shape (4,)."""
+        """Return the point with this omega (rad/s) at psi = 0 and t = 0."""
         b, c, a = (omega[axis] for axis in self.axes)
         y = self.on_c * c
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
@@ -72,12 +72,12 @@ class Coordinates(NamedTuple):
         return found
 
     def scale(self, point: Array) -> Array:
-        """Return the size of the components of a point, shape (4,), for relative errors."""
+        """Return the sizes of a point's components, for relative errors."""
         size = math.sqrt(abs(point[2]) + point[0] * point[0] + point[1] * point[1])
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return the largest component of omega (rad/s) on the orbits of points, shape (4, n)."""
+        """Return the largest component of omega (rad/s) on the orbits of points."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
@@ -94,7 +94,7 @@ class Coordinates(NamedTuple):
         return found
 
     def omega(self, point: Array, cosine: Array, sine: Array) -> tuple[list[Array], Array, Array]:
-        """Return omega (rad/s), y and |w_a| at a point with this cosine and sine of psi."""
+        """Return omega (rad/s), y and |w_a| at a point."""
         y = point[0] * sine + point[1] * cosine
         fast = np.sqrt(point[2] + self.bend * y * y)
         b, c, a = self.axes

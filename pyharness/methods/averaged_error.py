@@ -1,4 +1,4 @@
-"""Error and error amplification of omega over all macro-steps of the method `averaged`."""
+"""Error and error amplification over all macro-steps of the method `averaged`."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Done(NamedTuple):
 
     @classmethod
     def of(cls, coordinates: Coordinates, start: Array, error: Array, transition: Array) -> Self:
-        """Return a macro-step with this start, and with the measured error of its end."""
+        """Return a macro-step with its start and the error of its end."""
         phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
         cosine, sine = np.cos(phases), np.sin(phases)
         omega = coordinates.omega(start[:, None], cosine, sine)[0]

@@ -70,7 +70,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the matrix that interpolates values at `count` nodes, by the barycentric formula."""
+    """Return the matrix of barycentric interpolation from `count` nodes."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -83,7 +83,7 @@ def between_nodes(count: int, at: Array) -> Array:
 
 
 def between_angles(count: int, at: Array) -> Array:
-    """Return the matrix that interpolates values at an even `count` of angles (rad)."""
+    """Return the matrix that interpolates from an even `count` of angles (rad)."""
     half = 0.5 * (at[:, None] - fast_nodes(count).angles)
     sine = np.sin(half)
     hit = np.abs(sine) < 1e-17

@@ -50,16 +50,8 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    Attributes
-    ----------
-    stroboscopic : array, shape (4, nodes)
-        The point at psi = 0; its time is without a part that is proportional to psi.
-    error : array, shape (4, nodes)
-        The measured error of `stroboscopic`.
-    modulus : float
-        The largest square of the modulus of the orbits.
-    evaluations : int
-        The number of evaluations of the right-hand side.
+    `stroboscopic`, shape (4, nodes), is the point at psi = 0, its time without a part proportional
+    to psi, and `error` the measured one. `modulus` is the largest square on the orbits.
     """
 
     def __init__(
@@ -120,7 +112,7 @@ class MacroStep:
     def mean_slopes(
         coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
     ) -> Array:
-        """Return the means of the derivatives with respect to psi at a point, shape (4,)."""
+        """Return the mean derivatives by psi at a point, shape (4,)."""
         fast = fast_nodes(angles)
         times = np.full(angles, time)
         found: Array = coordinates.slopes(
@@ -135,7 +127,7 @@ class MacroStep:
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return the derivatives on a grid of nodes and angles, the last dimensions."""
+        """Return the derivatives on a grid of nodes and angles."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -144,7 +136,7 @@ class MacroStep:
         )
 
     def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
-        """Return the residual of the averaged equation, and the next approximation of W."""
+        """Return the residual of the averaged equation, and the next W."""
         slopes = self._slopes(mean[..., None] + waves, fast, slow)
         right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
         waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
@@ -152,7 +144,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set the Jacobian matrices of the averaged equation, and return its right-hand side."""
+        """Set the Jacobian matrices, and return the right-hand side."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)
@@ -178,7 +170,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the error at the nodes, by two sweeps with more nodes and angles."""
+        """Return the error at the nodes, by two finer sweeps."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -201,13 +193,13 @@ class MacroStep:
 
     @property
     def end(self) -> tuple[Array, tuple[float, float]]:
-        """Return the point at the end, with time 0, and two parts of the time (s) to the end."""
+        """Return the point at the end, with time 0, and two parts of that time (s)."""
         found = self.stroboscopic[:, -1].copy()
         found[3] = 0.0
         return found, (self._pace * self.length, float(self.stroboscopic[3, -1]))
 
     def angles(self, times: Array) -> Array:
-        """Return the angles psi (rad) since the start, shape (n,), at n times (s) since then."""
+        """Return the angles psi (rad) at times (s) since the start."""
         nodes = self._slow.nodes
         known = self._pace * self.length * nodes + self.stroboscopic[3]
         forward = 1.0 if self.length > 0.0 else -1.0
@@ -222,7 +214,7 @@ class MacroStep:
         return angle
 
     def at(self, angle: Array) -> tuple[Array, Array, Array]:
-        """Return the points at angles psi (rad), shape (4, n), and the cosines and sines of psi."""
+        """Return the points at angles psi (rad), (4, n), and cosines and sines."""
         nodes = between_nodes(self._sizes[0], angle / self.length)
         turns = between_angles(self._sizes[1], np.mod(angle, 2.0 * np.pi))
         point = self.stroboscopic @ nodes.T + ((nodes @ self._waves) * turns).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""The torque of a scene as a function of arrays, for the method `averaged`."""
+"""The torque of a scene as a function of arrays."""
 
 import math
 from typing import NamedTuple
@@ -19,7 +19,7 @@ _MOST_DEGREE = 8.0
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return the torque over the moments as a function, and whether it depends on time."""
+    """Return the torque over the moments, and whether it depends on time."""
     if isinstance(scene.torque, StateTorque):
         return _state_torque(scene, scene.torque), True
     _, constant, rate, sines, cosines = normalized(scene)

@@ -1,4 +1,4 @@
-"""Batches of scenes: one common scene, and arrays of the quantities that differ between scenes."""
+"""Batches of scenes, which differ by arrays of quantities."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -55,20 +55,9 @@ class Batch:
     Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
     and `stop_variable`, and call `rows` and `by_method`.
 
-    Attributes
-    ----------
-    scene : Scene
-        The quantities that all scenes have in common.
-    solver : Solver
-        The method or program, with its settings.
-    listing : Listing, or None
-        The program with a choice of its mistakes; None for a method.
-    t_end : ndarray, shape (n,)
-        Final times, s.
-    arrays : mapping
-        What differs, one row a scene, by argument of `solve_many` and `run_many`; always `omega0`.
-    attitude : bool
-        Whether attitudes are computed; by methods only.
+    `scene` has what all scenes have in common, and `arrays` what differs, a row each, by argument
+    of `solve_many` and `run_many`; always `omega0`. `listing` is None for a method, `t_end` (s) has
+    shape (n,), and `attitude` is for methods only.
     """
 
     scene: Scene
@@ -100,7 +89,7 @@ class Batch:
 
     @cached_property
     def omega(self) -> Array:
-        """Return omega at `t_end`, shape (n, 3), rad/s; NaN where the integration ended before."""
+        """Return omega at `t_end`, shape (n, 3), rad/s, or NaN."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
@@ -110,7 +99,7 @@ class Batch:
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the number of steps that a program completed in each scene, shape (n,)."""
+        """Return the number of steps that a program completed, shape (n,)."""
         return self._program.n_rows
 
     @property
@@ -119,7 +108,7 @@ class Batch:
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the last steps, counted from 1, of `samples` nearly equal parts of a run."""
+        """Return the last steps, from 1, of nearly equal parts of a run."""
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
@@ -152,7 +141,7 @@ class Batch:
 
     @property
     def first_attitudes(self) -> Array:
-        """Return the attitudes at time 0, from body to space, shape (n, 4) or (1, 4)."""
+        """Return the attitudes at time 0, shape (n, 4) or (1, 4)."""
         first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
         found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
         return found
@@ -165,7 +154,7 @@ class Batch:
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return a batch without results that starts from `omega0`, shape (n, 3), rad/s."""
+        """Return a batch without results that starts from `omega0` (rad/s)."""
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:

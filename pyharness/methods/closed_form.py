@@ -21,7 +21,7 @@ _MOST_ROWS = 16  # at which the amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s) of a body without torque; 0 if there is none, or a torque."""
+    """Return the period of omega (s) without torque, or 0."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]

@@ -1,4 +1,4 @@
-"""Calls of prepared solvers from compiled code, without a call of Python."""
+"""Calls of prepared solvers from compiled code, without Python."""
 
 from ctypes import PYFUNCTYPE, c_double, c_int, c_void_p
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Integrations under a torque that a compiled function computes, without a call of Python."""
+"""Integrations under a torque of a compiled function, without Python."""
 
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Dense output and events: what is known of a solution between the rows of its trajectory."""
+"""Dense output and events of a trajectory."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, between 0 and the times of `found`."""
+    """Return the solution as a function of time, between 0 and `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -82,6 +82,6 @@ def _first_periods(
 
 
 def with_events_reversed(found: Trajectory) -> Trajectory:
-    """Return a trajectory with the events of each function in reverse order."""
+    """Return a trajectory with its events in reverse order."""
     times, states = found.t_events or [], found.y_events or []
     return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])

@@ -98,7 +98,7 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials; there must be a row at a time other than 0."""
+    """Return the solution as polynomials, from 0 to another time at least."""
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
@@ -201,7 +201,7 @@ def _fitted(
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
-    """Return the cubics with the states and derivatives at the ends of steps."""
+    """Return the cubics with states and derivatives at the ends of steps."""
     step = scene.step_size
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:

@@ -1,4 +1,4 @@
-"""The result of `solve_many`: final states of many bodies, in new or given arrays."""
+"""The result of `solve_many`: final states of many bodies."""
 
 from dataclasses import dataclass, field
 
@@ -21,21 +21,20 @@ class Ensemble(BatchResult):
     status : ndarray of int8, shape (n,)
         How each computation ended: 0 `complete`, 2 `overflow`, 3 `refused` (the method does not
         apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
-        `sensitive` (a result whose amplified rounding errors exceed the tolerance).
+        `sensitive` (amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
         Unit quaternions from body to space, scalar first. This and the following are None if not
         requested.
     estimates : ndarray, shape (n, 2), or None
         The columns `error` and `growth`.
     t_events, y_events : list of list of ndarray, or None
-        For each function and body the times (s) of its events, shape (k,), and the states, omega
-        (rad/s) with the attitude if computed, shape (k, 3) or (k, 7); None for a body without a
-        result.
+        For each function and body the times (s) of its events, shape (k,), and the states, shape
+        (k, 3) or (k, 7); None for a body without a result.
     sensitivities : dict of ndarray, or None
         For each name the derivatives of the final state, shape (n, 3, m) or (n, 7, m) for a
         parameter of m values; NaN for a body without a result.
     refusals : dict of str, or None
-        The reasons for missing events and sensitivities of bodies with a final state, by number.
+        The reasons for missing events and sensitivities, by number of the body.
 
     Examples
     --------
@@ -69,7 +68,7 @@ class Ensemble(BatchResult):
         return None if self.estimates is None else self.estimates[:, 1]
 
     def estimates_of(self, piece: slice) -> Array:
-        """Return the estimates of m bodies as a kernel writes them, shape (2, m), or (2, 0)."""
+        """Return the estimates of m bodies as a kernel writes them."""
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 

@@ -42,16 +42,9 @@ _COARSEST = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a scene, as the search for events uses it.
+    """The solution of a scene for the search for events: polynomials and dense output.
 
-    Attributes
-    ----------
-    pieces : Pieces
-        The polynomials of omega and attitude.
-    sol : DenseOutput
-        The dense output, perhaps of the same polynomials.
-    tolerance : float
-        The tolerance of omega; 0 for a method with a fixed step.
+    `tolerance` is that of omega, 0 for a fixed step.
     """
 
     pieces: Pieces
@@ -69,7 +62,7 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values of an event's function at `times` (s), without the polynomials."""
+        """Return the values at `times` (s), without the polynomials."""
         return self.values(g, times, _normalised(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
@@ -115,7 +108,7 @@ def _normalised(states: Array) -> Array:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through the values of a function, and the roots where it has none."""
+    """Return polynomials through a function's values, and roots where there are none."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
@@ -174,7 +167,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 
 
 def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials with their noise, without those that can't be distinguished from 0."""
+    """Return the polynomials, with noise, that can be distinguished from 0."""
     noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
     fits = replace(fits, noise=noise)
     return fits.only(fits.sizes > 2.0 * noise)
@@ -194,17 +187,11 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
 
 @dataclass(frozen=True, eq=False)
 class ZeroIntervals:
-    """The intervals on which a function is 0 to within its error.
+    """The intervals from `low` to `high` (s), ascending, on which a function is 0 to within error.
 
-    Attributes
-    ----------
-    low, high : ndarray, shape (n,)
-        The ends of the intervals (s), ascending.
-    noise : ndarray, shape (n,)
-        The magnitude below which a value beside them can't be distinguished from 0.
-    before, after : ndarray, shape (n,)
-        The signs beside the intervals; 0 where the function decays, and at the ends of the
-        solution.
+    `noise` is the magnitude below which a value beside them can't be distinguished from 0; `before`
+    and `after` are the signs there, or 0 where the function decays, and at the ends of the
+    solution.
     """
 
     low: Array
@@ -234,7 +221,7 @@ class ZeroIntervals:
         return Roots(time, change.astype(int), zeros, zeros, zeros, zeros, lasting)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
-        """Return which roots are in an interval, or can't be distinguished from one."""
+        """Return which roots are in an interval, or undistinguished from one."""
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
@@ -252,7 +239,7 @@ class ZeroIntervals:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
-    """Return the intervals on which a function is 0 to within its error."""
+    """Return the intervals on which a function is 0 to within error."""
     if not fits.low.size:
         return ZeroIntervals(*(np.zeros(0) for _ in range(5)))
     fits = fits.only(np.argsort(fits.low))

@@ -1,4 +1,4 @@
-"""Functions whose roots are events: checks of what the user gives, and their evaluation."""
+"""Functions whose roots are events: checks, and evaluation."""
 
 import inspect
 import math
@@ -22,23 +22,11 @@ _CHECKED = 9  # values that are compared
 
 @dataclass(eq=False)
 class Event:
-    """A ready event, which a function of `pyharness.events` returns.
+    """A ready event of `pyharness.events`.
 
-    Attributes
-    ----------
-    name : str
-        The call that made the event.
-    function : callable
-        The function of time, omega, attitude and derivative of omega.
-    terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
-    direction : {-1, 0, 1}
-        The sign change that counts, in the direction of integration: 1 to positive, -1 to negative,
-        0 for any.
-    needs_attitude, needs_rates : bool
-        Whether the function uses the attitude, and the derivative of omega.
-    counts_touches : bool
-        Whether a root without a sign change counts.
+    `function` takes time, omega, attitude and derivative of omega, and `name` is its call.
+    `terminal` and `direction` are as in `crosses`; `counts_touches` counts roots without a sign
+    change.
     """
 
     name: str
@@ -54,16 +42,8 @@ class Event:
 class EventFunction:
     """A checked function of an event.
 
-    Attributes
-    ----------
-    name : str
-        The event in messages, as "events: event 1".
-    event : Event
-        The function with its attributes.
-    limit : float
-        The number of events that end the integration, or infinite.
-    is_vectorized : bool or None
-        Whether the function accepts arrays of times; None if not yet known.
+    `limit` is the number of events that end the integration, or infinite; `is_vectorized` is None
+    if not yet known.
     """
 
     name: str

@@ -44,18 +44,10 @@ _DERIVATIVE, _LEFT, _RIGHT = _transforms()
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """Polynomials on several intervals.
+    """Polynomials on p intervals from `low` to `high` (s), by `coefficients`, (p, NODES).
 
-    Attributes
-    ----------
-    low, high : ndarray, shape (p,)
-        The ends of the intervals (s).
-    first, last : ndarray, shape (p,)
-        The function there, with equal signs for adjacent intervals.
-    coefficients : ndarray, shape (p, NODES)
-        The Chebyshev coefficients.
-    noise : ndarray, shape (p,)
-        The magnitude below which a value can't be distinguished from 0.
+    `first` and `last` are the function there, with equal signs for adjacent intervals; below the
+    magnitude `noise` it can't be distinguished from 0.
     """
 
     low: Array
@@ -78,20 +70,12 @@ class Fits:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """Candidates for roots.
+    """Candidates for roots at n times (s).
 
-    Attributes
-    ----------
-    time : ndarray, shape (n,)
-        The times (s).
-    change : ndarray of int, shape (n,)
-        The sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
-    slope, curvature : ndarray, shape (n,)
-        The first (1/s) and second derivative (1/s2) of the polynomial.
-    noise, near : ndarray, shape (n,)
-        The magnitudes below which the function and the polynomial can't be distinguished from 0.
-    lasting : ndarray, shape (n,)
-        How long (s) the function remains 0, negative before time 0; 0 for a root.
+    `change` is the sign change in the order of time, 1 to positive, -1 to negative, 0 for a touch;
+    `slope` (1/s) and `curvature` (1/s2) are those of the polynomial; below the magnitudes `noise`
+    and `near`, function and polynomial can't be distinguished from 0; `lasting` is how long (s) the
+    function remains 0, negative before time 0.
     """
 
     time: Array
@@ -115,7 +99,7 @@ def joined(parts: list[Roots]) -> Roots:
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
-    """Return the values of polynomials, each at its own point between -1 and 1 (Clenshaw)."""
+    """Return the values of polynomials, each at its own point (Clenshaw)."""
     first = second = np.zeros(len(x))
     for k in range(NODES - 1, 0, -1):
         first, second = 2.0 * x * first - second + coefficients[:, k], first
@@ -123,7 +107,7 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 
 def may_vanish(fits: Fits) -> Array:
-    """Return which polynomials may have a root, by the bound on their coefficients."""
+    """Return which polynomials may have a root, by their coefficients."""
     c = np.abs(fits.coefficients)
     rest = c[:, 1:].sum(axis=1)
     near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))

@@ -260,16 +260,9 @@ def _repeated(
 
 @dataclass(frozen=True, eq=False)
 class FoundEvents:
-    """The events of a scene, and the times at which they end the integration.
+    """The `times` (s) of the events of each function, ascending, and the `states` there.
 
-    Attributes
-    ----------
-    times : list of ndarray
-        The times (s) of the events of each function, ascending.
-    states : list of ndarray
-        Omega (rad/s), and the attitude if requested, one row for each event.
-    first, last : float
-        The times (s) of the terminal events before and after 0, or infinite.
+    `first` and `last` (s) are the terminal ones before and after 0, or infinite.
     """
 
     times: list[Array]
@@ -279,7 +272,7 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return the events of `count` functions if no time but 0 was requested."""
+    """Return the events if no time but 0 was requested."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 

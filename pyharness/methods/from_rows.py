@@ -1,4 +1,4 @@
-"""Attitudes computed from a table of omega, such as the output of a program of the thesis."""
+"""Attitudes from a table of omega, as of a program of the thesis."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Gauss collocation with equal steps, which are halved until two successive solutions agree."""
+"""Gauss collocation with equal steps, halved until two solutions agree."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -23,7 +23,7 @@ from pyharness.model.values import Number, Numbers, Triple, three
 
 
 class LastCall:
-    """The base class of all prepared solvers, which report how the last call in a thread ended."""
+    """The base class of prepared solvers."""
 
     plan: Plan
     _given: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
@@ -90,12 +90,12 @@ class LastCall:
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits by the estimated error, or None."""
+        """Return the number of correct decimal digits, or None."""
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
-        """Return the number of steps, or of right-hand sides for Gauss collocation; else 0."""
+        """Return the number of steps; for Gauss collocation, of right-hand sides."""
         return abs(self._counted())
 
     def _counted(self) -> int:

@@ -47,7 +47,7 @@ def exponentials(small: Array) -> Array:
 
 
 def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the Jacobian matrix (1/s) of Euler's equations at each omega, shape (n, 3, 3)."""
+    """Return the Jacobian matrices (1/s) at each omega, shape (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T
     zero = np.zeros(len(omega))

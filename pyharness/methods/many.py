@@ -89,51 +89,47 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, which supplies each quantity without an array; or all scenes, without arrays.
+        One scene, which supplies what no array does; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Final times, s; positive, negative or 0.
+        Final times, s, of either sign or 0.
     omega0 : array, shape (n, 3) or (3,)
-        Initial angular velocities, rad/s. Here and below all bodies share an array of one row.
+        Initial angular velocities, rad/s. One row serves all bodies, here and below.
     attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
-        Quaternions at time 0, from body to space, scalar first, of any norm. The default is that of
-        the scene; without one, no attitudes are returned.
+        Quaternions at time 0, from body to space, scalar first. The default is the scene's; without
+        one, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
-        Inertia matrices (kg m2), in place of moments. Vectors and attitudes are then about the axes
-        of the matrix.
+        Inertia matrices (kg m2), in place of moments; vectors and attitudes are about their axes.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Constant torques (N m), and rates of torques that are linear in time (N m/s); for bodies
-        given by coefficients, divided by the moments (1/s2, 1/s3).
+        Constant torques (N m) and their rates (N m/s); over the moments (1/s2, 1/s3) for bodies
+        given by coefficients.
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        The k waves of the torques: three components of the amplitude (units as in
-        `torque_constant`) and the frequency (rad/s).
+        The k waves of the torques: three amplitudes (as `torque_constant`) and the frequency
+        (rad/s).
     method : str
-        A name in `pyharness.methods.solver.PREPARED`. `auto` uses the closed form for bodies
-        without torque and spheres, and the Taylor series otherwise.
+        A name in `pyharness.methods.solver.PREPARED`. `auto` uses closed forms or the Taylor
+        series.
     tolerance : float
-        Largest allowed error of a component of omega at the end, relative to the largest |omega|
-        from 0 to the end, and of the attitude's angle (rad). The default depends on the method.
+        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
+        end, and of the attitude's angle (rad). The default depends on the method.
     step : float, optional
-        Step size of Gauss collocation and of the methods with a fixed step, s. The default is the
-        scene's.
+        Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
     effort : float
-        Factor on the work limit of a body. A body that exceeds it has the status `gave up`.
+        Factor on the work limit of a body, beyond which its status is `gave up`.
     estimates : bool
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
-        Functions whose roots from time 0 to each final time are found, as in `solve`; none may be
-        terminal. They need the method `auto`, `taylor` or `closed-form`, and some milliseconds a
-        body, whose motion `solve` computes once more.
+        Functions whose roots are found, as in `solve`; none may be terminal. They need the method
+        `auto`, `taylor` or `closed-form`, and some milliseconds a body.
     sensitivities : iterable of str
-        Names of parameters, as in `solve`, for derivatives of the final states. They need the same
-        methods.
+        Names of parameters, as in `solve`, for derivatives of final states by the same methods.
     threads : int
-        Number of threads. The kernel releases the interpreter's lock (GIL).
+        Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
-        The result of an earlier call with as many bodies, or an array for omega, to be overwritten.
+        An earlier result for as many bodies, or an array for omega, to be overwritten.
     progress : bool
-        Whether to show a progress bar, in a terminal or in a notebook.
+        Whether to show a progress bar.
 
     Returns
     -------
@@ -143,9 +139,8 @@ def solve_many(
     Raises
     ------
     InputError
-        If the arrays differ in their numbers of rows, the method is unknown or can't solve the
-        bodies, the tolerance or effort is out of range, or events or sensitivities can't be
-        computed for any body.
+        If the arrays differ in their numbers of rows, the method can't solve the bodies, the
+        tolerance or effort is out of range, or events or sensitivities can't be computed for any.
     NotBuiltError
         If the extension is not built.
 

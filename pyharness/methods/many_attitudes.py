@@ -1,4 +1,4 @@
-"""Solution of a prepared scene from many initial omegas and attitudes in one call."""
+"""Many initial omegas and attitudes of a prepared scene."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any

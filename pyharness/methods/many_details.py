@@ -1,4 +1,4 @@
-"""Events and sensitivities of many bodies, which the function `solve` finds body by body."""
+"""Events and sensitivities of many bodies, found body by body."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -24,14 +24,14 @@ _BODY = ("moments", "coefficients", "inertia")
 
 
 class Details:
-    """A request for the events and sensitivities of many bodies, given as in `solve_many`."""
+    """A request for the events and sensitivities of many bodies."""
 
     def __init__(
         self, scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any], *, method: str,
         tolerance: Number | None, effort: float, events: object,
         sensitivities: Iterable[str] | None,
     ) -> None:  # fmt: skip
-        """Check the request, or raise InputError; copy the arrays, which may be overwritten."""
+        """Check the request; copy the arrays, which may be overwritten."""
         if method not in _METHODS:
             where = "sensitivities" if events is None else "events"
             raise InputError(f"{where}: the method is {method}; allowed: {', '.join(_METHODS)}")
@@ -68,7 +68,7 @@ class Details:
         }  # fmt: skip
 
     def added_to(self, found: Ensemble) -> Ensemble:
-        """Return the result of `solve_many` with the events and sensitivities of its bodies."""
+        """Return the result with the events and sensitivities."""
         n = len(found.omega)
         times: list[list[Array | None]] = [[None] * n for _ in range(self.n_events)]
         states: list[list[Array | None]] = [[None] * n for _ in range(self.n_events)]
@@ -104,7 +104,7 @@ class Details:
         return self.scenes[i] if self.scenes else scene_of_row(self.scene, self.rows, i)
 
     def _any_scene(self) -> Scene:
-        """Return the first scene whose numbers are allowed, or else the common one."""
+        """Return the first allowed scene, or else the common one."""
         for i in range(max(map(len, self.rows.values()), default=0)):
             try:
                 return self._scene_of(i)

@@ -1,4 +1,4 @@
-"""Many bodies under one recorded torque, which a compiled kernel integrates side by side."""
+"""Many bodies under one recorded torque, integrated side by side."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Conversion of scenes to the arrays of `solve_many`, about principal axes where necessary."""
+"""Conversion of scenes to the arrays of `solve_many`."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,7 +20,7 @@ _MOST_KEPT = 8  # scenes whose arrays are kept
 
 
 class Axes:
-    """The principal axes of n bodies, or one set for all, and conversions to and from them."""
+    """The principal axes of n bodies, or of all, and conversions."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
         """Store the axes, columns of `axes`, (n, 3, 3), also as quaternions, (n, 4)."""
@@ -135,7 +135,7 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if only some scenes have an attitude, or if step sizes differ."""
+    """Raise InputError if scenes differ in having attitudes, or in step sizes."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:

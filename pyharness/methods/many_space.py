@@ -141,7 +141,7 @@ def _kept_solver(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each body, or None for one whose numbers are not allowed."""
+    """Return a scene for each body, or None for invalid numbers."""
     rows = rows_of_bodies(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
@@ -153,7 +153,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return those of `arrays` that describe bodies and torques, with checked shapes."""
+    """Return the arrays of bodies and torques, with checked shapes."""
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -165,7 +165,7 @@ def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return `scene` with the quantities of body `i`; raise InputError if they are not allowed."""
+    """Return the scene of body `i`, or raise InputError."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {
         name.removeprefix("torque_"): own.pop(name)

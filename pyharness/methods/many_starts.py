@@ -1,4 +1,4 @@
-"""Solution of a prepared scene from many initial angular velocities in one call."""
+"""Many initial angular velocities of a prepared scene."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Packing of all numbers of a scene into one array for the kernels of prepared solvers."""
+"""Packing of a scene into one array for kernels."""
 
 import numpy as np
 

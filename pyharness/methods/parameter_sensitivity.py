@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of a solution with respect to its parameters, by Taylor series."""
+"""Sensitivities: derivatives of a solution by parameters, by Taylor series."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Events of a body without torque, whose omega is periodic: those of one period, repeated."""
+"""Events of a body without torque: those of one period, repeated."""
 
 from collections.abc import Callable, Sequence
 
@@ -68,7 +68,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
 def improved(
     g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
 ) -> Array:
-    """Return the times (s) of events, corrected by one step of Newton's method."""
+    """Return the times (s) of events, after one Newton step."""
     found, probe = times.copy(), _PROBE * period
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]

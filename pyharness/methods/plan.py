@@ -1,4 +1,4 @@
-"""The plan for a scene: the choice of the method, and of the quantities that are computed."""
+"""The choice of the method and of the computed quantities."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

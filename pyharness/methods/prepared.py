@@ -47,37 +47,33 @@ def prepare(
     Parameters
     ----------
     scene : Scene
-        The scene. Gauss collocation and the methods with a fixed step use its step size. With a
-        full inertia matrix, a call takes some microseconds more.
+        The scene. With a full inertia matrix, a call takes some microseconds more.
     method : str
-        A name in `pyharness.methods.solver.PREPARED`; `auto` selects the fastest method that meets
-        the tolerance.
+        A name in `pyharness.methods.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
-        Largest allowed error of a component of omega at the end, relative to the largest |omega|
-        from 0 to the end. The default is as in `solve`. Methods with a fixed step ignore it, and
-        Gauss collocation does not choose its step by it. If the motion amplifies perturbations by a
-        factor K, no method has a relative error below some 1e-15 K.
+        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
+        end, by default as in `solve`. Fixed steps and Gauss collocation do not follow it. If the
+        motion amplifies perturbations by a factor K, no method has a relative error below some
+        1e-15 K.
     effort : float
-        Factor on the work limit of a call; 1 means some ten seconds. A call that exceeds it has the
-        status `gave up`.
+        Factor on the work limit of a call, some ten seconds, beyond which the status is `gave up`.
     attitude : bool
-        Whether calls return the attitude too. A torque that depends on it, or is about the axes of
-        space, requires it.
+        Whether calls return the attitude too, as in `solve`.
 
     Returns
     -------
     Solver or AttitudeSolver
         A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
         `attitude` also a quaternion from body to space, scalar first, shape (4,). Under a torque
-        that depends on the state, an initial omega above 2**300 rad/s or below 2**-300 rad/s has
-        the status `refused`; `solve` takes any.
+        that depends on the state, an initial omega above 2**300 or below 2**-300 rad/s is
+        `refused`; `solve` takes any.
 
     Raises
     ------
     InputError
-        If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        comes without the attitude it needs; if the tolerance or effort is out of range. A call
-        raises it if a moment that changes with time reaches 0 before `t_end`.
+        If the method is unknown, or can't take the scene or its attitude; if a torque lacks the
+        attitude it needs; if the tolerance or effort is out of range. A call raises it if a
+        changing moment reaches 0 before `t_end`.
     NotBuiltError
         If the extension is not built.
 

@@ -91,7 +91,7 @@ class InertiaSolver(Solver):
 
 
 class InertiaAttitudeSolver(AttitudeSolver):
-    """An `AttitudeSolver` whose omegas and attitudes are about the axes of the inertia matrix."""
+    """An `AttitudeSolver` about the axes of the inertia matrix."""
 
     ctypes = capsule = property(_no_compiled_call)
 
@@ -133,7 +133,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes, as columns of a matrix, shape (3, 3), and as a quaternion."""
+    """Return the principal axes as a matrix of columns, and as a quaternion."""
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
@@ -159,7 +159,7 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
 
 
 def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float) -> InertiaSolver:
-    """Return a solver of omega for a scene with a full inertia matrix."""
+    """Return a solver of omega for a full inertia matrix."""
     from pyharness.methods.plan import plan
 
     about_principal = with_merged_waves(principal(replace(scene, attitude=None))[0])
@@ -169,7 +169,7 @@ def prepared_inertia(scene: Scene, method: str, tolerance: float, effort: float)
 def prepared_inertia_attitude(
     scene: Scene, method: str, tolerance: float, effort: float
 ) -> InertiaAttitudeSolver:
-    """Return a solver of omega and attitude for a scene with a full inertia matrix."""
+    """Return a solver of omega and attitude for a full inertia matrix."""
     from pyharness.methods.prepared_attitude import attitude_plan
 
     about_principal, _ = principal(replace(scene, attitude=scene.attitude or IDENTITY))

@@ -1,4 +1,4 @@
-"""Conversion of a scene to arguments of the Fortran kernels, and of results to a trajectory."""
+"""Conversion of a scene for the Fortran kernels, and of their results."""
 
 import math
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ def remainders(scene: Scene) -> Triple:
 
 
 def known(estimate: float) -> float | None:
-    """Return a kernel's estimate, or None for a negative one, which means unknown."""
+    """Return a kernel's estimate, or None for a negative one."""
     return float(estimate) if estimate >= 0.0 else None
 
 

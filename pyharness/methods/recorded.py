@@ -1,4 +1,4 @@
-"""The equations of motion of a scene with a recorded torque, as the kernel reads them."""
+"""The equations of motion with a recorded torque, as the kernel reads them."""
 
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""The bound of the error of a trajectory by the method `reference`, proved or estimated."""
+"""The bound of the error of a trajectory by `reference`."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The registry: all methods that solve a scene, with their names and properties."""
+"""The registry of all methods that solve a scene."""
 
 import importlib
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ _DEFAULT = 1e-12
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of one method, of this project or SciPy, which returns a trajectory."""
+    """The properties of a method, of this project or SciPy."""
 
     name: str
     title: str
@@ -56,7 +56,7 @@ class Method:
 
     @property
     def is_fixed_step(self) -> bool:
-        """Return whether the method uses the scene's step size, without error control."""
+        """Return whether the method has the scene's step size."""
         return self.finest == 1.0
 
 
@@ -230,7 +230,7 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
 
 
 def check_attitude(method: str) -> None:
-    """Raise InputError if the method with this name can't propagate the attitude."""
+    """Raise InputError if the method can't propagate the attitude."""
     if not REGISTRY[method].attitude:
         able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
         raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
@@ -247,7 +247,7 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method with this name can't solve a scene because of its torque."""
+    """Raise InputError if the method can't solve a scene because of its torque."""
     torque, chosen = scene.torque, REGISTRY[method]
     kind = "a torque about the axes of space"
     able: list[str] = []

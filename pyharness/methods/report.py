@@ -1,4 +1,4 @@
-"""The reports of the subcommands `run` and `plan`, and the picture of one trajectory."""
+"""The reports of `run` and `plan`, and the picture of a trajectory."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -126,7 +126,6 @@ def _shown(attitude: Array, form: str) -> Array:
 
 
 def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
-    """Return a picture of omega, and of the attitude if any, over time."""
     from matplotlib.figure import Figure
 
     has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0

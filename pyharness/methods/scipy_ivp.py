@@ -77,7 +77,7 @@ def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> 
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that SciPy's method `name` can meet from 0 to `time` (s)."""
+    """Return the smallest tolerance that SciPy's `name` can meet to `time` (s)."""
     if isinstance(scene.torque, StateTorque):
         return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
     ahead = _Run(scene, time, name).ahead()
@@ -149,7 +149,7 @@ def scipy_method(name: str) -> Integrator:
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return omega (rad/s) at time 0, and the initial quaternion if the scene has one."""
+    """Return omega (rad/s), and the quaternion if any, at time 0."""
     return (*scene.omega, *(scene.attitude or ()))
 
 

@@ -1,4 +1,4 @@
-"""Integrations by SciPy's `solve_ivp` under one work limit; SciPy is imported on first use."""
+"""Integrations by SciPy's `solve_ivp` under one work limit."""
 
 import contextlib
 import math

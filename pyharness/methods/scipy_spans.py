@@ -26,21 +26,21 @@ _FINER = 0.01
 
 
 class Span(NamedTuple):
-    """A part of an integration: the time at its end (s), and its longest step (s)."""
+    """A part of an integration: its end, and its longest step (s)."""
 
     end: float
     longest: float
 
 
 class Beside(NamedTuple):
-    """The rows of a series at the requested times, and the spans that its steps bound."""
+    """The rows of a series, and the spans that its steps bound."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return the times (s) at which a table of the torque changes before `end`, and `end`."""
+    """Return the times (s) at which a table changes before `end`, and `end`."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     breaks = [] if torque.tape is None else torque.tape.breaks

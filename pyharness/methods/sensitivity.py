@@ -1,4 +1,4 @@
-"""Sensitivity of a motion to rounding errors: error amplification, and the resulting error."""
+"""Sensitivity of a motion to rounding errors."""
 
 import math
 from dataclasses import replace

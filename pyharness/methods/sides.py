@@ -1,4 +1,4 @@
-"""Parts of a trajectory: its rows in reverse order, and the two sides of time 0 joined."""
+"""Trajectories in reverse order, or joined at time 0."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,7 +12,7 @@ _WORST_FIRST = ("singular", "overflow", "unchecked", "sensitive", "complete")
 
 
 def row_names(found: Trajectory) -> tuple[str, ...]:
-    """Return the names of the arrays of a trajectory that have a row for each time."""
+    """Return the names of the arrays with a row for each time."""
     return _ROWS if found.attitude is None else (*_ROWS, "attitude")
 
 

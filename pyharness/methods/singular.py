@@ -1,4 +1,4 @@
-"""The operation of a recorded torque that is not defined where an integration ends."""
+"""The operation of a recorded torque that is not defined."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -50,7 +50,7 @@ def undefined_operation(
         )
 
     def vanishes(slot: int) -> bool:
-        """Return whether a slot becomes 0: it is small, and halved by a step that is tiny."""
+        """Return whether a slot becomes 0: small, and halved by a tiny step."""
         size, step = (abs(x[slot]) if np.isfinite(x[slot]) else 0.0 for x in (at_begin, earlier))
         if begin == end:
             size = step = 0.0

@@ -65,31 +65,30 @@ def solve(
     Parameters
     ----------
     scene : Scene
-        The scene. Only methods with a fixed step use its step size.
+        The scene.
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
         A name in `pyharness.methods.registry.METHODS`.
     tolerance : float
-        Largest allowed error of a component of omega at `times`, relative to the largest component
-        from 0 to the last time. The default depends on the method, 1e-12 for `auto`; the
-        trajectory's `tolerance` reports it. A method with a fixed step takes none.
+        Largest allowed error of a component of omega at `times`, relative to the largest one from 0
+        on. The default depends on the method, 1e-12 for `auto`. A method with a fixed step takes
+        none.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool
-        Whether the attitude is computed too, from that of the scene, or from axes parallel to those
-        of space. The tolerance then also applies to its angle (rad). A torque that depends on the
-        attitude, or is about the axes of space, requires it.
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0); the tolerance also
+        applies to its angle (rad). A torque that depends on it, or is about the axes of space,
+        requires it.
     dense_output : bool
-        Whether `sol` of the trajectory is the solution as a function of time, from 0 to the last of
-        `times` on each side of 0, within the tolerance. It consists of polynomials, which take
-        further integrations; with a fixed step, of a cubic on each step.
+        Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
+        within the tolerance. Its polynomials take further integrations; with a fixed step they are
+        cubics on each step.
     events : callable, Event, or list of these
-        Functions of `(t, omega)` or `(t, omega, attitude)`, whose roots from time 0 to the last of
-        `times` on each side of 0 become `t_events` and `y_events`; ready ones are in
-        `pyharness.events`. The attributes `terminal` and `direction` are those of SciPy's
-        `solve_ivp`; rows after a terminal event are removed. Functions that accept arrays of many
-        times are called with them.
+        Functions of `(t, omega)` or `(t, omega, attitude)`, perhaps of `pyharness.events`, whose
+        roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
+        as in SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept
+        arrays are called with them.
     sensitivities : iterable of str
         Names of parameters; `sensitivities` of the trajectory has the derivatives of omega, and of
         the quaternion, with respect to each: `omega0`; `moments`, `coefficients`, or `inertia`
@@ -102,18 +101,16 @@ def solve(
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`, none beyond an overflow. `steps` and
-        `evaluations` are totals. Under a torque about the axes of space, `error` is the difference
-        of two integrations, and `growth` is None.
+        One row per time, in the order of `times`, none beyond an overflow. Under a torque about the
+        axes of space, `error` is the difference of two integrations, and `growth` is None.
 
     Raises
     ------
     InputError
-        If the method is unknown, or can't take the scene or propagate its attitude; if a torque
-        comes without the attitude it needs; if the times are not in order; if a moment that changes
-        with time reaches 0; if the method can't meet the tolerance within `effort`; if dense output
-        needs too many polynomials; if an event has other arguments or results; if a parameter is
-        unknown, or sensitivities can't be computed.
+        If the method is unknown, or can't take the scene or its attitude; if a torque lacks the
+        attitude it needs; if the times are not in order; if a changing moment reaches 0; if the
+        tolerance can't be met within `effort`; if dense output needs too many polynomials; if an
+        event has other arguments or results; if sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 

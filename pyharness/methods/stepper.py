@@ -1,4 +1,4 @@
-"""A motion that is computed step by step, while the user changes the torque or the state."""
+"""A motion step by step, while the user changes torque or state."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -310,7 +310,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory to `end` (s), with the reason if its torque is not defined."""
+    """Return a trajectory with the reason if its torque is not defined."""
     if found.ended != "overflow" or not is_recorded(scene):
         return found
     try:

@@ -44,9 +44,9 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     Parameters
     ----------
     fun : callable
-        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers. It
-        consists of + - * /, integer powers, and sqrt, sin, cos, tan, exp, sinh, cosh and tanh of
-        NumPy, without branches on `t` or `y`; up to 20,000 operations.
+        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers by
+        arithmetic operators, integer powers, and NumPy's sqrt, sin, cos, tan, exp, sinh, cosh and
+        tanh, without branches on `t` or `y`; up to 20,000 operations.
     t0 : float
         The time of the initial state.
     y0 : array_like, shape (n,)
@@ -54,8 +54,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     t_bound : float
         The end, before or after `t0`.
     max_step : float, optional
-        The longest step. Default is inf. Events are found between the ends of steps; shorter ones
-        do not miss two roots within a step.
+        The longest step. Default is inf. Shorter ones find both of two roots of an event within a
+        step.
     rtol, atol : float or array_like, shape (n,), optional
         The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. A component
         that is 0 is compared with the largest if `atol` is 0. Defaults are 1e-3 and 1e-6.
@@ -64,13 +64,12 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     first_step : float, optional
         The longest first step. By default the method chooses it.
     **extraneous : dict
-        Options of other methods, such as `jac`, ignored with a warning.
+        Options of other methods, ignored with a warning.
 
     Raises
     ------
     InputError
-        If `fun` can't be recorded or does not return n numbers, or an option is not allowed. It is
-        a ValueError.
+        If `fun` can't be recorded or does not return n numbers, or an option is not allowed.
     ValueError
         If `y0` is complex or not one-dimensional.
 

@@ -1,4 +1,4 @@
-"""One step of an ordinary differential equation by its Taylor series, for callers that step."""
+"""One step of a differential equation by its Taylor series."""
 
 from typing import NamedTuple
 

@@ -1,1 +1,1 @@
-"""The data types that all other subpackages use: scenes, listings, trajectories and reports."""
+"""The data types of all subpackages: scenes, listings, trajectories and reports."""

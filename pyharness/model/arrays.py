@@ -128,14 +128,14 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `rows` with a single row repeated for each of `n` bodies."""
+    """Return `rows`, a single one repeated, for `n` bodies."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, shape (n, 4), divided by their norms; NaN where that is impossible."""
+    """Return quaternions, (n, 4), over their norms, or NaN."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

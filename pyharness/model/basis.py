@@ -1,4 +1,4 @@
-"""The basis of a limit: whether the limit is proved, derived or measured, and by what source."""
+"""The basis of a limit: proved, derived or measured, and its source."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,8 @@ MARKS = {
 class Basis:
     """The reason why a limit has its value, defined once, beside the limit.
 
-    Attributes
-    ----------
-    mark : str
-        A key of `MARKS`, the weakest of the parts.
-    limit : str
-        The quantity that is limited, and its terms.
-    source : str
-        The theorem, the derivation, or the command of the runs, in Markdown.
+    `mark` is a key of `MARKS`, the weakest of the parts; `limit` has the terms, and `source` the
+    theorem, derivation or command, in Markdown.
     """
 
     mark: str
@@ -29,6 +23,6 @@ class Basis:
     source: str
 
     def __post_init__(self) -> None:
-        """Raise ValueError if the mark is unknown, or a text empty."""
+        """Raise ValueError for an unknown mark, or an empty text."""
         if self.mark not in MARKS or not self.limit or not self.source:
             raise ValueError(f"not a basis of a limit: {self}")

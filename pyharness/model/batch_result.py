@@ -1,4 +1,4 @@
-"""The base class of the results of solvers and compiled programs for a batch of many bodies."""
+"""The base class of results for many bodies."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,8 @@ _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 class BatchResult:
     """The angular velocities of n bodies, and how the computation of each body ended.
 
-    Attributes
-    ----------
-    omega : ndarray, shape (n, ..., 3)
-        Angular velocity about the body axes, rad/s, at one or more times; NaN without result.
-    status : ndarray of int8, shape (n,)
-        The integers of `pyharness.model.codes.Statuses`.
+    `omega` (rad/s), shape (n, ..., 3), is NaN without result; `status`, shape (n,), is of
+    `pyharness.model.codes.Statuses`.
     """
 
     omega: Array

@@ -1,4 +1,4 @@
-"""Versions and build options of this installation, and the packages that it depends on."""
+"""Versions and build options of this installation."""
 
 import os
 import sys
@@ -92,7 +92,7 @@ class Installation:
 
 
 def installation() -> Installation:
-    """Return how pyharness was installed, the machine, and the versions of packages."""
+    """Return the installation, the machine, and versions of packages."""
     folder = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     return Installation(
         folder=folder,
@@ -149,7 +149,7 @@ def _arithmetic() -> str | None:
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:
-    """Return "processor", "cores", and the versions of those of `packages` that are installed."""
+    """Return "processor", "cores", and the versions of installed `packages`."""
     found = {"processor": _processor(), "cores": str(os.cpu_count())}
     return found | {name: text for name in packages if (text := _version(name)) is not None}
 
@@ -177,7 +177,7 @@ def _version(package: str) -> str | None:
 
 
 def doctor_report(build: Build, here: Installation) -> Report:
-    """Return the report of the subcommand `doctor`, with the use of each optional package."""
+    """Return the report of the subcommand `doctor`."""
     rows = {
         "pyharness": build.version,
         "installed by": here.installer,

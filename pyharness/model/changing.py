@@ -57,7 +57,7 @@ class Changing:
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the angular momentum (kg m2/s) about the body axes, shape (n, 3), of n rows."""
+        """Return the angular momentum (kg m2/s) about the body axes, (n, 3)."""
         matrix = self.matrix(times)
         rows = [sum(each * omega[:, k] for k, each in enumerate(row)) for row in matrix]
         return np.stack([np.asarray(row) for row in rows], axis=-1)
@@ -76,7 +76,7 @@ class Changing:
         return max(first for first, _ in zeros), min(last for _, last in zeros)
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError if a moment reaches 0 between time 0 and one of `times` (s)."""
+        """Raise InputError if a moment reaches 0 up to one of `times` (s)."""
         first, last = self.span
         for time in times:
             if not first < time < last:

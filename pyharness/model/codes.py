@@ -19,7 +19,7 @@ class Statuses:
 
 
 class Methods:
-    """The integers that select a method in the kernel of a prepared solver."""
+    """The integers that select a method of a prepared solver."""
 
     TAPE = 0  # the Taylor series of a recorded torque
     CLOSED_FORM = 1  # for scenes without torque
@@ -54,7 +54,7 @@ class Places:
 
 
 class Series:
-    """Limits of the order and of the local tolerance of the Taylor method."""
+    """Limits of order and local tolerance of the Taylor method."""
 
     LEAST_ORDER = 12
     MOST_ORDER = 24
@@ -66,19 +66,19 @@ class Series:
 
 
 class Waves:
-    """The limit, as a power of 2, of angles (rad) of our binary128 sine, which is NaN beyond."""
+    """The limit, as a power of 2, of angles (rad) of our binary128 sine."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
 
 class Blocks:
-    """The number of bodies that a compiled program integrates in vector instructions."""
+    """The number of bodies that a program integrates at once."""
 
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait
 
 
 class Operations:
-    """The operations of a tape; the kernel has one slot for the series of each, or more."""
+    """The operations of a tape, as the kernel knows them."""
 
     LINEAR = 1  # a constant plus a sum of coefficients times slots
     PRODUCT = 2

@@ -1,4 +1,4 @@
-"""Trajectories as objects of pandas, xarray and matplotlib, as HTML and as files."""
+"""Trajectories as objects of pandas, xarray and matplotlib, and as files."""
 
 import os
 from html import escape
@@ -36,7 +36,7 @@ class _Quantity(NamedTuple):
 
 
 class Conversions(SciPyNames):
-    """A base class of trajectories, with the conversions to objects of other packages."""
+    """A base class of trajectories, with conversions."""
 
     recorded_time: Array
     velocity: Array | None

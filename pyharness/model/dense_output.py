@@ -1,4 +1,4 @@
-"""Dense output: the solution of a scene as a function of time, by piecewise polynomials."""
+"""Dense output: the solution as a function of time, by polynomials."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,14 +24,9 @@ _WEIGHTS[[0, -1]] /= 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time that is a polynomial on each of p adjacent intervals.
+    """A function of time, a polynomial on each of p intervals between `edges` (s), ascending.
 
-    Attributes
-    ----------
-    edges : ndarray, shape (p + 1,)
-        The ends of the intervals (s), ascending.
-    values : ndarray, shape (p, NODES, m)
-        The m components at the Chebyshev points of each interval.
+    `values`, (p, NODES, m), are the components at Chebyshev points.
     """
 
     edges: Array
@@ -39,7 +34,7 @@ class Pieces:
 
     @property
     def coefficients(self) -> Array:
-        """The coefficients of Chebyshev polynomials for each interval, shape (p, NODES, m)."""
+        """The Chebyshev coefficients, shape (p, NODES, m)."""
         found: Array = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, self.values)
         return found
 

@@ -23,14 +23,9 @@ _MOST_ROTATIONS = 500
 
 @dataclass(frozen=True)
 class Diagonal:
-    """The eigenvalues of a symmetric 3 x 3 matrix and its orthonormal eigenvectors.
+    """The eigenvalues of a symmetric matrix, and orthonormal eigenvectors `vectors[k]`, exact.
 
-    Attributes
-    ----------
-    values : tuple of three Fractions
-        The eigenvalues, with relative errors of at most 2**-100; 0 for a singular matrix.
-    vectors : tuple of three tuples of three Fractions
-        `vectors[k]` belongs to `values[k]`.
+    Relative errors are at most 2**-100; a singular matrix has a 0.
     """
 
     values: Row

@@ -1,4 +1,4 @@
-"""Name and version of the installable distribution, which is not called `pyharness`."""
+"""Name and version of the distribution, which is not called `pyharness`."""
 
 from pyharness.model.errors import InputError
 
@@ -19,7 +19,7 @@ def install_command(extra: str) -> str:
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError if an optional package, which `what` needs, is not installed."""
+    """Raise InputError if a package that `what` needs is not installed."""
     from importlib import import_module
 
     try:

@@ -29,7 +29,7 @@ _MOST_STEPS_OF_ALL = 1e9
 
 
 class Integrator(Protocol):
-    """The type of a function that integrates a scene and returns a trajectory."""
+    """The type of a function that integrates a scene."""
 
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
@@ -38,7 +38,7 @@ class Integrator(Protocol):
 
 
 def checked_effort(effort: Number) -> float:
-    """Return `effort` as a float; raise InputError unless it is finite and above 0."""
+    """Return `effort` as a float above 0, or raise InputError."""
     value = number("effort", effort)
     if not 0.0 < value < math.inf:
         raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
@@ -64,7 +64,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves in the torque; 0 if it depends on the state and has no terms."""
+    """Return the number of waves in the torque; 0 under one of the state."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)

@@ -1,4 +1,4 @@
-"""Access to the compiled Fortran extension, and the status integers that its kernels return."""
+"""Access to the compiled Fortran extension."""
 
 from pathlib import Path
 from types import ModuleType

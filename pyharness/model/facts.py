@@ -1,4 +1,4 @@
-"""Facts about the thesis, with their sources, from the TOML files in `pyharness/data`."""
+"""Facts about the thesis, with sources, from `pyharness/data`."""
 
 import tomllib
 from functools import cache

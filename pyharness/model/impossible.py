@@ -1,4 +1,4 @@
-"""The warning about moments of inertia that no rigid body can have."""
+"""The warning about impossible moments of inertia."""
 
 import sys
 import warnings
@@ -38,13 +38,13 @@ class _Body(Protocol):
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest number exceeds the sum of the others, however it is rounded."""
+    """Return whether the largest exceeds the sum of the others, not by rounding."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 
 
 def warn_of_impossible(body: _Body) -> None:
-    """Warn, at the line of user code, if it creates a scene with impossible moments."""
+    """Warn, at the line of user code, of impossible moments."""
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
         frame, level = frame.f_back, level + 1

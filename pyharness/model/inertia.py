@@ -22,18 +22,10 @@ _KEPT = 256  # number of matrices whose principal frames are cached
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments and axes of one body.
+    """The principal moments (kg m2) and axes of one body, rounded and correct to some 38 digits.
 
-    Each axis is near to the body's own axis of its number; they form a right-handed frame.
-
-    Attributes
-    ----------
-    moments, moments_low : tuple of three floats
-        The moments (kg m2) rounded to nearest, and the exact minus the rounded ones.
-    axes : ndarray, shape (3, 3)
-        The axes in columns, rounded to nearest.
-    exact_moments, exact_axes : tuples of Fractions
-        Moments (kg m2) and axes, tuples of components, correct to some 38 digits.
+    Each axis, a column of `axes`, is near to the body's own axis of its number; they form a
+    right-handed frame. `moments_low` is the exact minus the rounded moments.
     """
 
     moments: Triple
@@ -125,7 +117,7 @@ def _determinant(axes: list[Exact]) -> float:
 
 
 def nearest_float(value: Fraction) -> float:
-    """Return the float nearest to a fraction, or an infinity beyond the range of floats."""
+    """Return the float nearest to a fraction, perhaps infinite."""
     try:
         return float(value)
     except OverflowError:

@@ -1,4 +1,4 @@
-"""Torque laws, or fields, in symbols: the value, its integral over time, and its derivative."""
+"""Torque laws, or fields, in symbols."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return the three components of a law at a time, about the law's axes."""
+    """Return a law at a time, about the law's axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]

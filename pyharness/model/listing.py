@@ -97,7 +97,7 @@ class Listing:
 
     @property
     def flags(self) -> int:
-        """The active names as a bit mask, an argument of the compiled programs."""
+        """The active names as a bit mask for the compiled programs."""
         return sum(1 << entry["flag"] for entry in flagged() if entry["id"] in self.active)
 
     @classmethod
@@ -122,7 +122,7 @@ def flagged() -> list[dict[str, Any]]:
 
 @cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind, "defect", "reading" or "conjecture", in one program or all."""
+    """Return the names of a kind, as "defect", in one program or all."""
     return tuple(
         entry["id"]
         for entry in flagged()
@@ -131,13 +131,13 @@ def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
 
 
 def switchable(program: str | None = None) -> tuple[str, ...]:
-    """Return the names of all defects, readings and conjectures, which --fix and --keep accept."""
+    """Return the names that --fix and --keep accept."""
     return tuple(name for kind in _FIELDS for name in names_of(kind, program))
 
 
 @cache
 def switches(program: str) -> tuple[str, ...]:
-    """Return the defects, and the conjectures with `in_original`, of the original program."""
+    """Return the defects and conjectures that are active in the original program."""
     return tuple(
         entry["id"]
         for entry in flagged()

@@ -193,7 +193,7 @@ class Mechanics:
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform n vectors, shape (n, 3), from the body to space, by unit quaternions, (n, 4)."""
+    """Transform vectors, (n, 3), from the body to space."""
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
     return vectors + scalar * twice + np.cross(vector, twice)

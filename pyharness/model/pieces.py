@@ -1,4 +1,4 @@
-"""Division of a computation for many bodies into ranges of bodies, which threads process."""
+"""Division of many bodies into ranges, which threads process."""
 
 import itertools
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Reading and writing of files that may be pipes or devices, with a limit on the waiting time."""
+"""Files that may be pipes or devices, with limited waiting."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Transformation of scenes to principal axes, and of the results back to the body's own axes."""
+"""Transformation of scenes to principal axes, and of results back."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -108,7 +108,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory of the scene of `principal`, transformed back to the body's own axes."""
+    """Return a trajectory, transformed back to the body's own axes."""
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = quaternion_of_axes(axes)

@@ -1,4 +1,4 @@
-"""Reports of the progress of a long computation, and a bar that shows it to users of Python."""
+"""Reports of the progress of a long computation."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -19,11 +19,11 @@ _bar: ContextVar[Any] = ContextVar("bar", default=None)
 
 
 def no_progress(done: int, total: int, what: str) -> None:
-    """Ignore a report of progress: completed parts, all parts, and the current one."""
+    """Ignore a report of progress."""
 
 
 def bar_of_bodies(is_shown: bool) -> AbstractContextManager[None]:
-    """Show tqdm's progress bar of the bodies that are computed in this context, if `is_shown`."""
+    """Show tqdm's progress bar of bodies in this context, if `is_shown`."""
     return _shown_bar() if is_shown else nullcontext()
 
 
@@ -45,14 +45,14 @@ def has_bar() -> bool:
 
 
 def expect_bodies(n: int) -> None:
-    """Tell the bar, if any, that n bodies are computed; only the first call counts."""
+    """Tell the bar, if any, the number of bodies, once."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
 
 
 def count_done(n: int) -> None:
-    """Tell the bar, if any, that n more bodies have been computed."""
+    """Tell the bar, if any, of n completed bodies."""
     bar = _bar.get()
     if bar is not None:
         bar.update(n)
@@ -60,7 +60,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide the function that a user chose to report progress; True stands for a bar of parts."""
+    """Provide the user's function that reports progress; True is a bar."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

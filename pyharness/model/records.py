@@ -1,4 +1,4 @@
-"""Dictionaries for JSON output that describe a scene, a listing, a run or the installation."""
+"""Dictionaries for JSON output."""
 
 from dataclasses import asdict
 from typing import Any
@@ -72,7 +72,7 @@ def _wave(wave: Wave) -> dict[str, Any]:
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:
-    """Return a listing for JSON: "label", and the names of its three kinds."""
+    """Return a listing for JSON."""
     return {
         "label": listing.label,
         "defects": sorted(listing.defects),
@@ -93,7 +93,7 @@ def ending_record(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def estimate_record(trajectory: Trajectory) -> dict[str, float | None]:
-    """Return "error" (relative), "growth" and "digits" of a method for JSON; None if unknown."""
+    """Return "error", "growth" and "digits" of a method for JSON."""
     return {name: getattr(trajectory, name) for name in ("error", "growth", "digits")}
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value for CSV, a float with all digits, None as an empty text."""
+    """Return a value for CSV, with all digits; None is empty."""
     if isinstance(value, float):
         return float.__repr__(value)  # the repr of a NumPy float names its type
     if value is None:
@@ -25,12 +25,12 @@ def exact(value: Any) -> str:
 
 
 def plain(value: Any) -> str:
-    """Return a word or whole number as text; None becomes a dash."""
+    """Return a word or whole number as text; None is a dash."""
     return "-" if value is None else str(value)
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number with two digits, as 1.2e-3; None becomes a dash."""
+    """Return a number with two digits, as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -40,7 +40,7 @@ def short(x: "float | Decimal | None") -> str:
 
 
 def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
-    """Return a function that formats `scale` times a number by `form`, and None as a dash."""
+    """Return a function that formats `scale` times a number by `form`."""
     return lambda x: "-" if x is None else f"{scale * x:{form}}"
 
 
@@ -62,7 +62,7 @@ class Column(NamedTuple):
 
 
 def words(heads: str) -> list[Column]:
-    """Return left-aligned columns with the heads in a text, separated by blanks."""
+    """Return left-aligned columns with heads separated by blanks."""
     return [Column(head, left=True) for head in heads.split()]
 
 
@@ -87,7 +87,7 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV only; blanks separate its heads in `names`."""
+    """Return a table for CSV only, with heads separated by blanks."""
     return Table([Column(name) for name in names.split()], rows)
 
 
@@ -98,7 +98,7 @@ class Line(str):
 
 
 class Field(NamedTuple):
-    """A paragraph of a report, printed after its label on the same line."""
+    """A paragraph of a report after its label."""
 
     label: str
     text: str

@@ -67,27 +67,25 @@ class Scene:
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, or ChangingMoments, optional
-        The principal moments of inertia (kg m2). If they change, the attribute `moments` is None,
-        and `changing` has them.
+        The principal moments of inertia (kg m2). If they change, this attribute is None, and
+        `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
         The torque; zero by default. A function returns its components about the body axes; it is
-        called with symbols and recorded, or else given as ``opaque(function)``.
+        recorded with symbols, or else given as ``opaque(function)``.
     step_size : float
         The step size of programs and methods with a fixed step (s).
     steps : int
         The number of steps of a program.
     masses, forces : three numbers
-        The masses (kg) and forces (N) in the velocity equations of the programs. The defaults are
-        the printed ones.
+        The masses (kg) and forces (N) in the programs' velocity equations, by default as printed.
     case : int, optional
         The number of the case in Table 1 of the thesis.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional
-        A symmetric inertia matrix about the body axes (kg m2). If it changes, the attribute
-        `inertia` is None, and `changing` has it.
+        A symmetric inertia matrix about the body axes (kg m2), or None if it is `changing`.
     changing : ChangingMoments or ChangingInertia, optional
         An inertia that changes with time.
 
@@ -248,7 +246,7 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """The exact moments minus `moments` (kg m2); 0 except in the subclass `PrincipalScene`."""
+        """The exact moments minus `moments` (kg m2)."""
         return 0.0, 0.0, 0.0
 
     @property
@@ -288,11 +286,11 @@ class Scene:
         return self.law
 
     def times(self) -> list[float]:
-        """Return the times (s) of a program's results, one for each step."""
+        """Return the times (s) of a program's results."""
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return the torque over the moments, M = N / I, at `time` (s): three numbers (1/s2)."""
+        """Return M = N / I, the torque over the moments (1/s2), at `time` (s)."""
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third

@@ -70,7 +70,7 @@ def case_scene(number: SupportsIndex) -> Scene:
 
 
 def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
-    """Return the data of a user's TOML file; raise InputError if it can't be read."""
+    """Return the data of a user's TOML file, or raise InputError."""
     return toml_of(read_file(path, where), where)
 
 
@@ -203,7 +203,7 @@ def body_of(scene: Scene) -> tuple[str, list[Any]]:
 
 
 def law_of_table(table: dict[str, Any]) -> TorqueLaw:
-    """Return the torque law of a table [torque]; raise InputError if a value is invalid."""
+    """Return the torque law of a table [torque]."""
     waves = {key: _waves(f"[torque] {key}", table[key]) for key in _WAVES if key in table}
     return TorqueLaw(**{**table, **waves})
 
@@ -226,7 +226,7 @@ def check_written_schema(data: dict[str, Any], kind: str) -> None:
 
 
 def check_keys(table: dict[str, Any], allowed: Iterable[str], where: str) -> None:
-    """Raise InputError if a table, named `where`, has a key that is not `allowed`."""
+    """Raise InputError if a table has a key that is not `allowed`."""
     for key in table:
         if key not in allowed:
             raise unknown("key", key, allowed, where)

@@ -1,4 +1,4 @@
-"""Lines of a report: a description of a scene, how a run ended, and its estimated errors."""
+"""Lines of a report on a scene and a run."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ _LONGEST_TEXT = 60
 
 
 def heading(scene: Scene) -> list[str]:
-    """Return lines that describe a scene, with a warning if its moments are impossible."""
+    """Return lines that describe a scene."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, ChangingMoments):
@@ -112,7 +112,7 @@ def _tuple(values: Sequence[float]) -> str:
 
 
 def ending(trajectory: Trajectory) -> str:
-    """Return a line that says how a run ended, with its steps and evaluations."""
+    """Return a line that says how a run ended."""
     steps = counted(trajectory.steps, "step")
     counts = f"{steps}, {counted(trajectory.evaluations, 'right-hand side')}"
     if trajectory.stop is not None:
@@ -135,13 +135,13 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase on a result whose amplified rounding error exceeds the tolerance."""
+    """Return a phrase on amplified rounding errors."""
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line with a method's estimates of the error, or no line."""
+    """Return a line with a method's estimates, or none."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class SciPyNames:
-    """A base class of trajectories, with the names that results of `solve_ivp` have in SciPy."""
+    """A base class of trajectories, with the names of SciPy's results."""
 
     time: Array
     omega: Array

@@ -1,4 +1,4 @@
-"""Short text representations of results, whose length does not depend on the sizes of arrays."""
+"""Short representations of results."""
 
 import textwrap
 from dataclasses import fields, is_dataclass
@@ -11,7 +11,7 @@ _LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a result as at most ten lines, arrays by type and shape, without None."""
+    """Return a result as at most ten lines, arrays by type and shape."""
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)

@@ -1,4 +1,4 @@
-"""Torques that depend on the state: recorded from a Python function, or evaluated by calling it."""
+"""Torques that depend on the state, recorded or opaque."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -243,7 +243,7 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:
-    """Return a user's torque, with a function recorded; raise InputError for anything else."""
+    """Return a user's torque, with a function recorded, or raise InputError."""
     if isinstance(value, (TorqueLaw, StateTorque)):
         return value
     if not callable(value):

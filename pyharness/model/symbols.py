@@ -48,16 +48,16 @@ class Recorder:
         self._slots: dict[Operation, int] = {}
 
     def inputs(self) -> list["Symbol"]:
-        """Return a symbol for each input: the time, then the unknowns (omega and attitude)."""
+        """Return a symbol for each input: time, omega and attitude."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str) -> InputError:
-        """Return the exception for an operation that can't be recorded; `what` names it."""
+        """Return the exception for what can't be recorded."""
         allowed = f"allowed: {_ALLOWED}, or {self._instead}"
         return InputError(f"{self.place}: {what} can't be recorded; {allowed}")
 
     def impure(self) -> InputError:
-        """Return the exception for a function whose result depends on more than its arguments."""
+        """Return the exception for a function of more than its arguments."""
         return InputError(
             f"{self.place}: two calls of the function differ, or it keeps its arguments; allowed: "
             "a function of its arguments alone, without random numbers and memory; for a "
@@ -69,7 +69,7 @@ class Recorder:
         return Symbol(self, value, {})
 
     def slot(self, operation: Operation) -> int:
-        """Return the slot of the result of `operation`, which is recorded if it is new."""
+        """Return the slot of `operation`, recorded if new."""
         if operation not in self._slots:
             if len(self._operations) == self._most:
                 most = self._most
@@ -81,7 +81,7 @@ class Recorder:
         return self._slots[operation]
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
-        """Return the tape that computes `outputs`, without operations that are not used."""
+        """Return the tape of `outputs`, without unused operations."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
         return _without_unused(self._operations, linear, self._n_inputs)
 
@@ -291,7 +291,7 @@ class Symbol:
         return self._of("tanh", math.tanh)
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return the value of a table at this time; raise InputError if it isn't the plain time."""
+        """Return a table at this symbol, which must be the time."""
         if self._constant or self._terms != {TIME: 1.0}:
             raise InputError(
                 f"{self.recorder.place}: a table of anything but the time can't be recorded"

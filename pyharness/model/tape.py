@@ -60,7 +60,7 @@ class Tape:
 
     @property
     def inputs(self) -> frozenset[int]:
-        """The slots of the inputs on which an operation or an output depends."""
+        """The slots of the inputs that are used."""
         used = {slot for each in self.operations for slot in slots_of(each)}
         used |= {slot for output in self.outputs for slot, _ in output.terms}
         return frozenset(slot for slot in used if slot < self.n_inputs)
@@ -89,7 +89,7 @@ def slots_of(operation: Operation) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Functions(Generic[T]):
-    """The functions of an arithmetic that a tape needs beside the operators + - * and /."""
+    """The functions that a tape needs beside + - * and /."""
 
     number: Callable[[float], T]  # converts a constant of the tape
     sqrt: Callable[[T], T]
@@ -122,7 +122,7 @@ def _combined(linear: Linear, values: Sequence[Any], functions: Functions[Any]) 
 
 
 def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
-    """Return the values of all slots of a tape, as `evaluate` computes them."""
+    """Return the values of all slots of a tape."""
     values: list[Any] = list(inputs)
     for kind, operands, linear, table in tape.operations:
         if linear is not None:

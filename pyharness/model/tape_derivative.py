@@ -1,4 +1,4 @@
-"""Derivatives of a tape with respect to its inputs or to parameters, as another tape."""
+"""Derivatives of a tape by inputs or parameters, as a tape."""
 
 import math
 from collections.abc import Sequence

@@ -19,7 +19,7 @@ _OPERANDS = {"product": 2, "quotient": 2} | {
 
 
 def tape_record(tape: Tape) -> dict[str, Any]:
-    """Return a tape as a dictionary for JSON, from which `tape_of` restores it."""
+    """Return a tape as a dictionary for JSON."""
     return {
         "operations": [_operation_record(each) for each in tape.operations],
         "outputs": [_linear_record(each) for each in tape.outputs],

@@ -1,4 +1,4 @@
-"""The torque law: a torque that depends on time alone, as constant, linear and sinusoidal terms."""
+"""The torque law: a torque that depends on time alone."""
 
 import itertools
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Trajectories, which are the results of a method or a program for a scene."""
+"""Trajectories, the results for a scene."""
 
 import math
 from dataclasses import dataclass, field
@@ -65,31 +65,30 @@ class Trajectory(Mechanics, Conversions):
     time : ndarray, shape (n,)
         The true times, s.
     recorded_time : ndarray, shape (n,)
-        The variable TIME of a program's output, s, which a defect may falsify; else `time`.
+        The variable TIME of a program's output, s, which a defect may falsify.
     omega : ndarray, shape (n, 3)
         Angular velocity about the body axes, rad/s.
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        Numbers of steps (of rows, for SciPy's methods and the reference) and of evaluations of the
-        right-hand side.
+        Numbers of steps (rows, for SciPy's methods and the reference) and right-hand sides.
     ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
         How the integration ended. All rows are present if it is "sensitive", the amplified rounding
-        error exceeding the tolerance, or "unchecked": a method of SciPy may have passed a short
-        change of a recorded torque, because the series that bounds its steps does not reach the
-        end. It was "stopped" by the Lipschitz test, by an "overflow", before omega is not finite,
-        where a recorded torque is not defined ("singular"), or by a terminal "event".
+        error exceeding the tolerance, or "unchecked": SciPy may have passed a short change of a
+        recorded torque, because the series that bounds its steps does not reach the end. It was
+        "stopped" by the Lipschitz test, or by an "overflow", an undefined torque ("singular"), or a
+        terminal "event".
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
-        The error codes of the linear solver of the collocation programs; 129 for a singular matrix.
+        Error codes of the collocation programs' linear solver; 129 for a singular matrix.
     error : float or None
         Estimated error of any component, relative to the largest one along the trajectory.
     growth : float or None
-        The error amplification: the largest norm of the state-transition matrices of omega from any
-        time to the end.
+        The error amplification: the largest norm of the state-transition matrices of omega to the
+        end.
     reason : str or None
-        Where a recorded torque is not defined: the time and the operation.
+        The time and the operation at which a recorded torque is not defined.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
@@ -97,8 +96,8 @@ class Trajectory(Mechanics, Conversions):
     axes : ndarray, shape (3, 3), or None
         The principal axes, in columns; None if they are the body's own.
     exact : ndarray of object, shape (n, 8), or None
-        Rows of a program in another arithmetic than binary64: `time`, `recorded_time`, `omega` and
-        `velocity`, whose attributes are the nearest floats.
+        Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
+        their attributes are the nearest floats.
     tolerance : float or None
         The tolerance of a method without a fixed step.
     scene : Scene or None
@@ -106,12 +105,12 @@ class Trajectory(Mechanics, Conversions):
     sol : DenseOutput or None
         The solution as a function of time. It is not saved.
     t_events : list of ndarray, or None
-        The times (s) of the events of each function, in the order of `time`.
+        The times (s) of the events of each function, in order.
     y_events : list of ndarray, or None
-        Omega (rad/s), with the attitude if requested, at these events: shape (k, 3) or (k, 7).
+        Omega (rad/s), with the attitude if requested, at these: shape (k, 3) or (k, 7).
     sensitivities : dict of ndarray, or None
-        For each name the derivatives of omega (rad/s), with the quaternion if requested, at `time`:
-        shape (n, 3, m) or (n, 7, m) for a parameter of m values.
+        For each name the derivatives of omega (rad/s), with the quaternion if requested: shape (n,
+        3, m) or (n, 7, m) for a parameter of m values.
 
     Examples
     --------
@@ -153,10 +152,10 @@ class Trajectory(Mechanics, Conversions):
 
     @property
     def has_all_rows(self) -> bool:
-        """Whether all requested rows are present, as also in a sensitive trajectory."""
+        """Whether all requested rows are present."""
         return self.ended in WITH_ALL_ROWS
 
 
 def digits_left(error: float | None) -> float | None:
-    """Return the number of correct decimal digits, 0 to 15.95 (binary64), or None if unknown."""
+    """Return the number of correct decimal digits, 0 to 15.95 (binary64), or None."""
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))

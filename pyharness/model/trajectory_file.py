@@ -69,7 +69,7 @@ def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
 
 
 def file_content(found: "Trajectory") -> bytes:
-    """Return the bytes of the file of a trajectory; they depend on the trajectory alone."""
+    """Return the bytes of a file, which depend on the trajectory alone."""
     if found.exact is not None:
         raise InputError(
             "the trajectory has numbers in another arithmetic than binary64, which can't be "
@@ -129,7 +129,7 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
 
 
 def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
-    """Add the name, length and bytes of an entry of an archive to a digest of hashlib."""
+    """Add name, length and bytes of an entry to a digest."""
     digest.update(f"{name} {len(data)}\n".encode())
     digest.update(data)
 

@@ -25,7 +25,7 @@ _THREE_FLOATS = [float, float, float]
 
 
 def number(where: str, value: object) -> float:
-    """Return a user's real number, perhaps infinite or NaN, as a float, or raise InputError."""
+    """Return a real number, perhaps not finite, as a float, or raise InputError."""
     found = converted(value)
     if isinstance(found, float):
         return found
@@ -51,7 +51,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, a boolean, an array or the like, even if float() takes it."""
+    """Return whether a value is text, boolean, array or the like, despite float()."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -75,7 +75,7 @@ def _plain(text: str) -> str:
 
 
 def three(where: str, values: object) -> Triple:
-    """Return three finite numbers of a user as floats, or raise InputError."""
+    """Return three finite numbers as floats, or raise InputError."""
     found = three_floats(where, values)
     for each in found:
         if not math.isfinite(each):
@@ -84,7 +84,7 @@ def three(where: str, values: object) -> Triple:
 
 
 def three_floats(where: str, values: object) -> Triple:
-    """Return three real numbers of a user, perhaps not finite, as floats, or raise InputError."""
+    """Return three real numbers, perhaps not finite, as floats, or raise InputError."""
     if type(values) is tuple and [type(each) for each in values] == _THREE_FLOATS:
         return values
     allowed = "allowed: three numbers"
@@ -97,7 +97,7 @@ def three_floats(where: str, values: object) -> Triple:
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number of a user as a float, or raise InputError."""
+    """Return a finite number as a float, or raise InputError."""
     found = number(where, value)
     if not math.isfinite(found):
         raise _not_finite(where, found)
@@ -119,7 +119,7 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number of a user as an int; raise InputError for others, and all floats."""
+    """Return a whole number, but no float, as an int, or raise InputError."""
     if type(value) is int:
         return value
     if not is_no_number(value):
@@ -131,7 +131,7 @@ def integer(where: str, value: object) -> int:
 
 
 def boolean(where: str, value: object) -> bool:
-    """Return a user's True or False, of Python or NumPy, or raise InputError."""
+    """Return True or False, of Python or NumPy, or raise InputError."""
     if isinstance(value, bool) or kind_of(value) == "true or false":
         return bool(value)
     raise InputError(f"{where} is {kind_of(value)}; allowed: True or False")

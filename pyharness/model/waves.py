@@ -37,7 +37,7 @@ class ExactLaw:
     frame: str
 
     def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with constant, rate and amplitudes rotated by the function `turn`."""
+        """Return the law with its vectors rotated by `turn`."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
             return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
@@ -47,7 +47,7 @@ class ExactLaw:
         )
 
     def rounded(self) -> TorqueLaw:
-        """Return the law rounded to floats; raise InputError if a number is beyond their range."""
+        """Return the law in floats, or raise InputError."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
             return tuple((_rounded(amplitude), frequency) for amplitude, frequency in each)
@@ -70,7 +70,7 @@ def merged(law: TorqueLaw) -> TorqueLaw:
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
-    """Return whether `merged` changes a law, apart from waves of amplitude 0."""
+    """Return whether `merged` changes a law."""
     for waves in (law.sines, law.cosines):
         # A wave of amplitude 0 is ignored.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
@@ -129,7 +129,7 @@ def _rounded(values: Exact) -> Triple:
 
 
 def with_merged_waves(scene: Scene) -> Scene:
-    """Return the scene with a merged torque law; another torque is unchanged."""
+    """Return the scene with a merged torque law, if any."""
     if not isinstance(scene.torque, TorqueLaw):
         return scene
     law = merged(scene.torque)

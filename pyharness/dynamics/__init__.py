@@ -1,1 +1,1 @@
-"""Right-hand sides: Euler's equations with a torque that depends on the state."""
+"""Right-hand sides of Euler's equations, and ready torques."""

@@ -1,4 +1,4 @@
-"""Evaluation of a tape for many times and states at once, in NumPy's arrays."""
+"""Evaluation of a tape for many states in NumPy's arrays."""
 
 from collections.abc import Sequence
 from contextlib import suppress

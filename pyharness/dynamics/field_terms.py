@@ -1,4 +1,4 @@
-"""Torque terms of fields in space: gravity gradient, magnetic field, and torques fixed in space."""
+"""Torque terms of fields, and torques fixed in space."""
 
 from collections.abc import Iterable
 from typing import Any

@@ -1,4 +1,4 @@
-"""Parameters of a scene, and its equations of motion with their partial derivatives."""
+"""Parameters of a scene, and partial derivatives of its equations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at time 0, shape (n,), and its derivatives by column, shape (n, m)."""
+    """Return the state at 0, (n,), and its derivatives by column, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]

@@ -1,4 +1,4 @@
-"""The right-hand side of the equations of motion of any scene, for many times and states."""
+"""The right-hand side of any scene, for many states."""
 
 from dataclasses import replace
 

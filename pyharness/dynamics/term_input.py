@@ -41,7 +41,7 @@ def _file_value(value: Any) -> Any:
 
 
 def is_diagonal(matrix: Array) -> bool:
-    """Return whether all elements outside the diagonal of a matrix, shape (3, 3), are 0."""
+    """Return whether a matrix is diagonal."""
     return np.array_equal(matrix, np.diag(np.diag(matrix)))
 
 

@@ -70,7 +70,6 @@ def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
 
 
 def _prepared(load: EnsembleLoad) -> Callable[[], object]:
-    """Return a function that solves a load by a prepared closed form."""
     solver, out = prepare(load.scene, "closed-form"), np.empty_like(load.omega0)
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 

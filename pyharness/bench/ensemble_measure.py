@@ -172,7 +172,6 @@ def measure_ensembles(
 
 
 def _fastest(rows: Iterable[Rate]) -> Iterable[Rate]:
-    """Return the fastest variant of each solver, in order."""
     found: dict[tuple[object, ...], Rate] = {}
     for row in rows:
         place = (row.load, row.target, row.method, row.threads)

@@ -35,10 +35,7 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return tables of speeds, of time per body, and of memory.
-
-    `packages` are those whose versions are listed, `command` repeats the report.
-    """
+    """Return tables of speeds, of time per body, and of memory."""
     return measured_report(
         "## Ensembles",
         _DRIFT,

@@ -92,7 +92,6 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
 
 
 def _right_hand_side(scene: Scene) -> RightHandSide:
-    """Return the equations of motion for SciPy's integrators."""
     if isinstance(scene.torque, StateTorque):
         return slopes_of(scene)
     slopes = scene.right_hand_side()

@@ -36,8 +36,7 @@ _DRIFT = (
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
     """Return a table for each workload, mean ratios, and the machine.
 
-    For random scenes there are distributions of the ratios instead. `packages` are those whose
-    versions are listed, `command` repeats the report.
+    For random scenes there are distributions of the ratios instead.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -187,7 +186,6 @@ def ratio(value: float | None) -> str:
 
 
 def _parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return titled tables: run times of each workload, geometric means of each group."""
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:

@@ -56,10 +56,7 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return tables of single bodies, of many, and mean ratios.
-
-    `packages` are those whose versions are listed, `command` repeats the report.
-    """
+    """Return tables of single bodies, of many, and mean ratios."""
     return measured_report(
         "# Torques that depend on the state",
         _WORTH,

@@ -142,7 +142,6 @@ def leave(code: int) -> None:
 
 
 def _is_pending() -> bool:
-    """Return whether a KeyboardInterrupt is being handled."""
     error: BaseException | None = sys.exception()
     while error is not None:
         if isinstance(error, KeyboardInterrupt):

@@ -128,7 +128,6 @@ def _listed(mark: Path, kind: str) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    """Return two temporary paths for replacing a folder."""
     new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
     return new, old
 

@@ -33,7 +33,6 @@ class Parser(argparse.ArgumentParser):
     """The parser of one verb, which suggests the nearest known name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
-        """Declare the OPTIONS of a verb's module."""
         self._width = _WIDEST
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(

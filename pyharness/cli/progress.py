@@ -16,12 +16,10 @@ class _Terminal:
         return getattr(sys.stderr, name)
 
     def write(self, text: str) -> None:
-        """Write a text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.write(text)
 
     def flush(self) -> None:
-        """Flush the text; a failure is ignored."""
         with suppress(OSError, ValueError):
             sys.stderr.flush()
 

@@ -107,7 +107,6 @@ def _first() -> Scene:
 
 
 def _output(program: str) -> str:
-    """Return the text that a Python program prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(program, {})

@@ -130,7 +130,6 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def _references(entities: Sequence[dict[str, Any]], prefix: str) -> Any:
-    """Return references to the entities whose identifiers begin with `prefix`."""
     found = [{"@id": each["@id"]} for each in entities if each["@id"].startswith(prefix)]
     return found[0] if len(found) == 1 else found
 

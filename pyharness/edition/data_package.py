@@ -125,7 +125,6 @@ def _parts(progress: Progress) -> Iterator[Part]:
 
 
 def _cards(program: str) -> bytes:
-    """Return a program's cards as CSV, by number."""
     found = deck(program)
     rows = [
         [
@@ -145,7 +144,6 @@ def _caption(plan: FigurePlan) -> str:
 
 
 def _readme(parts: list[Part]) -> Part:
-    """Return the package's README, which lists all other files."""
     described = codemeta()
     rows = [
         *((each.path, each.title) for each in parts),
@@ -172,5 +170,4 @@ def _manifest(content: Mapping[str, bytes]) -> bytes:
 
 
 def _indented(record: dict[str, Any]) -> bytes:
-    """Return a dictionary as strict, indented JSON."""
     return json_text(record, indent=2).encode()

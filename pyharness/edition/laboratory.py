@@ -158,7 +158,6 @@ def _first() -> dict[str, Any]:
 
 
 def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    """Return a step's cells in the table of results."""
     assert run.velocity is not None
     values = [run.time[number], *run.omega[number], *run.velocity[number]]
     values.append(run.recorded_time[number])

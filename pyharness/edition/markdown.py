@@ -131,7 +131,6 @@ def slug(title: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return a line of Markdown as plain text."""
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 

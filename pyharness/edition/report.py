@@ -53,7 +53,6 @@ def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
 
 
 def _sizes(content: Mapping[str, bytes]) -> Table:
-    """Return a table of number and size (kB) by suffix."""
     sizes: dict[str, list[int]] = {}
     for name, each in content.items():
         sizes.setdefault(PurePosixPath(name).suffix.lstrip("."), []).append(len(each))

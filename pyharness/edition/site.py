@@ -107,8 +107,7 @@ class Page(NamedTuple):
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return all files of the site, content by path.
 
-    `progress` gets the number of completed parts, of all parts, and the name of the part. `docs` is
-    by default the checkout's.
+    `progress` is as in `data_package`; `docs` is by default the checkout's.
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
@@ -236,7 +235,6 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _listed() -> set[str]:
-    """Return the paths of the pages in the menu."""
     return {path for section in MENU.values() for _, path in section}
 
 

@@ -147,12 +147,10 @@ def _distance(run: Trajectory, goal: Array) -> float:
 
 
 def _first_error(case: int, program: str, listing: str = "original") -> float:
-    """Return the largest error of omega1 (rad/s)."""
     return _distance(_run(case, program, listing), _truth(case).omega)
 
 
 def _largest_error(case: int, program: str, listing: str) -> float:
-    """Return the largest error of omega (rad/s)."""
     run = _run(case, program, listing)
     return float(np.abs(run.omega - _truth(case).omega[: run.steps]).max())
 
@@ -199,13 +197,11 @@ def _velocity_chart(run: Trajectory) -> Chart:
 
 
 def _second_velocity(run: Trajectory) -> list[float]:
-    """Return V2 (m/s) after each step."""
     assert run.velocity is not None
     return [float(row[1]) for row in run.velocity]
 
 
 def _race_chart(listing: str) -> Chart:
-    """Return each program's largest error by case, on a logarithmic scale."""
     axes = ("case", "largest error, rad/s")
     found = _chart(f"race-{listing}", axes, (1.5, 7.5), (-8, 2), _powers(-8, 2), is_log=True)
     curves = [
@@ -231,7 +227,6 @@ def _chart(
 
 
 def _even(low: float, high: float) -> list[tuple[float, str]]:
-    """Return round numbers of a range with labels."""
     raw = (high - low) / 5.0
     unit = 10.0 ** math.floor(math.log10(raw))
     step = next(unit * m for m in (1, 2, 5, 10) if unit * m >= raw)
@@ -241,7 +236,6 @@ def _even(low: float, high: float) -> list[tuple[float, str]]:
 
 
 def _powers(low: int, high: int) -> list[tuple[float, str]]:
-    """Return powers of ten of a range, by exponent, with labels."""
     return [(n, power_of_ten(n) if n else "1") for n in range(low, high + 1) if n % _LOG_STEP == 0]
 
 

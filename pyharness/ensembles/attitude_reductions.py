@@ -76,7 +76,6 @@ def pointing_error(batch: Batch, given: Given) -> Array:
 
 
 def _in_space(batch: Batch) -> Array:
-    """Return the final attitudes from body to space, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 

@@ -124,7 +124,6 @@ def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
 
 
 def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
-    """Return the initial attitudes, shape (n, 4), or None if no axis varies them."""
     if not any(name in own for name in ATTITUDE):
         return None
     base = scene.attitude or IDENTITY
@@ -133,7 +132,6 @@ def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
 
 
 def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    """Return three components of a quantity, shape (n, 3), or None."""
     fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
     if not any(field in own for field in fields):
         return None

@@ -54,7 +54,6 @@ class Store:
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
-        """Open the arrays in an existing folder."""
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
@@ -116,7 +115,6 @@ class Store:
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
-        """Return whether a chunk is complete; raise DamageError if damaged."""
         checksums = self._checksums(chunk)
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)

@@ -275,7 +275,6 @@ def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
 
 
 def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
-    """Yield each combination of program, method, listing and reading on the axes."""
     words = [axis for axis in axes if axis.is_choice]
     counts = {axis.dimension: axis.count for axis in words}
     for at in itertools.product(*map(range, counts.values())):

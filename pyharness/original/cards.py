@@ -1,10 +1,9 @@
 """The text of the edition: every card of the three decks, and how the scan shows it.
 
-A card is a line of a printed program; a deck is the cards of one program. A line of the scan is a
-card number, a dash and the text of the card; blanks are ignored. The tables in `data/cards` contain
-the decks, the pages of the scan in their order, and the lines of the Python twin that correspond to
-each card. `data/apparatus.toml`, the critical apparatus, explains the deviations of the scan from
-our text.
+A card is a line of a printed program, a deck the cards of one. A line of the scan is card number,
+dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and the twin's
+lines of each card; `data/apparatus.toml`, the critical apparatus, explains the deviations of the
+scan.
 """
 
 import re
@@ -34,20 +33,10 @@ class Difference(NamedTuple):
 class Card(NamedTuple):
     """A card of a printed program, and how the scan shows it.
 
-    Attributes
-    ----------
-    program : str
-        Name of the program, one of `PROGRAMS`.
-    number : int
-        Card number: 100, 110, 120, ...
-    text : str
-        Columns 1 to 72 in our text.
-    differences : tuple of Difference
-        From left to right. Each is the first occurrence of its characters after the previous one.
-    printed : tuple of (str, str) or None
-        Another card number that the scan shows, and the apparatus entry that explains it.
-    lost : str or None
-        The apparatus entry about the loss of a card that the scan lacks.
+    `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
+    occurrence of its characters after the one before. `printed` is another number that the scan
+    shows, with the apparatus entry that explains it; `lost` the entry about a card that the scan
+    lacks; else None.
     """
 
     program: str
@@ -281,8 +270,7 @@ def passages(
 ) -> Iterator[tuple[str, Difference | None]]:
     """Yield each passage of a card's text with its difference from the scan, or None.
 
-    `differences` are all differences of the card, in the order of the text; else ValueError is
-    raised.
+    `differences` are all of the card's, in order; else ValueError is raised.
     """
     # Indices of all characters that are not blanks. Blanks are ignored.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]

@@ -1,10 +1,10 @@
 """The rounding rules of the floating-point arithmetic of the CDC 6600 and CYBER 70.
 
 The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient of
-p = 48 bits and an exponent. A sum is formed in a register of 2 p bits, the frame. `FX` denotes the
-truncating instructions for sum, difference, product and quotient (octal 30, 31, 40 and 44), `RX`
-the rounding ones (34, 35, 41 and 45). NX (24) normalises a sum. There is no guard bit: the bits
-below the unit of the larger operand are truncated before NX shifts the sum to the left.
+p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, the frame. `FX` denotes
+truncating sum, difference, product and quotient (octal 30, 31, 40 and 44), `RX` rounding ones (34,
+35, 41 and 45). There is no guard bit: the bits below the unit of the larger operand are truncated
+before NX (24) normalises a sum.
 """
 
 from pyharness.original.rounding import Operation, Pair, Rules, rounding
@@ -16,8 +16,7 @@ LEAST, MOST = -1023, 1022
 def cdc(p: int, rounds: bool) -> Rules:
     """Return the arithmetic of the CDC for p-bit coefficients: RX if `rounds`, else FX.
 
-    Literals are rounded to nearest. This is an assumption: no source states how CDC's compiler FTN
-    converted them.
+    Literals are rounded to nearest, an assumption: no source states how CDC's FTN converted them.
     """
     settled = rounding(p, LEAST, MOST, cut=True, gradual=False)
     quarter = 1 << p - 2 if rounds else 0
@@ -49,9 +48,9 @@ def _sum(p: int, rounds: bool) -> Operation:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is an integer in units of 2**(e - p), e the larger exponent. Both coefficients have p
-    bits. The operand with the smaller exponent is shifted and truncated; if `rounds`, half a unit
-    in the last place is first added to each operand, as in RX.
+    The frame is in units of 2**(e - p), e the larger exponent; coefficients have p bits. The
+    smaller operand is shifted and truncated; if `rounds`, half a unit in the last place is first
+    added to each, as in RX.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

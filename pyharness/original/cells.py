@@ -1,7 +1,7 @@
-"""Cells: combinations of a listing and a case, for which Fortran port and twin are compared.
+"""Combinations of a listing and a case, for which Fortran port and twin are compared.
 
-A listing is a program with a choice of active defects, readings and conjectures. A case is a scene
-of Table 1.
+A listing is a program with a choice of defects, readings and conjectures, a case a scene of Table
+1.
 """
 
 from collections.abc import Iterator
@@ -51,8 +51,8 @@ def cell_name(listing: Listing, case: int) -> str:
 def listing_name(listing: Listing) -> str:
     """Return a name, without blanks, for a listing.
 
-    It is ``corrected``; or ``original`` and the chosen readings, each after a colon; or the names
-    of all chosen defects, readings and conjectures, joined by ``+``.
+    ``corrected``; ``original`` and readings, each after a colon; or all switches and readings,
+    joined by ``+``.
     """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))

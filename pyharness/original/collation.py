@@ -79,8 +79,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    Each deviation at a card must name an entry that declares it, each declared deviation must be at
-    a card, and a lost card must name an entry of the kind ``missing text``.
+    Each deviation must name an entry that declares it and vice versa; a lost card must name an
+    entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

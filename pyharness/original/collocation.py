@@ -1,9 +1,9 @@
 """Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
 
-A step is an interval, in which every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34).
-Its derivative equals the right-hand side at as many collocation points as there are terms after
-x(0) (eq. 36). A first estimate assumes a constant right-hand side; one correction evaluates it at
-the collocation points, with the unknowns of the estimate.
+In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34), with
+the right-hand side as derivative at as many collocation points as there are terms after x(0) (eq.
+36). A first estimate assumes a constant right-hand side; one correction evaluates it at the points
+along the estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,10 +30,9 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    `points_of` returns the collocation points (s) from the start of a step, given DT, the step size
-    as the program computes it. `rates` returns the right-hand sides of all unknowns at one point,
-    from the torques over the moments of inertia (1/s2) at the start and all points, the number k of
-    the point (0 for the start), and the unknowns.
+    `points_of` returns the collocation points (s) from DT, the step as the program computes it.
+    `rates` returns the right-hand sides at point k (0 for the start), from the torques over the
+    moments (1/s2) at the start and all points, k, and the unknowns.
     """
     h = scene.step_size
     dt = h
@@ -65,11 +64,10 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one interval, and the error code IER that the programs print.
+    """Return all unknowns after one interval, and the error code IER of the correction.
 
-    `start` has the unknowns at the start; `points` and `end` are in seconds from it. `rates`
-    returns the right-hand sides at point k (0 for the start), from k and the unknowns. IER is that
-    of the second solution, the correction.
+    `points` and `end` are in seconds from the `start`. `rates` returns the right-hand sides at
+    point k (0 for the start), from k and the unknowns.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))

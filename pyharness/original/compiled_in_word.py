@@ -25,9 +25,8 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing in a word; the result is that of `in_word.run`.
 
-    Raise InputError if the extension's compiler does not support the word, or if angles of the
-    torque's waves are too large for the extension's sine, and NotBuiltError if the extension is not
-    built.
+    Raise InputError if the compiler does not support the word, or angles of the torque are too
+    large for its sine; NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)

@@ -17,23 +17,11 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 class Row(NamedTuple):
     """An operation, and whether the decks and the thesis agree on it.
 
-    Attributes
-    ----------
-    what : str
-        A description of the operation.
-    cards : dict of str to str
-        The card numbers by program, as in ``750-770, 800``.
-    decks : str
-        ``agree`` if all decks with the operation have the same statements, ``names`` if only names
-        differ, ``order`` if only names and order differ, else ``differ``. ``-`` if no deck has it.
-    thesis : str
-        Whether the thesis ``agrees`` with the decks, ``differs`` or is ``silent``.
-    text, says : str
-        The place in the thesis, and its statement; empty if the thesis is silent.
-    entries : tuple of str
-        The apparatus entries that explain a disagreement.
-    reason : str
-        An explanation that is not in the apparatus.
+    `cards` has the numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all decks
+    with the operation have the same statements, ``names`` if only names differ, ``order`` if only
+    names and order, else ``differ``; ``-`` if no deck has it. `thesis` is ``agrees``, ``differs``
+    or ``silent``; `text` and `says` are place and statement. `entries` of the apparatus, or
+    `reason`, explain a disagreement.
     """
 
     what: str

@@ -1,8 +1,7 @@
 """Decks as fixed-form FORTRAN, and runs of them after compilation.
 
-A third, independent way from the cards to the results, besides port and twin: it shares the table
-of cards with the edition, but no code with either. The compiler translates the author's own
-statements, and a separate version of the solver LEQT1F (`data/cards/leqt1f.f`).
+They are a third, independent way from the cards to the results: the author's statements, compiled
+with a separate LEQT1F (`data/cards/leqt1f.f`). They share no code with port and twin.
 """
 
 import re
@@ -55,25 +54,12 @@ def deck_text(
 ) -> str:
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
-    Parameters
-    ----------
-    listing : Listing
-        The program with its active defects and readings.
-    scene : Scene, optional
-        A case of Table 1, whose numbers replace those of the deck's assignment cards and DO
-        statement. By default the case on the published cards: Case 2 with 300 steps
-        (collocation) or Case 5 with 100 steps (Runge-Kutta).
-    dialect : {"1982", "gfortran", "ftn"}
-        "1982": the cards without changes. "ftn", for the original compiler, adds only the torque of
-        Case 7. "gfortran" adds this torque and the changes that a modern compiler needs. Column 73
-        marks each card that a dialect adds or replaces.
-    terms : int, optional
-        3 or 5, for a conjectural deck that is derived from the four-term deck.
-
-    Raises
-    ------
-    InputError
-        If the dialect is unknown, or no card can express the listing, the terms or the scene.
+    By default it is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
+    with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
+    DO statement. `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7,
+    "gfortran" also what a modern compiler needs; column 73 marks these cards. `terms`, 3 or 5,
+    requests the conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card
+    can express the request.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -133,9 +119,9 @@ def corrections(program: str) -> dict[int, list[str]]:
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
 
-    The job includes our LEQT1F if the deck calls it. `system` ("nos" or "nosbe") selects the
-    control statements. `rounds` sets FTN's option ROUND, with which sums, products and quotients
-    are rounded. Raise InputError if the system is unknown.
+    It includes our LEQT1F if needed. `system` ("nos" or "nosbe") selects control statements;
+    `rounds` sets FTN's option ROUND for sums, products and quotients. Raise InputError if the
+    system is unknown.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -181,8 +167,8 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 def model_cards(terms: int) -> dict[int, str]:
     """Return the cards, by new number, of a collocation deck with `terms` terms.
 
-    They are a conjecture from the four-term deck: V.2 uses three and five terms in Case 6, but the
-    thesis prints no such deck. The n collocation points are at k/(n+1) of the interval, k = 1 to n.
+    A conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such deck. The n
+    collocation points are at k/(n+1) of the interval, k = 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -297,8 +283,8 @@ def compiler() -> str | None:
 def run_deck(text: str, folder: Path | None = None) -> Run:
     """Compile and run a deck in the dialect `gfortran`, and return its output.
 
-    The compiled solver is kept in `folder` for later calls; by default it is compiled each time.
-    Raise RuntimeError if the compiler rejects the deck, or if the program fails.
+    `folder` keeps the compiled solver for later calls. Raise RuntimeError if compiler or program
+    fails.
     """
     with TemporaryDirectory() as place:
         here = Path(place)

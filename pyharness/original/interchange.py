@@ -42,7 +42,6 @@ def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
 
 
 def _pattern(x: Number) -> int:
-    """Return sign, exponent and fraction of a number, highest bit first, as an integer."""
     p = x.word.p
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:

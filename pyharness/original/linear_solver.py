@@ -11,8 +11,8 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
 
-    The arguments are not changed. If A is algorithmically singular, IER is `SINGULAR` (129), and
-    every b is returned instead of its x; otherwise IER is 0.
+    If A is algorithmically singular, IER is `SINGULAR` (129), and every b is returned instead of
+    its x; otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -22,10 +22,9 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite the rows of a matrix by its LU factors, and return the pivot rows.
+    """Overwrite the rows of a matrix by its LU factors; return the pivot rows, None if singular.
 
-    A pivot row is the index of the row exchanged with that of the diagonal element. None if the
-    matrix is singular.
+    A pivot row is the index of the row exchanged with that of the diagonal element.
     """
     n = len(a)
     pivots = []

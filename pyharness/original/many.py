@@ -200,8 +200,8 @@ def _run(
 ) -> ProgramEnsemble:  # fmt: skip
     """Run a compiled program for n bodies, with checked arguments.
 
-    `inputs` contains the arrays of `run_many` by name; ``inputs["body"]`` contains the moments of
-    inertia if `by_moments`, else A, B, C. `wanted` contains the steps whose results are returned.
+    `inputs` has the arrays of `run_many` by name; ``inputs["body"]`` moments if `by_moments`, else
+    A, B, C. `wanted` are the returned steps.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
@@ -254,8 +254,8 @@ def _run(
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
     """Yield the range of bodies for each call of the kernel.
 
-    One thread makes one call; several share a larger number of calls. Each but the last has a
-    multiple of the number of bodies that the kernel processes simultaneously.
+    One thread makes one call, several share more; all but the last have a multiple of the bodies
+    that the kernel processes at once.
     """
     size = n
     if threads > 1:
@@ -267,7 +267,6 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
 
 
 def _check_ends(step_size: Array, steps: int) -> None:
-    """Raise InputError if a body's step size (s) times the number of steps is not finite."""
     with np.errstate(over="ignore"):
         ends = np.isfinite(step_size * steps)
     if not ends.all():

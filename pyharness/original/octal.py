@@ -27,9 +27,8 @@ _INSTRUCTIONS = tuple(
 def from_octal(text: str) -> Pair:
     """Return the number m 2**e that 20 octal digits represent, as the pair (m, e).
 
-    Blanks are ignored. A word whose bits are all 0 or all 1 is zero. For zero, infinity and nan, m
-    is 0 and e is the value as a float. Raise InputError if the text is not 20 octal digits, or if
-    the coefficient is not normalised.
+    Words of all bits 0 or 1 are zero. For zero, infinity and nan, m is 0 and e the value as a
+    float. Raise InputError for other texts, and if the coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):

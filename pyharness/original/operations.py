@@ -1,9 +1,8 @@
 """Counts of the floating-point operations in a step of a program, made on the cards.
 
-The statements of a deck are interpreted as the author wrote them, with numbers that count the
-operations on them. LEQT1F is our own version, because the original source is not published. `T**2`
-counts as one multiplication, `T**3` and `T**4` as two each. Operations in subscripts, jumps, ABS
-and WRITE are not counted.
+The author's statements are interpreted with numbers that count operations; LEQT1F is our own
+version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each; subscripts, jumps, ABS
+and WRITE do not count.
 """
 
 import re
@@ -27,9 +26,8 @@ ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts all that the cards perform; `once` only distinct ones, without repetitions of
-    an operation on the same operands. With unit times they are the times of these operations in
-    sequence.
+    `written` counts all on the cards; `once` no repetition on the same operands. With unit times
+    they are times in sequence.
     """
 
     written: int
@@ -65,8 +63,8 @@ def _value(x: Any) -> float:
 class _Number:
     """A floating-point value, with the counter of the operations on it.
 
-    A repeated operation on the same operands in the same order returns the same object. Therefore
-    two objects are identical exactly if their values were computed in the same way.
+    A repeated operation on the same operands returns the same object, so that objects are identical
+    exactly if computed in the same way.
     """
 
     def __init__(self, counter: _Counter, value: float) -> None:
@@ -116,8 +114,6 @@ class _Number:
 
 
 class _Array(defaultdict[tuple[int, ...], Any]):
-    """An array with FORTRAN's subscripts in parentheses."""
-
     def __call__(self, *subscripts: int) -> Any:
         return self[subscripts]
 
@@ -145,10 +141,9 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of a value from before a step, without the operations that computed it.
+    """Return a copy of a value from before a step, whose operations `counter` counts.
 
-    `counter` counts operations on the copy. Anything but a number or an array of numbers is
-    returned unchanged.
+    Anything but a number or an array of numbers is returned unchanged.
     """
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}

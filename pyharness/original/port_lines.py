@@ -31,10 +31,7 @@ def port_file(program: str) -> str:
 
 
 def port_lines(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of a port that corresponds to cards, with their numbers as text.
-
-    The numbers are in the comment at the end of the line, as in ``750-770, 800``.
-    """
+    """Yield each line of a port that corresponds to cards, with their numbers as text."""
     file = port_file(program)
     for number, text in enumerate(_lines(shipped(PORT) / file), 1):
         if match := _MARGIN.match(text):
@@ -42,9 +39,9 @@ def port_lines(program: str) -> Iterator[tuple[Place, str]]:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the defect or reading on which a line of the port depends, and whether it is active.
+    """Return the defect or reading on which a port's line depends, and whether it is active.
 
-    The result is None for a line that does not depend on a single switch.
+    None for a line that does not depend on a single switch.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

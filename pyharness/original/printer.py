@@ -30,9 +30,8 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    A header with the moments and torques of `scene`, which must have moments, is followed by a line
-    for each row of `trajectory`. If the stop test ended the run, the last line is the row of the
-    step that failed the test. Lines have no trailing blanks.
+    The moments and torques of `scene`, which must have moments, are followed by a line for each
+    row, the last one for the step that failed the stop test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -87,10 +86,9 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the three torques (N m) on the input cards for a scene.
+    """Return the torques (N m) on the input cards: initial ones of Table 1, else constant ones.
 
-    No card can express a torque that varies with time. Therefore these are the initial torques of a
-    case of Table 1, else the constant torques.
+    No card can express a torque that varies with time.
     """
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.law.constant)

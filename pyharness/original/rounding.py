@@ -1,12 +1,9 @@
 """Rounding rules: sum, product and quotient of two numbers of a floating-point format.
 
-A number is a pair of integers (m, e) with the value m 2**e; m has p bits, or fewer if subnormal. If
-m is 0, e is the value as a float: 0.0, -0.0, inf, -inf or nan. The operands of an `Operation` have
-m other than 0, its result may not.
-
-No library has all the rules that the project needs: mpmath and gmpy2 have no limited range of
-exponents, SoftFloat and numpy only the formats of IEEE 754, and none has the rules of the CDC
-machines (`cdc.py`).
+A number m 2**e is a pair of integers (m, e); m has p bits, or fewer if subnormal. If m is 0, e is
+the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an `Operation` have m other than 0.
+No library has all these rules: mpmath and gmpy2 have no limited exponents, SoftFloat and numpy only
+IEEE 754, and none those of the CDC machines (`cdc.py`).
 """
 
 import math
@@ -19,20 +16,11 @@ Operation = Callable[[int, int, int, int], Pair]
 
 
 class Rules(NamedTuple):
-    """The arithmetic of a floating-point format, as functions of integers m and e.
+    """The arithmetic of a format, as functions of integers m and e.
 
-    Attributes
-    ----------
-    nearest : Rounding
-        To nearest, ties to even; for square roots, sines, cosines and literals.
-    cut : Rounding
-        Towards zero; for literals if the word truncates them.
-    add, multiply, divide : Operation
-        A difference is the sum with the negative.
-    difference : Operation
-        One number plus the negative of the other, for comparison only: equal if it is zero.
-    signed_zero : bool
-        Whether there is -0.0 besides 0.0.
+    `nearest` (ties to even) is for square roots, sines, cosines and literals, `cut` (towards zero)
+    for literals if the word truncates them. A difference is the sum with the negative; `difference`
+    is for comparison only: numbers are equal if it is zero.
     """
 
     nearest: Rounding

@@ -106,10 +106,10 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` and `change_u` are the magnitudes of the changes of the six right-hand sides and
-    unknowns within a step. The norms over omega are compared; with the defect
-    `lipschitz-per-component` each component, and with `lipschitz-tests-velocity` the velocity too.
-    The quotient is infinite if the unknowns do not change.
+    `change_k` and `change_u` are magnitudes for the six right-hand sides and unknowns within a
+    step. Norms over omega are compared; by the defect `lipschitz-per-component` components, and by
+    `lipschitz-tests-velocity` the velocity too. The quotient is infinite if the unknowns do not
+    change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

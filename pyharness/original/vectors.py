@@ -1,9 +1,8 @@
 """Test vectors for the arithmetic of CDC machines, and the results that we compute.
 
 `data/words/cdc.json` follows from the CYBER 170 hardware reference, CDC 60463560; a public emulator
-of its floating-point unit gives the same results. A file is a JSON object with `schema` and
-`vectors`, a list of objects with `name`, `op` (an instruction as in `octal.operated`), and `x`, `y`
-and `result` in octal.
+agrees. A file is a JSON object with `schema` and `vectors`: objects with `name`, `op` (as in
+`octal.operated`), and `x`, `y` and `result` in octal.
 """
 
 import json

@@ -1,8 +1,8 @@
 """Words: floating-point formats of p bits with a rounding rule, for runs of the twins.
 
-A number of a word behaves like a float: it has operators, comparisons, `abs` and `float`. The other
-operand may be a number of the same word, an integer or a float. A float is treated as a literal of
-a source text: its shortest decimal representation is rounded, not its exact binary value.
+A number of a word has the operators of a float, also with integers, floats and numbers of the same
+word. A float is treated as a literal of a source text: its shortest decimal representation is
+rounded, not its exact binary value.
 """
 
 import math
@@ -33,7 +33,6 @@ class Number:
     rules: ClassVar[Rules]
 
     def __init__(self, m: int, e: Any) -> None:
-        """Store `m` and `e` of a number that the word can represent."""
         self.m, self.e = m, e
 
     def __add__(self, other: Any) -> "Number":
@@ -215,26 +214,11 @@ def _quotient(x: float, y: float) -> float:
 class Word:
     """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
 
-    A word is called with a float, an integer, a fraction or the text of a decimal, and returns this
-    value as a `Number`.
-
-    Parameters
-    ----------
-    p : int
-        Number of bits of the coefficient (significand).
-    rule : {"nearest-even", "chop", "FX", "RX"}
-        To nearest with ties to even; towards zero; or the CDC's FX (truncating) or RX (rounding).
-    largest : int, optional
-        Largest exponent, except for FX and RX: numbers are below 2**(largest + 1), and the smallest
-        exponent follows as in IEEE 754. The default is that of binary64 if p is at most 53, else of
-        binary128.
-    cut_literals : bool
-        Whether converted values are truncated instead of rounded to nearest.
-
-    Raises
-    ------
-    InputError
-        If the rule is unknown, or if p is below 4.
+    `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
+    (rounding). Except for these two, numbers are below 2**(largest + 1), and the smallest exponent
+    follows as in IEEE 754; the default is binary64's if p is at most 53, else binary128's. With
+    `cut_literals` converted values are truncated. Raise InputError if the rule is unknown, or if p
+    is below 4.
     """
 
     def __init__(
@@ -244,7 +228,6 @@ class Word:
         largest: int | None = None,
         cut_literals: bool = False,
     ) -> None:
-        """Select the arithmetic, and make the word's class of numbers."""
         if rule not in RULES:
             raise unknown("rounding", rule, RULES)
         if p < 4:

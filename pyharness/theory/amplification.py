@@ -1,10 +1,9 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation of a steady rotation, and the translational velocity in it, obey x' = J x. A step of
-size h multiplies x by a matrix of polynomials in z = h times an eigenvalue of J, derived in exact
-fractions from each program; hJ may replace z. The matrix has m rows for the m vectors that a
-program propagates: two in the original Runge-Kutta program, the result of the step and U(1), at
-which the first stage is evaluated.
+A perturbation of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
+multiplies x by a matrix of polynomials in z, h times an eigenvalue of J, derived in exact
+fractions; hJ may replace z. It has m rows for the m vectors that a program propagates: two in the
+original Runge-Kutta program, the result and U(1), at which the first stage is evaluated.
 """
 
 from dataclasses import dataclass
@@ -92,8 +91,8 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
     """Return the integral of s**2 / h**3 over a step by a collocation program; exact is 1/3.
 
-    Along the first estimate, a straight line, the right-hand side is F + s J F + s**2 Q(F), Q its
-    quadratic part. The integral is thus the weight of Q(F) in the result. `step` is from 1.
+    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), Q its quadratic part; the
+    integral is the weight of Q(F) in the result. `step` is from 1.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2

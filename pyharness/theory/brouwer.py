@@ -1,8 +1,8 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
-Brouwer 1937, Astronomical Journal 46: if the rounding errors of the steps are random, the errors of
-energy and momentum grow like the root of the number of steps, and that of the phase like its power
-3/2; if rounding is biased, the powers are 1 and 2.
+Brouwer 1937, Astronomical Journal 46: with random rounding errors those of energy and momentum grow
+like the root of the number of steps, and that of the phase like its power 3/2; with biased ones
+like the powers 1 and 2.
 """
 
 import math
@@ -123,9 +123,9 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
     """Return error bounds of a Taylor step, by a running error analysis.
 
     `step` is in s, `left_out` the truncation error relative to the largest omega. Term k is a sum
-    of k products of lower terms, each with at most k + 3 roundings and the errors of the lower
-    terms. Omega is used without the remainder of compensated summation, at most half a unit in the
-    last place. The sum rounds each term three times.
+    of k products of lower terms, with their errors and at most k + 3 roundings each. The remainder
+    of compensated summation adds at most half a unit in the last place, and the sum rounds each
+    term three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -244,10 +244,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of the absolute derivatives of `_frequency` by omega.
-
-    They are central differences.
-    """
+    """Return the sum of abs(derivatives) of `_frequency` by omega, by central differences."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

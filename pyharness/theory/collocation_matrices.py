@@ -183,10 +183,9 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
 
-    It does if the computed sum N + p equals N, p a scaled pivot and N the number of rows: if p is
-    at most half a unit in the last place of N (a tie is rounded to even N). N is a power of 2, so
-    that this unit is N 2**(1 - bits) with rounding to nearest. The last scaled pivot, proportional
-    to step**(N-1), decides.
+    It does if the computed sum N + p equals N, for a scaled pivot p and N rows: if p is at most
+    half a unit in the last place of N, a power of 2 with the unit N 2**(1 - bits). A tie is rounded
+    to even N. The last scaled pivot, proportional to step**(N-1), decides.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

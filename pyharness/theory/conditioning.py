@@ -54,10 +54,10 @@ class Conditioning:
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the largest final error of omega that a method may have, over `largest`.
 
-        `made` is the relative sum of the errors allowed in the steps. It is multiplied by the
-        amplification, and two bounds of amplified rounding errors are added; the second is
-        proportional to `steps`, the number of times that omega is rounded (0 with compensated
-        summation). The limit is at most 2, as components up to `largest` differ by no more.
+        `made`, the relative sum of the errors allowed in the steps, is multiplied by the
+        amplification; two bounds of amplified rounding errors are added, the second proportional to
+        `steps`, how often omega is rounded (0 with compensated summation). The limit is at most 2,
+        as components up to `largest` differ by no more.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.

@@ -161,11 +161,10 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
 def _growing(
     scene: Scene, omega: Triple, rate: complex, matrix: Array, share: float
 ) -> float | None:
-    """Return the time (s) up to which linear theory describes a growing perturbation.
+    """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    It is the time at which the second-order terms reach a tenth of the perturbation. It is infinite
-    if these are zero, and None beyond binary64. `rate` is the fastest Q, `matrix` the Jacobian
-    (1/s).
+    Linear theory holds until then. It is infinite if these terms are zero, None beyond binary64.
+    `rate` is the fastest Q, `matrix` the Jacobian (1/s).
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -186,11 +185,10 @@ def _growing(
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
     """Return the time (s) until an oscillation about a stable axis has a phase error of 0.1 rad.
 
-    This is the error of linear theory without torque. `coefficients` are in cyclic order from the
-    axis; `rate` is the linear frequency (rad/s). A perturbation that tilts the rotation by d (rad)
-    towards another axis changes the frequency by the fraction d**2 / 4 times the first coefficient
-    divided by the coefficient of the other axis. The time is infinite if the first coefficient is
-    0, and None if the frequency is: then only the spin drifts.
+    `coefficients` are in cyclic order from the axis; `rate` is the linear frequency (rad/s). A tilt
+    by d (rad) towards another axis changes it by the fraction d**2 / 4 times the first coefficient
+    over that axis's. The time is infinite if the first coefficient is 0, and None if the frequency
+    is: then only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -223,7 +221,6 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
 
 def _places(scene: Scene) -> tuple[str, Places]:
-    """Return a text about a scene's steady rotations, and places."""
     coefficients, torque = scene.euler_coefficients, scene.normalized_torque(0.0)
     held = [axis for axis in range(3) if torque[axis] != 0.0]
     if not held:

@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme, without code of the method, computes one step: with `Numbers`, or with `Series`, power
-series in the step size, which yield each term of the truncation error. Its arguments are `on`, one
-of the two, and `omega` at the start. The torque is constant; equations 16-18.
+A scheme computes one step with `Numbers`, or with `Series`, power series in the step size that
+yield each term of the truncation error. It shares no code with the method. Its arguments are `on`,
+one of the two, and `omega` at the start. The torque is constant; equations 16-18.
 """
 
 import math
@@ -53,7 +53,6 @@ class Series:
     """
 
     def __init__(self, scene: Scene) -> None:
-        """Store the equations of a scene."""
         self._coefficients = np.array(scene.euler_coefficients)
         self._torque = np.array(scene.normalized_torque(0.0))
 

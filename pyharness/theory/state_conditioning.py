@@ -95,7 +95,6 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
-    """Return the Jacobians (1/s) of the equations, shape (n, m, m)."""
     n, m = state.shape
     return outputs_at(slopes, times, state)[:, m:].reshape(n, m, m)
 
@@ -121,7 +120,6 @@ class _Bounded:
         self.value, self.error = value, error
 
     def chained(self, value: Any, slope: Any) -> "_Bounded":
-        """Return a function of this value, from its value and derivative."""
         return _Bounded(value, np.abs(slope) * self.error + np.abs(value))
 
     def __add__(self, other: Any) -> "_Bounded":

@@ -94,7 +94,6 @@ class Forecaster:
     """The error predictions for one method along one solution."""
 
     def __init__(self, along: Path, method: str) -> None:
-        """Store a solution and a method, a key of `schemes.SCHEMES`."""
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)

@@ -38,9 +38,8 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
     is for collocation, as in `grid`. The Gauss-Legendre quadrature with m points is exact to degree
     2m - 1: for constant torques the products of two omegas have degree 2n, and the weights n
-    (Galerkin), n - 1 (least squares) or 0. For torques that vary with time the error of the
-    quadrature is of order 2n + 1 or higher in the step size. This exceeds the order of each of the
-    methods.
+    (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time its error is of order
+    2n + 1 or higher, above the method's order.
     """
     n = terms
     if weighting == "collocation":
@@ -77,7 +76,6 @@ def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Frac
 
 
 def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Return the exact solution x of a x = b, all matrices."""
     rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
     for k in range(len(rows)):
         pivot = next(i for i in range(k, len(rows)) if rows[i][k])

@@ -1,7 +1,7 @@
 """Exact solution of a symmetric body with a torque along its axis, in decimal arithmetic.
 
-The spin is the initial spin plus the integral of the torque over the moment. The other two
-components of omega rotate by an angle proportional to the integral of the spin.
+The spin is its initial value plus the integral of torque over moment; the other components rotate
+by an angle proportional to the integral of the spin.
 """
 
 import decimal

@@ -35,16 +35,8 @@ Row = Sequence[float | Fraction]
 class ErrorBound(NamedTuple):
     """A statement on the error of the reference at all its times.
 
-    Attributes
-    ----------
-    value : float
-        Bound of the error of any component of omega, rad/s.
-    basis : {"proved", "estimated"}
-        What the bound rests on.
-    angle, angle_basis : float and str, or None
-        The same for the attitude (rad); None without attitude.
-    warning : str
-        A sentence if the proved error exceeds the estimate; otherwise empty.
+    `value` bounds any component of omega (rad/s), and `angle` the attitude (rad); the bases are
+    "proved" or "estimated". `warning` is a sentence if the proved error exceeds the estimate.
     """
 
     value: float
@@ -139,7 +131,7 @@ def error_bound(
 ) -> ErrorBound:
     """Return a statement on the error of values of the reference at `times` (s).
 
-    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
+    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4);
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates. Omega is proved if the scene has
     a certificate, which needs no library. With python-flint the attitude is proved in torque-free
     motion, and if `any_torque`, both under any recorded torque. The limit of a proof is about half
@@ -203,7 +195,6 @@ class _Statement(NamedTuple):
     claimed_angle: float  # rad
 
     def bound(self, any_torque: bool, effort: float) -> ErrorBound:
-        """Return the bound of the errors, proved as far as possible."""
         value, basis, warnings = self.claimed, ESTIMATED, []
         angle = None if self.attitude is None else self.claimed_angle
         angle_basis = None if self.attitude is None else ESTIMATED
@@ -271,7 +262,6 @@ def _tried(prove: Callable[[], Enclosure]) -> Enclosure | None:
 
 
 def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float]:
-    """Return the least and the largest error that rows of omega may have."""
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):
         apart = max(map(_distance, row, middle))
@@ -294,10 +284,9 @@ def _extreme_angles(
 ) -> tuple[float, float]:
     """Return the least and the largest error (rad) that quaternions may have.
 
-    The error is twice the angle between the lines of a quaternion and the true one. The sine s of
-    its angle to the ball's middle is exact before rounding, and arcsin(s) < s (1 + s**2) for s <=
-    1/2. Four radii r have the norm 2 r, so middle and true quaternion differ by at most arcsin(2 r)
-    < 4 r.
+    It is twice the angle between the lines of two quaternions. Its sine s to the ball's middle is
+    exact before rounding, and arcsin(s) < s (1 + s**2) for s <= 1/2. Four radii r have the norm 2
+    r: middle and true line differ by at most arcsin(2 r) < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

@@ -86,10 +86,9 @@ def prove(
 ) -> Proof:
     """Return balls that contain omega at `times` (s), and a certificate of them.
 
-    The times have one sign and lead away from 0. A radius is at most 10**-digits rad/s, times the
-    largest component of omega if that exceeds 1 rad/s. `effort` is a factor on the limit of steps.
-    Raise InputError if the scene has no certificate, if omega grows without bound, or if the work
-    limit is exceeded.
+    A radius is at most 10**-digits rad/s, times the largest component of omega if that exceeds 1
+    rad/s. `effort` is a factor on the limit of steps. Raise InputError if there is no certificate,
+    omega grows without bound, or the limit is exceeded.
     """
     if not has_certificate(scene):
         raise InputError(
@@ -150,8 +149,6 @@ def _scene_record(scene: Scene) -> dict[str, Any]:
 
 
 class _Run:
-    """An integration of one scene with one accuracy."""
-
     def __init__(
         self, record: dict[str, Any], times: Sequence[float], digits: float, goal: int
     ) -> None:
@@ -260,7 +257,6 @@ class _Run:
             self.omega.append(Balls(tuple(Fraction(x, unit) for x in middle), size / unit))
 
     def certificate(self) -> dict[str, Any]:
-        """Return the certificate of the balls at all times but 0."""
         rows = zip(self._times, self.omega, strict=True)
         return {
             "format": FORMAT,

@@ -45,12 +45,10 @@ def taylor_series(
 ) -> list[Row]:
     """Return a row of omega, velocity and attitude at each of `times` (s).
 
-    Rows are missing from where omega grows without bound or a torque that depends on the state is
-    singular. Velocity (m/s) is included if requested, the attitude if the scene has one, with the
-    norm of the scene's quaternion. `coefficients` are A, B, C; `order` is the degree, larger for a
-    torque with high powers; `tolerance` is local and relative to omega and to the attitude.
-    `effort` is a factor on a work limit of some ten seconds; None means 100 000 steps, fewer if the
-    torque depends on the state. Raise InputError if it is exceeded.
+    Rows are missing from where omega grows without bound or the torque is singular. The quaternion
+    has the norm of the scene's. `coefficients` are A, B, C; `order` is the degree, larger for high
+    powers in the torque; `tolerance` is local and relative. `effort` is a factor on a work limit of
+    some ten seconds; None means 100 000 steps, fewer if the torque depends on the state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     if equations.least_order > order:
@@ -106,8 +104,6 @@ def taylor_series(
 
 
 class _Limit:
-    """The limit on the number of Taylor steps, and a forecast of this number."""
-
     def __init__(self, scene: Scene, effort: float | None) -> None:
         self._effort = None if effort is None else checked_effort(effort)
         a_step = 5 + _torque_work(scene)
@@ -121,8 +117,8 @@ class _Limit:
     def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
         """Raise InputError if the number of steps, so far or by forecast, exceeds the limit.
 
-        `step` is the number of steps, without the `stops` that ended early at a change of a table;
-        `begin` the time reached, `length` the next step and `rest` the time left (s).
+        `step` does not count the `stops` that ended early at a change of a table; `begin`, `length`
+        (of the next step) and `rest` are in s.
         """
         if step + stops >= self._most:
             self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
@@ -143,12 +139,11 @@ class _Limit:
                 self._before = step, abs(begin)
 
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
-        """Return a forecast of the number of steps from time 0 until the end.
+        """Return the expected number of steps until the end.
 
-        `step` is the number of steps that were taken until the time `begin` (s), and `rest` is the
-        time left until the end (s). The forecast assumes that the mean length of the steps remains
-        the same. However, if the number of steps so far grew like time to a power above 1.3, the
-        forecast assumes that power, but at most 3.
+        `begin` (s) is the time after `step` steps, `rest` (s) the time left. The mean length is
+        assumed to remain; if the steps so far grew like time to a power above 1.3, that power, at
+        most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -178,7 +173,6 @@ def _torque_work(scene: Scene) -> int:
 
 
 def _law_of(scene: Scene) -> TorqueLaw:
-    """Return the scene's torque law about the body axes."""
     if scene.changing is not None and isinstance(scene.torque, TorqueLaw):
         return scene.torque
     return scene.body_torque
@@ -222,7 +216,6 @@ def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def _derivatives(coefficients: list[Row], t: Decimal) -> Row:
-    """Return the derivatives of polynomials with the given coefficients at `t`."""
     return _evaluate([[k * x for k, x in enumerate(row)][1:] for row in coefficients], t)
 
 
@@ -236,8 +229,7 @@ def _is_continued(
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
-    A pulse of the torque within the step may be too small to be seen at its beginning. `state` is
-    at the end, `end` and `length` are in s, and `tolerance` is relative to omega.
+    A pulse of the torque within the step may be too small to be seen at its beginning.
     """
     slopes = _derivatives(series, length)
 
@@ -330,7 +322,6 @@ class _Equations:
 
     @property
     def least_order(self) -> int:
-        """The order that shows the powers of the torque."""
         return 0 if self._tape is None else self._tape.least_order
 
     def reach(self, length: Decimal) -> Decimal:
@@ -431,7 +422,6 @@ def _rates_by_momentum(
 
 
 def _triple(x: Row, y: Row, z: Row) -> Decimal:
-    """Return the determinant of the matrix with three given columns."""
     return (
         x[0] * (y[1] * z[2] - y[2] * z[1])
         + x[1] * (y[2] * z[0] - y[0] * z[2])

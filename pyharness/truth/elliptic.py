@@ -1,8 +1,7 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike the solution by Taylor series, this solution loses no digits with time. Many flips near the
-separatrix take no more work than a short time. The module shares no code with the closed form that
-it checks, and uses Landen's transformation.
+Unlike Taylor series, it loses no digits with time, and takes no more work for many flips near the
+separatrix. It shares no code with the closed form that it checks, and uses Landen's transformation.
 """
 
 import decimal
@@ -41,7 +40,6 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
 
 
 def _decades(values: Sequence[Fraction]) -> int:
-    """Return the difference of the largest and smallest decimal exponents; zeros are ignored."""
     powers = [_decimal(value).adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
@@ -74,9 +72,9 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
 
-    Multiplied by factors, x' = y z, y' = -z x, z' = x y. The invariants p = x**2 + y**2 and q =
-    z**2 + y**2 (1/s**2) are compared as fractions, because on the separatrix, where p = q, a
-    rounding error would cause flips.
+    Multiplied by factors, x' = y z, y' = -z x, z' = x y. Fractions are compared of p = x**2 + y**2
+    and q = z**2 + y**2 (1/s**2), because on the separatrix, p = q, a rounding error would cause
+    flips.
     """
     s1, s2, s3 = (abs(each) for each in a)
     squares = [s2 * s3, s1 * s3, s1 * s2]
@@ -164,5 +162,4 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
 
 
 def _decimal(x: Fraction) -> Decimal:
-    """Return a fraction rounded to the current decimal arithmetic."""
     return Decimal(x.numerator) / x.denominator

@@ -111,7 +111,6 @@ def _digits(radius: Fraction) -> int:
 
 
 def _decimal(x: Fraction, digits: int) -> str:
-    """Return a fraction as a decimal string with `digits` after the point."""
     whole = (abs(x.numerator) * 10**digits * 2 + x.denominator) // (2 * x.denominator)
     sign = "-" if x < 0 and whole else ""
     text = str(whole).rjust(digits + 1, "0")

@@ -1,8 +1,8 @@
 """Proved enclosures: balls that contain the true solution of a scene.
 
-There are three provers: a closed form for torque-free motion (`enclosure_free`), Taylor steps in
-integers (`certificate`) for torques that depend on time alone, and Taylor steps in balls
-(`enclosure_steps`) for everything else. The first and the last need python-flint.
+The provers are a closed form for torque-free motion (`enclosure_free`), Taylor steps in integers
+for torques of time alone (`certificate`), and in balls for all others (`enclosure_steps`). The
+first and the last need python-flint.
 """
 
 from collections.abc import Sequence
@@ -36,34 +36,13 @@ def enclose(
 ) -> Enclosure:
     """Return balls that contain the true solution of a scene at requested times.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its torque must be recorded; one that depends on the attitude needs the scene's.
-    times : sequence of numbers
-        Times (s) of one sign, each farther from 0 than the one before; the first may be 0.
-    digits : int
-        A radius of omega is at most 10**-digits rad/s, times the largest component of omega if it
-        exceeds 1 rad/s; of the initial omega for a closed form.
-    velocity, transition : bool
-        Whether to enclose the translational velocity (m/s), and the derivatives of omega and
-        attitude by omega at time 0.
-    effort : number
-        A factor on the limit of the number of steps.
-    progress : function
-        Called with the percentage of the last time that is done, 100, and the time reached.
-
-    Returns
-    -------
-    Enclosure
-        Omega, the attitude if the scene has one, what was requested, and the rotational energy if
-        the scene has moments.
-
-    Raises
-    ------
-    InputError
-        If the times are not in order, python-flint is needed and missing, the torque is opaque, the
-        solution can't be enclosed up to the last time, or the work limit is exceeded.
+    `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
+    10**-digits rad/s, times the largest component of omega (for a closed form, of the initial one)
+    if that exceeds 1 rad/s. `velocity` (m/s) and `transition` request more; the attitude and the
+    rotational energy are included if the scene has attitude and moments. `progress` gets the
+    percentage of the last time, 100, and the time. `effort` is a factor on the limit of the number
+    of steps. Raise InputError if the times are not in order, python-flint is missing, the torque is
+    opaque, the solution can't be enclosed up to the last time, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

@@ -26,10 +26,9 @@ Rates = Callable[[Any, Sequence[Any]], list[Any]]
 class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
-    The unknowns are omega (rad/s); the quaternion, if the scene has an attitude; the velocity
-    (m/s), if `velocity`; and if `transition`, the derivatives of omega and attitude by omega at
-    time 0, row by row. `blocks` are the slices of the present groups. `scales` are the units of
-    errors.
+    The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, for
+    `transition`, the derivatives of omega and attitude by omega at time 0, row by row. `blocks` are
+    the slices of present groups, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -55,7 +54,6 @@ class Equations:
         self._exact()
 
     def _exact(self) -> None:
-        """Convert the body's numbers to balls of the current precision."""
         scene = self._scene
         self._principal: list[Any] | None = None
         self._moments = [arb(1)] * 3
@@ -94,7 +92,6 @@ class Equations:
         return rates
 
     def _turned(self, time: Any, omega: list[Any], q: list[Any], functions: Any) -> list[Any]:
-        """Return the derivatives of omega and of the attitude."""
         inputs = [time, *omega, *(q or IDENTITY)]
         parts = [evaluate(each, inputs, functions) for each in self._tapes]
         torque = [sum(each[1:], each[0]) for each in zip(*parts, strict=True)]

@@ -37,8 +37,8 @@ def enclose_free(
 
     With `attitude`, four more contain the unit quaternion from body to space, scalar first,
     continuous in time. Radii are at most 10**-`digits`, for omega times the largest initial
-    component if that exceeds 1 rad/s. Times may be negative. Raise InputError if there is a torque,
-    motions may be unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
+    component if that exceeds 1 rad/s. Raise InputError if there is a torque, motions may be
+    unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
     """
     _check(scene, times, digits, attitude)
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
@@ -60,7 +60,6 @@ def enclose_free(
 
 
 def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) -> None:
-    """Raise InputError if arguments of `enclose_free` are not allowed."""
     if not checked_scene(scene).torque.is_zero:
         raise InputError("the scene has a torque; allowed: a scene without torque")
     if not all(map(math.isfinite, times)):
@@ -105,20 +104,18 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn in the body, n the direction of the angular momentum L
-    in the body, and T the kinetic energy. Then n e = c dn(u) with c > 0. The attitude is the
-    product of a constant, the rotation by an angle psi about e, and the smallest rotation from n to
-    e. Euler's equations give psi' = (2 T/L + omega e)/(1 + n e). As functions of a complex u, psi'
-    and dn have the periods 2K and 4iK'. The poles of psi' are where dn(u) = -1/c, at u = 2iK' + iy
-    and 2iK' - iy. The residues of psi'/(2 rate) are 1/2i and -1/2i, or the opposite numbers. The
-    derivative of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same
-    periods, poles and residues. The difference is thus constant.
+    Let e be the direction of the axis of dn and n that of the angular momentum L in the body, T the
+    kinetic energy; n e = c dn(u) with c > 0. The attitude is a constant, the rotation by psi about
+    e, and the smallest rotation from n to e. Euler's equations give psi' = (2 T/L + omega e)/(1 + n
+    e). Like dn, psi' has the periods 2K and 4iK' in complex u; its poles, where dn(u) = -1/c, are
+    at u = 2iK' + iy and 2iK' - iy, and the residues of psi'/(2 rate) are 1/2i and -1/2i, or
+    opposite. The derivative of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has
+    the same periods, poles and residues; the difference is thus constant.
     """
 
     def __init__(
         self, orbit: Orbit, moments: Sequence[Fraction], w: list[Fraction], begin: Balls
     ) -> None:
-        """Compute the constants for initial omega `w` (rad/s) and quaternion `begin`."""
         self.orbit = orbit
         energy = sum((i * x**2 for i, x in zip(moments, w, strict=True)), Fraction(0))
         square = sum(((i * x) ** 2 for i, x in zip(moments, w, strict=True)), Fraction(0))
@@ -145,7 +142,6 @@ class _Attitude:
         self.first = self._turn(orbit.start).conjugate()
 
     def row(self, t: Fraction) -> Balls:
-        """Return omega (rad/s) and the attitude at time `t` (s)."""
         orbit, omega = self.orbit, self.orbit.omega(t)
         turn = _direction(self.pace * ball(t / 2)) * self.first
         turn *= self._turn(orbit.start + orbit.rate * ball(t))

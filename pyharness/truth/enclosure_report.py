@@ -55,7 +55,6 @@ def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
 
 
 def _lines(row: dict[str, Any]) -> list[list[Any]]:
-    """Return time, name, value, radius and unit for each component."""
     lines = []
     for quantity, unit in _UNITS.items():
         values = row.get(quantity, ())
@@ -111,7 +110,6 @@ def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]])
 
 
 def _table(lines: Sequence[Sequence[Sequence[Any]]]) -> Table:
-    """Return the table of each row's lines, without units."""
     columns = [
         Column("time", lambda x: f"{x:.6g}", unit="s"),
         Column("quantity", left=True),

@@ -1,14 +1,12 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step an approximate solution p is a polynomial of time, whose residual p' - f(t, p) in y' =
-f(t, y) is bounded on the whole step. The unknowns are divided into blocks, such as omega and the
-attitude. The vector r of the norms of the blocks of the error y - p obeys r' <= M r + d, with the
-bounds d of the residual. On the diagonal of M are bounds of the logarithmic norms of the diagonal
-blocks of the Jacobian of f near p, or 0 instead of negative ones; elsewhere are bounds of the norms
-of the other blocks. Since no element of M is negative, r(h) is at most exp(h M) (r(0) + h d). For
-one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
-Equations I. The proof does not depend on how p was found. All bounds are computed in ball
-arithmetic.
+In each step a polynomial p approximates the solution of y' = f(t, y), and its residual p' - f(t, p)
+is bounded, in ball arithmetic, on the whole step, however p was found. The vector r of the norms of
+blocks of y - p, such as omega and attitude, obeys r' <= M r + d, d the bounds of the residual. M
+has, on its diagonal, bounds of the logarithmic norms of the diagonal blocks of the Jacobian near p,
+or 0 if negative; elsewhere of the norms of the other blocks. Since M is not negative, r(h) is at
+most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993,
+Solving Ordinary Differential Equations I.
 """
 
 import math
@@ -52,8 +50,8 @@ def enclose_steps(
 ) -> Enclosure:
     """Return balls that contain the solution of a scene at `times` (s).
 
-    The arguments are those of `enclosure.enclose`. Raise InputError if the torque is opaque, if no
-    enclosure is found at some time, or if too many steps are needed.
+    The arguments are those of `enclosure.enclose`. Raise InputError if the torque is opaque, or no
+    enclosure is found within the limit of steps.
     """
     limit = _MOST_STEPS * checked_effort(effort)
     wanted = float(digits + 2)
@@ -121,7 +119,6 @@ def _upper(x: Any) -> Any:
 
 
 def _terms(x: Any, count: int) -> list[Any]:
-    """Return the first coefficients of a power series or constant."""
     found = x.coeffs() if isinstance(x, arb_series) else [arb(x)]
     return [*found, *[arb(0)] * (count - len(found))][:count]
 
@@ -141,8 +138,6 @@ def _expanded(rates: Rates, begin: Any, middle: Sequence[Any], order: int) -> li
 
 
 class _Proof:
-    """The enclosure of one scene with one precision, step by step."""
-
     def __init__(self, equations: Equations, digits: float, forward: bool) -> None:
         self.equations, self.forward = equations, forward
         self.order = max(16, math.ceil(0.9 * digits))
@@ -157,7 +152,6 @@ class _Proof:
         self.state = _State(Fraction(0), [x.mid() for x in start], radii)
 
     def norm(self, errors: Sequence[Any], block: slice) -> Any:
-        """Return an upper bound of the norm of a block of errors, in scaled units."""
         parts = zip(errors[block], self.scales[block], strict=True)
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
@@ -240,7 +234,6 @@ class _Proof:
         return radii
 
     def _residuals(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
-        """Return bounds of the residual of the polynomials in each block."""
         count = 2 * self.order + 2
         length, begin = abs(ball(h)), ball(self.state.time)
         ctx.cap = count
@@ -328,6 +321,5 @@ def _value(terms: Sequence[Any], offset: Any) -> Any:
 
 
 def _log2(x: Any) -> float:
-    """Return roughly the binary logarithm of a ball's middle; -inf for 0."""
     middle = abs(x.mid())
     return float(middle.log()) / math.log(2.0) if middle > 0 else -math.inf

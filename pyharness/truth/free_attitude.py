@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle, so that a
-Taylor integration over one period determines the attitude at any time. Near the separatrix errors
-of omega grow exponentially; the integration therefore consists of segments that start from omega of
-`elliptic.py`. It shares no code with the closed form that it checks, and uses no theta function.
+In each period of omega the body rotates about the angular momentum by the same angle: a Taylor
+integration over one period suffices. Near the separatrix errors of omega grow exponentially;
+therefore segments start from omega of `elliptic.py`. No code is shared with the closed form that is
+checked.
 """
 
 import decimal
@@ -32,10 +32,9 @@ _MOST_RADIANS = 1e5
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    It is continuous in time, which determines its sign. The scene must have moments and an
-    attitude. On the separatrix, where omega has no period, the motion is integrated until the
-    rotation is steady to all digits. Raise InputError if the integration takes too many steps, or
-    if the torque depends on the state.
+    It is continuous in time. The scene must have moments and an attitude. On the separatrix,
+    without period, the motion is integrated until the rotation is steady to all digits. Raise
+    InputError if the integration takes too many steps, or if the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None

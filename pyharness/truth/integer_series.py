@@ -1,8 +1,8 @@
 """A second reference, by Taylor series in integer arithmetic.
 
-It shares no code with the first (`truth/reference.py`). A number is an integer over 2**BITS, in
-units in which the last time is 1 and the largest omega about 1. The sines and cosines of the torque
-are unknowns like omega, so that no library function is needed.
+It shares no code with the first (`truth/reference.py`). Numbers are integers over 2**BITS, in units
+in which the last time is 1 and the largest omega about 1. Sines and cosines of the torque are
+unknowns too, so that no library function is needed.
 """
 
 from collections.abc import Sequence
@@ -52,9 +52,7 @@ class _OtherUnitError(Exception):
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
     """Return the true solution of a scene at `times` (s).
 
-    The times have one sign and lead away from 0. Before rounding to binary64 the error is some
-    1e-29 of the largest omega, times the error amplification. Raise InputError if omega grows
-    without bound before the last time, or if too many steps would be needed.
+    Before rounding the error is some 1e-29 of the largest omega, times the error amplification.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):

@@ -78,14 +78,12 @@ def reference(
     """Return the true solution of `scene` at `times` (s).
 
     The times have one sign and lead away from 0; the first may be 0. If `precise`, the series is
-    accurate to 1e-25 before rounding, unless the motion amplifies errors too much. Its error is
-    estimated by the largest difference of two integrations with different order and steps; by four
-    times that if `precise`. `effort` is a factor on a work limit of some ten seconds, judged by the
-    pace of the first steps; None means 100 000 steps. Attitudes, if the scene has one, are always
-    by the series. Raise InputError if the times are not in order, if a moment that changes with
-    time reaches 0, or if the series needs too many steps. A torque that depends on the state must
-    be recorded, and needs the scene's attitude if it depends on it. The result ends before such a
-    torque is singular.
+    accurate to 1e-25 before rounding, unless errors are amplified too much. The error is the
+    largest difference of two integrations with different order and steps; four times that if
+    `precise`. `effort` is a factor on a work limit of some ten seconds, judged by the pace of the
+    first steps; None means 100 000 steps. Attitudes are always by the series. Raise InputError if
+    the times are not in order, a changing moment reaches 0, or the series needs too many steps. A
+    torque that depends on the state must be recorded; the result ends before it is singular.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -195,7 +193,6 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _sphere(scene: Scene, t: Decimal) -> Row:
-    """Return omega (rad/s) of a sphere at t (s), from the time integral of the torque."""
     torque = scene.body_torque
     row = []
     for axis in range(3):
@@ -225,7 +222,6 @@ def exact_coefficients(scene: Scene) -> Row:
 
 
 def _is_number(x: Decimal) -> bool:
-    """Return whether a decimal is finite after rounding to binary64."""
     return math.isfinite(float(x))
 
 

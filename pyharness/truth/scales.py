@@ -10,9 +10,9 @@ _LEAST = 1e-4  # of the square of the largest unit
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units of the three components of omega, the largest of them 1.
 
-    They are the roots of abs(A), abs(B) and abs(C), divided by the largest, and at least 0.01; 0.01
-    if all are 0. The logarithmic norm is then 0 for rotations about the axes of the largest and
-    smallest moment, unless a unit is 0.01.
+    They are the roots of abs(A), abs(B) and abs(C) over the largest, and at least 0.01. The
+    logarithmic norm is then 0 for rotations about the axes of the largest and smallest moment,
+    unless a unit is 0.01.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

@@ -67,7 +67,6 @@ class TapeSeries:
     """
 
     def __init__(self, tape: Tape) -> None:
-        """Convert the tape's numbers to the current decimal arithmetic."""
         self._operations = [(each, _sum(each.linear)) for each in tape.operations]
         self._outputs = [_sum(each) for each in tape.outputs]
         # Each table, by the slot of its operation, and the exact times at which its pieces begin.
@@ -88,9 +87,8 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        The caller extends `omega` and `attitude`, the coefficients of the unknowns; the latter is
-        empty if the tape does not use it. At a break of a table the later piece is expanded if
-        `forward`, else the earlier one.
+        The caller extends `omega` and `attitude`, the unknowns' coefficients; the latter may be
+        empty. At a break of a table the later piece is expanded if `forward`, else the earlier one.
         """
         self._order = 0
         self._tables = {
@@ -149,7 +147,6 @@ class TapeSeries:
         return (sine if kind == "sine" else cosine)[k]
 
     def _wave(self, operand: int, k: int) -> tuple[Row, Row]:
-        """Return coefficients 0 to k of sine and cosine of a slot."""
         if k == 0 and operand not in self._waves:
             angle = self._slots[operand][0]
             if abs(angle) > _LARGEST_ANGLE:
@@ -187,11 +184,10 @@ class TapeSeries:
     def reach(self, length: Decimal) -> Decimal:
         """Return the step (s), reduced so that every operation's series converges.
 
-        An exponential may be invisible at the beginning of a step and large a little later.
-        Therefore its argument changes by at most half the order, unless it stays invisible; a
-        hyperbolic tangent's derivative is such a pulse too. A divisor has no zero in the circle
-        around the beginning. The terms of a product of many factors are of at most half the order
-        in the mean, unless it stays invisible.
+        An exponential, or a hyperbolic tangent's derivative, may be invisible at the beginning of a
+        step and large a little later: its argument changes by at most half the order, unless it
+        stays invisible. So do the terms of a product of many factors, in the mean. A divisor has no
+        zero in the circle around the beginning.
         """
         for operation, _ in self._operations:
             most = self._largest_change(operation)

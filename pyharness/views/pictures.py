@@ -58,7 +58,6 @@ def _form(path: str) -> str:
 
 
 def _set_title(picture: Picture) -> None:
-    """Set the title, wrapped to the figure's width."""
     if not picture.title:
         return
     room = int(_LETTERS_PER_INCH * picture.figure.get_figwidth())

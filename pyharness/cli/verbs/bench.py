@@ -165,7 +165,6 @@ def chosen(
 
 
 def _again(options: argparse.Namespace) -> str:
-    """Return the command that repeats this measurement as Markdown."""
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     command += " --terms" if options.terms else ""
     for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
@@ -256,7 +255,6 @@ def _terms(options: argparse.Namespace) -> int:
 
 
 def _choose_bodies(options: argparse.Namespace, default: int) -> int:
-    """Return --bodies, or the default."""
     n = default if options.bodies is None else shared.whole(options.bodies, "--bodies")
     if not 1 <= n <= _MOST_BODIES:
         raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")

@@ -46,7 +46,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _write_package(options: argparse.Namespace) -> int:
-    """Write the data package of --data, print its files, and return 0."""
     from pyharness.cli.output import check_tree, write_tree
     from pyharness.edition.crate import PACKAGE_MARK
     from pyharness.edition.data_package import data_package

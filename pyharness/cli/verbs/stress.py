@@ -59,7 +59,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _of_scene(options: argparse.Namespace) -> dict[str, Trial]:
-    """Return the trials of the scene of --scene."""
     from pyharness.checks.scene_trials import scene_trials
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.model.scene import checked_scene

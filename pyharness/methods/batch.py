@@ -147,10 +147,7 @@ class Batch:
         return found
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (rad/s) at `part` * `t_end` by another method, shape (n, 3).
-
-        A tolerance below the method's smallest is raised to it.
-        """
+        """Return omega (rad/s) at `part` * `t_end` by another method, shape (n, 3)."""
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":

@@ -61,10 +61,7 @@ class Ensemble(BatchResult):
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications, shape (n,); NaN where unknown.
-
-        Each is the largest norm of state-transition matrices from 0 on, or a bound to the end.
-        """
+        """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
         return None if self.estimates is None else self.estimates[:, 1]
 
     def estimates_of(self, piece: slice) -> Array:

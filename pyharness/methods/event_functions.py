@@ -106,10 +106,7 @@ class EventFunction:
 
 
 def event_functions(events: object, attitude: bool) -> list[EventFunction]:
-    """Return a user's events, one function or a list, as checked functions.
-
-    Raise InputError for anything else.
-    """
+    """Return a user's events, one or a list, as checked functions, or raise InputError."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):

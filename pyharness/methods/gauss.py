@@ -184,8 +184,5 @@ def _lengths(times: Sequence[float]) -> Array:
 
 
 def _first_step(rate: float, shortest: float) -> float:
-    """Return a first step size (s), in which each phase grows by at most about half a radian.
-
-    It divides the `shortest` interval (s), so that halving doubles the number of steps exactly.
-    """
+    """Return a step size (s), a part of `shortest`, in which a phase grows by half a radian."""
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

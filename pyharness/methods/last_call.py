@@ -67,20 +67,15 @@ class LastCall:
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first.
 
-        ``gave up``: the work limit was exceeded, or no correct digit of the phase left;
-        ``refused``: the method does not apply; ``sensitive``: amplified rounding errors exceed the
-        tolerance, and leave `digits`. To find the last takes microseconds for a closed form,
-        milliseconds for Gauss collocation.
+        ``gave up``: work limit exceeded, or no correct digit of the phase left; ``refused``: the
+        method does not apply; ``sensitive``: amplified rounding errors exceed the tolerance. To
+        find the last takes microseconds for a closed form, milliseconds for Gauss collocation.
         """
         return self._found()[0]
 
     @property
     def error(self) -> float | None:
-        """Return the estimated error of the last result, or None.
-
-        It is relative to the largest component of omega so far, or the angle (rad) if that is
-        larger.
-        """
+        """Return the estimated error of the last result, as of `Trajectory`, or angle (rad)."""
         return self._found()[1]
 
     @property

@@ -9,10 +9,7 @@ _HUGE = 1e100  # limit of a matrix element, which keeps products finite
 
 
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the state-transition matrix of omega from each time to the last, shape (n, 3, 3).
-
-    Omega (rad/s) must change little from each time (s) to the next.
-    """
+    """Return the state-transition matrices of omega from close times to the last, (n, 3, 3)."""
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
 

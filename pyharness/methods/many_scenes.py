@@ -52,8 +52,7 @@ class Axes:
 def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
     """Return scenes with full inertia matrices as arrays about principal axes; None as NaN.
 
-    Coefficients A, B, C replace moments: `principal` computes them more accurately than rounded
-    moments would give.
+    They have A, B, C, which rounded moments would give less accurately.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))

@@ -82,10 +82,9 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     def many(self) -> Callable[..., tuple[Array, Array, NDArray[np.int8]]]:
         """Return the function that solves many initial omegas and attitudes in one call.
 
-        Call it as ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``, as
-        `Solver.many`, with quaternions of shape (n, 4) or (4,). It returns omega (rad/s), (n, 3),
-        the attitudes, (n, 4), and the statuses, int8, (n,); `out` may be an Ensemble, or an array
-        for omega.
+        ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)`` is as in `Solver`, with
+        quaternions of shape (n, 4) or (4,). It returns omega (rad/s), attitudes and statuses; `out`
+        may be an Ensemble, or an array for omega.
         """
         return partial(many_attitudes, self, self._code)
 

@@ -28,10 +28,7 @@ class ChangingSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function ``solver.many(omega0, t_end)``, as `Solver.many` describes.
-
-        A row is NaN and REFUSED if a moment reaches 0 before its time.
-        """
+        """Return `Solver.many`; a row is REFUSED if a moment reaches 0 before its time."""
         return self._many
 
     def _many(

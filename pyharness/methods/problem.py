@@ -21,8 +21,8 @@ _NOT_FINITE = (
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """Return the coefficients A, B, C, and the torque over the moments, as five arrays.
 
-    They are constant (1/s2), rate (1/s3), sines and cosines, shape (4, n), with columns of three
-    amplitudes and the frequency (rad/s). Raise InputError if one is not finite.
+    They are constant (1/s2), rate (1/s3), sines and cosines, columns of three amplitudes and the
+    frequency (rad/s). Raise InputError if one is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 

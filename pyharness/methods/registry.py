@@ -221,10 +221,7 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the requested tolerance, or the method's default; its range is not checked.
-
-    Raise InputError if it is not a number.
-    """
+    """Return the tolerance, unchecked, or the method's default; raise InputError if no number."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 

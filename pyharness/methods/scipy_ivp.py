@@ -68,10 +68,7 @@ class _Ahead(NamedTuple):
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound of the ratio of a SciPy method's error at the end to its error per step.
-
-    `radians` is the phase, `turned` the angle (rad) by which the body rotates, or 0.
-    """
+    """Return a bound of the ratio of an error at the end to that per step; angles are in rad."""
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 

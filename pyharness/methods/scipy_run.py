@@ -147,10 +147,7 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from rows of omega, shape (n, 3), or omega and attitude, (n, 7).
-
-    Attitudes are normalised.
-    """
+    """Return a trajectory from omega, (n, 3), or with attitude, normalised here, (n, 7)."""
     attitude = None
     if rows.shape[1] > 3:
         attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

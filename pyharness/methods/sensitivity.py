@@ -29,10 +29,7 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether amplified rounding errors exceed 0.3 times the tolerance.
-
-    They are the unit roundoff times `growth` times (1 + `noise`), as of `torque_noise`.
-    """
+    """Return whether rounding errors, times `growth` (1 + `noise`), exceed 0.3 tolerances."""
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
 

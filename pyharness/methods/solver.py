@@ -104,11 +104,11 @@ class Solver(LastCall, BoundKernel):
     def many(self) -> "ManyStarts":
         """Return the function that solves many initial omegas in one call.
 
-        Call it as ``solver.many(omega0, t_end, threads=1, out=None)``, with `omega0` (rad/s) of
-        shape (n, 3), and `t_end` (s) a number or of shape (n,). It returns omega (rad/s), shape (n,
-        3), in `out` if that is not None, and the statuses, int8, shape (n,), as in `Ensemble`. A
-        row does not depend on the others or on the number of threads; it meets the tolerance, but
-        its rounding differs from a single call's. Other arguments raise an InputError.
+        ``solver.many(omega0, t_end, threads=1, out=None)`` takes `omega0` (rad/s) of shape (n, 3),
+        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in `out`
+        if given, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
+        others or on threads; its rounding differs from a single call's. Other arguments raise an
+        InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -131,10 +131,7 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Return `omega0` (rad/s) and `t_end` (s) as floats if C can't read their types.
-
-    Raise InputError for a wrong type or shape.
-    """
+    """Return `omega0` (rad/s) and `t_end` (s) as floats, or raise InputError."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
         raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")

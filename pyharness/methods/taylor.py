@@ -49,10 +49,7 @@ def taylor(
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name of the kernel that solves a scene by Taylor series, and its first arguments.
-
-    Raise InputError for an opaque torque.
-    """
+    """Return the name and first arguments of the kernel; raise InputError if opaque."""
     if isinstance(scene.torque, StateTorque):
         return "tape_rows", (kernel_tape(system(scene)),)
     if scene.torque.in_space:

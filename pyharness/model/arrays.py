@@ -96,10 +96,7 @@ def row_of(array: Array, i: int) -> Any:
 
 
 def only_one(given: Mapping[str, object]) -> str:
-    """Return the name of the one argument that is not None, or "".
-
-    Raise InputError if several are not None.
-    """
+    """Return the name of the argument that is not None, or ""; raise InputError for several."""
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
         raise InputError(f"{' and '.join(names)} are both given; give one of them")

@@ -25,9 +25,6 @@ def facts_folder() -> Path:
 
 
 def shipped(name: str) -> Path:
-    """Return the path of what a checkout has beside the package, as ``fortran/original``.
-
-    An installed package has it in `data`, except ``docs``.
-    """
+    """Return the path of what a checkout, or `data`, has, as ``fortran/original``."""
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

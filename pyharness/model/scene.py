@@ -317,10 +317,7 @@ class Scene:
 
 
 def most_steps() -> int:
-    """Return the largest number of steps whose results fit in half of this machine's memory.
-
-    Compiled programs count in 32 bits, to 400 million.
-    """
+    """Return how many steps fit in half of the memory, and in the 32 bits of programs."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 

@@ -101,10 +101,7 @@ class Functions(Generic[T]):
 
 
 def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
-    """Return the outputs of a tape in the arithmetic of `functions`.
-
-    `inputs` are the time, omega and attitude, eight values.
-    """
+    """Return the outputs of a tape for eight inputs in the arithmetic of `functions`."""
     values = slot_values(tape, inputs, functions)
     return [_combined(each, values, functions) for each in tape.outputs]
 

@@ -138,10 +138,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a user's tolerance as a float, with its range unchecked, or raise InputError.
-
-    `finest` is for the message.
-    """
+    """Return a user's tolerance as a float, unchecked against `finest`, or raise InputError."""
     found = converted(value)
     if isinstance(found, float):
         return found

@@ -62,10 +62,7 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return a merged torque law, the argument itself if nothing changes.
-
-    A cosine of frequency 0 is added to the constant.
-    """
+    """Return a merged torque law, the argument itself if nothing changes."""
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
@@ -196,9 +193,6 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without k for which all laws have none.
-
-    A frequency that is not finite is kept: the solver rejects its law.
-    """
+    """Return the waves, (m, k, 4), without k where no law has any; what is not finite is kept."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -67,10 +67,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations of motion with their derivatives by parameters and initial state.
-
-    The torque must not be opaque.
-    """
+    """Return the equations with their derivatives by parameters and initial state."""
     body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)

@@ -17,10 +17,7 @@ from pyharness.model.values import converted, finite, number_list, three
 
 
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
-    """Return a recorded function of (t, omega, attitude) as a ready term.
-
-    Scene files have its kind and its checked arguments.
-    """
+    """Return a recorded function as a ready term, with kind and checked arguments."""
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
 

@@ -138,9 +138,9 @@ def workloads(
 ) -> list[Workload]:
     """Return cases of Table 1, each to an end time T.
 
-    By default Cases 2 to 7 to 3 s, and 3 (nearly symmetric) and 4 (unsymmetric, torque-free) to 100
-    s. With `attitude` Cases 1 to 7 to 3 s, and all except 6 to 100 s, from the axes of space.
-    `case` and `horizon` (s) select one.
+    By default 2 to 7 to 3 s, and 3 (nearly symmetric) and 4 (unsymmetric, torque-free) to 100 s;
+    with `attitude`, from the axes of space, 1 to 7 to 3 s and all but 6 to 100 s. `case` and
+    `horizon` (s) select one.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)

@@ -19,8 +19,7 @@ WARMING = 2.0
 def orekit(scene: Scene) -> Maker:
     """Return a maker of `TorqueFree`; the setting has no effect.
 
-    Each run computes the elliptic integrals again. Raise InputError if the scene has a torque or no
-    moments, or if Java or Orekit fails.
+    Each run computes the elliptic integrals again.
     """
     if not scene.torque.is_zero or scene.moments is None:
         raise InputError("TorqueFree does not take this scene; allowed: moments, and no torque")
@@ -69,10 +68,7 @@ def _end(found: Any) -> End:
 
 
 def _machine() -> Any:
-    """Return JPype with a started Java machine, of which a process can have one.
-
-    Raise InputError if Java or Orekit fails.
-    """
+    """Return JPype with a started Java machine, of which a process can have one."""
     try:
         # JPype's type hints declare only some of its names.
         jpype, package = map(import_module, ("jpype", "orekit_jpype"))

@@ -22,9 +22,8 @@ def measured_report(
     """Return the report of a benchmark.
 
     `title` is a Markdown heading, `worth` says how far numbers can be compared, `parts` are titled
-    tables, and `notes` lines below them. `record` returns the JSON, `data` is the table with full
-    precision, `pictures` are functions by name. `packages` are those whose versions are listed,
-    `command` repeats the report.
+    tables. `record` returns the JSON, `data` is the table with full precision, `pictures` are
+    functions by name. `packages` are those whose versions are listed, `command` repeats the report.
     """
     here, built = machine(packages), build()
     versions = [

@@ -26,9 +26,9 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload of a seed and a number (from 1), which takes the torques in turn.
 
-    It is drawn again if its error amplification is `MOST_GROWTH` or more, or if the body turns less
-    than once or more than 300 times. Units are kg m2, rad/s, N m and s. With `attitude` it starts
-    from the axes of space, and has no `truth`, as `integer_series` does not propagate it.
+    It is drawn again if its error amplification is `MOST_GROWTH` or more, or the body turns less
+    than once or more than 300 times. With `attitude` it starts from the axes of space, and has no
+    `truth`, as `integer_series` does not propagate it.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

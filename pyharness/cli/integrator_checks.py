@@ -20,8 +20,7 @@ _HIGHEST = 40.0
 def check_integrator(options: argparse.Namespace) -> int:
     """Compare an integrator with true solutions; return 0 if all checks pass, else 1.
 
-    `options.integrator` starts it. Raise InputError if an option has no meaning with it, or no
-    scene is selected.
+    `options.integrator` starts it.
     """
     shared.refuse(options, "--integrator", _REFUSED)
     command = options.integrator

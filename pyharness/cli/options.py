@@ -110,8 +110,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
     """Return the names in --only, kinds or beginnings of ids, as in ``cells/two-term``.
 
-    A kind is the part before the first slash. Raise InputError, which calls it `what`, for an
-    unknown one.
+    A kind is the part before the first slash.
     """
     only = names(text)
     for each in only:
@@ -210,10 +209,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the stop test's constant (1/s), by default that on the cards.
-
-    Raise InputError if --lipschitz or --no-stop is given without a stop test, or both are.
-    """
+    """Return the stop test's constant (1/s), by default that on the cards."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -276,10 +272,7 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return the files of --also with their formats.
-
-    Raise InputError for an unknown format, or a file named twice.
-    """
+    """Return the files of --also with their formats."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""

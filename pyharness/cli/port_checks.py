@@ -15,10 +15,7 @@ _REFUSED = ("only", "external", "update", "record")
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Compare a port, started by `options.port`; return 0 if all checks pass, else 1.
-
-    Raise InputError if an option has no meaning with a port, or no run is requested.
-    """
+    """Compare a port, started by `options.port`; return 0 if all checks pass, else 1."""
     shared.refuse(options, "--port", _REFUSED)
     cells, seed = requested_cells(
         shared.names(options.cell), programs, cases, options.draws, shared.chosen_seed(options)
@@ -47,8 +44,7 @@ def requested_cells(
 
     `names` are beginnings such as ``two-term/case-3`` or ``random/7``, empty for all; `draws` is
     the number of random scenes as text. The seed is by default the present year and week, and empty
-    without draws. Raise InputError if no run is requested, `draws` is not allowed, or a seed has no
-    draws.
+    without draws.
     """
     count = 0 if draws is None else shared.whole(draws, "--draws")
     check_count("--draws", count, 0, CHECKS)

@@ -49,21 +49,10 @@ def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
 
 
 class Printed(NamedTuple):
-    """A figure of the thesis, beside our drawings of it.
+    """A figure of the thesis, beside our drawings of it by file name without suffix.
 
-    Attributes
-    ----------
-    number : int
-        Its number in the thesis.
-    caption, where : str
-        Its printed caption, and its place.
-    says : list of tuple of Markup and str
-        Each sentence of the thesis about it, with the sentence's anchor; the anchor is empty for
-        sections I to IV.
-    ours : Markup
-        The replacement of a figure that is not drawn; else empty.
-    drawn : dict of str to Drawn
-        Our drawings by file name without suffix.
+    `says` has each sentence of the thesis about it with the anchor, empty for sections I to IV.
+    `ours` replaces a figure that is not drawn, else it is empty.
     """
 
     number: int

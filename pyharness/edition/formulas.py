@@ -12,20 +12,9 @@ from pyharness.model.facts import facts
 class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
-    Attributes
-    ----------
-    number : str
-        As in ``34a`` or ``13-15``; empty if it has none.
-    where : str
-        The section.
-    lines : list of Markup
-        The lines as MathML.
-    what : Markup
-        One sentence on it, as HTML.
-    cards : dict of str to str
-        Numbers of the cards that compute it, by program.
-    entry : str
-        The entry of the apparatus about it, or empty.
+    `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
+    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is that of the
+    apparatus about it, or empty.
     """
 
     number: str

@@ -37,26 +37,11 @@ _SAMPLE = "sample"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid: a field of the scene or of the solver, and its values.
+    """One axis of a sweep's grid: a field of the scene or solver, as in ``omega.1``.
 
-    Axes with the same dimension vary together: index i gives value i of each.
-
-    Attributes
-    ----------
-    field : str
-        The field, as in ``omega.1``.
-    dimension : str
-        The dimension of the store's arrays; by default the field's name, or `sample` if the values
-        are random.
-    count : int
-        The number of values.
-    how : str
-        `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`.
-    values : tuple of float or str
-        The listed values, both ends of the range, or mean and standard deviation; none for
-        `sphere`.
-    seed : int
-        The seed of a distribution.
+    Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
+    together. `how` is `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`; `values` are
+    accordingly all values, both ends, or mean and standard deviation (none for `sphere`).
     """
 
     field: str
@@ -127,8 +112,7 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
 def axis_of(table: object, number: int) -> Axis:
     """Return the axis of a table [[axis]] of a sweep file.
 
-    `number`, from 1, is for messages. Raise InputError if a key is missing or has a value that is
-    not allowed.
+    `number`, from 1, is for messages.
     """
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):

@@ -29,7 +29,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
     `listing` is ``original``, ``corrected``, ``fix:`` and the only defects to correct, or ``keep:``
     and the only ones to keep. `reading` is ``adopted``, or the readings to activate. Names are
-    joined by ``+``. Raise InputError for an unknown one.
+    joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")

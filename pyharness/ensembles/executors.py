@@ -182,10 +182,7 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 
 
 def _connected(dask: Any, address: str) -> Any:
-    """Return a client of the Dask scheduler at `address`.
-
-    Raise InputError if none answers, or if it has no worker.
-    """
+    """Return a client of the Dask scheduler at `address`."""
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"

@@ -32,7 +32,7 @@ _ORDERS = 3.0
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the reduction `name`, by default the first one without codes of outcomes.
 
-    If all have codes, it is the first. Raise InputError for an unknown name.
+    If all have codes, it is the first.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:

@@ -16,8 +16,7 @@ _MOST_SAMPLES = 10_000
 def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
     """Return the reduction of an entry: a name, or a table with name and parameters.
 
-    `claims` maps each claim to the function that checks it, as in ``package.module:name``. Raise
-    InputError for an unknown name or a value that is not allowed.
+    `claims` maps each claim to the function that checks it, as in ``package.module:name``.
     """
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:

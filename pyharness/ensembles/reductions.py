@@ -31,25 +31,10 @@ _NOT_YET = -1
 class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
-    Attributes
-    ----------
-    title, units : str
-        Description and unit.
-    compute : callable
-        A function of a batch of n scenes and of the parameters by name. It returns n values, or n
-        rows with a value for each label.
-    dtype : str
-        The NumPy type. NaN, or -1 in an integer array, marks values not computed yet.
-    labels, dimension : tuple of str, str
-        The labels of several values, and the name of their dimension, the last one; else empty.
-    only : str
-        `program` or `method` if only one of these can compute the quantity, else empty.
-    needs : tuple of str
-        Requirements: `moments`, `no torque` or `attitude`.
-    parameters : mapping
-        The parameters with their defaults.
-    flags : mapping
-        The meaning of each value, if they are codes of outcomes.
+    `compute` returns, from a batch of n scenes and the parameters, n values or n rows with a value
+    for each of `labels`, along `dimension`. `only` is `program` or `method` if the other can't
+    compute it; `needs` lists `moments`, `no torque` or `attitude`. `parameters` has defaults,
+    `flags` the meaning of codes of outcomes.
     """
 
     title: str

@@ -139,31 +139,12 @@ def run_sweep(
 ) -> Outcome:
     """Compute the chunks of a sweep that its store lacks, and return the outcome.
 
-    Parameters
-    ----------
-    sweep : Sweep
-        The sweep, as `read_sweep` returns it.
-    path : str
-        The store, a folder, which is made if it is missing.
-    executor : {"here", "processes", "dask"}
-        This process, other processes on this machine, or a Dask cluster.
-    workers : int, optional
-        The number of processes; by default the number of processors.
-    address : str, optional
-        A Dask scheduler, as in ``tcp://host:8786``; by default `dask` starts a cluster here.
-    before : callable
-        It is called with the forecast before anything is computed.
-    progress : bool or callable
-        True for a progress bar; or a function that is called after each chunk with the number of
-        computed chunks, the number to compute, and the text "chunks".
-    repair : bool
-        Whether to compute or write damaged chunks and metadata again, instead of raising an error.
-
-    Raises
-    ------
-    InputError
-        If the store belongs to another sweep or is damaged, the cluster does not answer, or disk or
-        memory can't hold the sweep. Computed chunks stay, and the next call computes the rest.
+    `path` is the store's folder, made if missing. `executor` is "here", "processes" or "dask",
+    which starts a cluster here without the `address` of a scheduler, as in ``tcp://host:8786``.
+    `before` gets the forecast before anything is computed. `progress` is True for a bar, or is
+    called after each chunk with the computed chunks, all to compute, and "chunks". With `repair`,
+    damaged chunks and metadata are made again. Raise InputError if the store is another sweep's or
+    damaged, no cluster answers, or disk or memory is too small; computed chunks stay.
     """
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome

@@ -65,10 +65,7 @@ def follows_body(scene: Scene) -> bool:
 def with_numbers(
     scene: Scene, constants: Mapping[str, float], moments: Sequence[float] | None
 ) -> Scene:
-    """Return the scene with other constants of expressions, or other moments (kg m2).
-
-    Raise InputError if a value is not allowed, for example because a constant is divided by 0.
-    """
+    """Return the scene with other constants of expressions, or other moments (kg m2)."""
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:
         data["torque"]["constants"].update(constants)

@@ -38,20 +38,9 @@ class ReductionSpec:
 class Sweep:
     """A sweep as a sweep file describes it.
 
-    Attributes
-    ----------
-    scene : Scene
-        The scene that supplies all quantities that no axis varies.
-    axes : tuple of Axis
-        In the order of the file.
-    solver : Solver
-        The method or program, with its settings.
-    reductions : tuple of ReductionSpec
-        The stored quantities.
-    chunk : int
-        The largest number of scenes in a chunk.
-    text, fingerprint : str
-        The text of the sweep file, and the SHA-256 of it and of the scene file that it names.
+    `scene` supplies all quantities that no axis varies. `chunk` is the largest number of scenes in
+    a chunk; `fingerprint` is the SHA-256 of `text`, the sweep file, with the scene file that it
+    names.
     """
 
     name: str

@@ -49,8 +49,7 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
 
     A scene file's path is relative to the sweep file. `claims` maps each claim to the function that
     checks it, as in ``package.module:name``: for a `Batch` of n scenes it returns 1 where the claim
-    holds, 0 fails, 2 does not apply, 3 holds in part. Raise InputError if the file can't be read or
-    does not describe a sweep.
+    holds, 0 fails, 2 does not apply, 3 holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"

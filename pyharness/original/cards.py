@@ -180,10 +180,7 @@ def numbers(ranges: str) -> list[int]:
 
 
 def find(program: str, number: int) -> Card:
-    """Return the card of a program with a number.
-
-    Raise InputError, which names the nearest cards, if there is none.
-    """
+    """Return the card of a program with a number."""
     cards = deck(program).cards
     if number not in cards:
         near = sorted(cards, key=lambda each: abs(each - number))[:2]

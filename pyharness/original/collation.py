@@ -51,7 +51,7 @@ def witness_lines() -> dict[str, str]:
 def unexplained(scan: str) -> list[str]:
     """Return a sentence for each line in which a scan disagrees with our tables of cards.
 
-    `scan` is the text of the whole thesis. Raise InputError if it has no appendix with cards.
+    `scan` is the text of the whole thesis.
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):

@@ -22,8 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `run_program`, and are not checked. Raise NotBuiltError if the
-    extension is not built.
+    The arguments are those of `run_program`, and are not checked.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)

@@ -119,9 +119,8 @@ def corrections(program: str) -> dict[int, list[str]]:
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
 
-    It includes our LEQT1F if needed. `system` ("nos" or "nosbe") selects control statements;
-    `rounds` sets FTN's option ROUND for sums, products and quotients. Raise InputError if the
-    system is unknown.
+    It includes our LEQT1F if needed. `system` is "nos" or "nosbe"; `rounds` sets FTN's option ROUND
+    for sums, products and quotients.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")

@@ -277,10 +277,7 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the requested steps as an array, by default the last.
-
-    Raise InputError if a requested step is not from 1 to `steps`.
-    """
+    """Return the requested steps as an array, by default the last; check them."""
     if at is None:
         return np.array([steps], dtype=np.int32)
     found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]

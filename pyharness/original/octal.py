@@ -65,8 +65,7 @@ def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
     `name` is F (truncating) or R (rounding), X, and +, -, * or /, as in ``FX*``. A sum or
-    difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError if the
-    instruction is unknown, or if `x` or `y` is not a CDC word.
+    difference is normalised only if NX follows, as in ``RX+ NX``.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

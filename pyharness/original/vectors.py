@@ -43,10 +43,7 @@ class Answer(NamedTuple):
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the test vectors of a JSON file, by default ours, with our results.
-
-    Raise InputError if the file cannot be read, is not of this form, or has no vectors.
-    """
+    """Return the test vectors of a JSON file, by default ours, with our results."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)

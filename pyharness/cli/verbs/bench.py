@@ -265,8 +265,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
     """Return the solvers that an option lists, by name or package.
 
-    None is for all, "none" for no solver. Raise InputError, with the noun `what`, for an unknown
-    one.
+    None is for all, "none" for no solver.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:

@@ -75,7 +75,7 @@ class LastCall:
 
     @property
     def error(self) -> float | None:
-        """Return the estimated error of the last result, as of `Trajectory`, or angle (rad)."""
+        """Return the last result's estimated error, relative or of the angle (rad), or None."""
         return self._found()[1]
 
     @property

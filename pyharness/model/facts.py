@@ -25,6 +25,6 @@ def facts_folder() -> Path:
 
 
 def shipped(name: str) -> Path:
-    """Return the path of what a checkout, or `data`, has, as ``fortran/original``."""
+    """Return the path of a folder beside the package, as ``fortran``, or installed in `data`."""
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -122,7 +122,7 @@ def _by_series(
 
 
 def _period(scene: Scene) -> float:
-    """Return the period of omega (s), or 0 if there is none, or too little change for its digits."""
+    """Return the period of omega (s), or 0 if there is none, or omega is nearly constant."""
     # A function that is 0 now, and has a parameter of this name, may depend on time.
     period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
     largest = math.hypot(*scene.omega)

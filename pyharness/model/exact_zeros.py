@@ -30,7 +30,7 @@ def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the last zero before time 0 and the first after, or infinities; it is positive at 0."""
+    """Return the last zero before time 0, where it is positive, and the first after, or inf."""
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)

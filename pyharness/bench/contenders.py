@@ -74,10 +74,7 @@ def own() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError if a tolerance is below 100 eps, eps = 2**-52.
-
-    SciPy would warn and use 100 eps; LSODA would reject it.
-    """
+    """Raise InputError below 100 eps, as SciPy uses 100 eps and LSODA refuses it."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

@@ -12,10 +12,7 @@ _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text with control characters, except line breaks, tabs and form feeds, escaped.
-
-    Names from third-party files could otherwise change the state of a terminal.
-    """
+    """Return a text with the control characters of third-party names escaped."""
     return printable(text, _LAYOUT)
 
 

@@ -218,10 +218,7 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if an option in `names` has no meaning with `chosen`.
-
-    `names` are as in "no_stop"; `chosen` is as in "--program two-term", or a noun.
-    """
+    """Raise InputError if a name, as in "no_stop", has no meaning with `chosen`."""
     for name in names:
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")

@@ -86,10 +86,7 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return the moments (kg m2) of a homogeneous box by edges (m) and mass (kg).
-
-    They are computed from decimals, so that they are as short.
-    """
+    """Return moments (kg m2) of a homogeneous box (m, kg), with as few digits as decimals."""
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
     return [float(twelfth * (sum(squares) - square)) for square in squares]

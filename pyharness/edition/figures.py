@@ -40,10 +40,7 @@ def drawn() -> dict[str, Drawn]:
 
 
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Return original and corrected Figure 7 and its limit, as SVG and CSV.
-
-    `figures` is the result of `drawn`.
-    """
+    """Return Figure 7, original and corrected, and its limit, as SVG and CSV."""
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")
 

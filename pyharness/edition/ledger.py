@@ -58,10 +58,7 @@ def kinds(judged: Sequence[Judgement]) -> Markup:
 
 
 def account() -> dict[str, Markup]:
-    """Return, by identifier, the HTML texts that pages and documents share.
-
-    They are ``data/account.toml``, and the effects of single defects in ``data/apparatus.toml``.
-    """
+    """Return the HTML texts of ``data/account.toml`` and the effects of single defects, by id."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}

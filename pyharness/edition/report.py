@@ -20,10 +20,7 @@ _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the JSON record of the site.
-
-    `build` has versions, compiler and flags; `files` sizes in bytes by path.
-    """
+    """Return the site's JSON: `build` has versions and compiler, `files` sizes in bytes."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 

@@ -279,10 +279,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return JavaScript that assigns `value` to a global name.
-
-    A page opened without a server can't load JSON.
-    """
+    """Return JavaScript that assigns `value`; pages without a server can't load JSON."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 

@@ -99,18 +99,12 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the fields that an axis may vary, without the constants of expressions.
-
-    Every scene has its own constants.
-    """
+    """Return the fields that an axis may vary, without the constants of expressions."""
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return a field of numbers: a key of `NUMBERS`, or as in ``torque.constants.k``.
-
-    Raise KeyError for any other name.
-    """
+    """Return a field: a key of `NUMBERS`, or as in ``torque.constants.k``; else KeyError."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]

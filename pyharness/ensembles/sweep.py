@@ -129,10 +129,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of the varied fields in the scenes that `where` selects.
-
-    The keys are fields, as in ``omega.1``.
-    """
+    """Return the values in the scenes of `where`, by fields as in ``omega.1``."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 

@@ -19,10 +19,7 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing of a program: each subset of switches with each subset of readings.
-
-    The switches are the defects and some conjectures, all active in the original program.
-    """
+    """Yield every listing: each subset of defects, some conjectures and readings."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)

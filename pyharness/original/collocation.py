@@ -77,10 +77,7 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return c1, c2, ... of each unknown's polynomial, and the error code IER.
-
-    `rates` has the derivatives at `points` (s), a row for each point.
-    """
+    """Return c1, c2, ... and IER from the `rates` at `points` (s), a row for each point."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 

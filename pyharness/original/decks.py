@@ -95,11 +95,7 @@ def card_steps(program: str) -> int:
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return the text of each card of the corrected program, by number.
-
-    Inserted cards have numbers between their neighbours'; deleted cards are missing. There are no
-    blanks at the end.
-    """
+    """Return each card of the corrected program by number, inserted ones in between."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
@@ -309,10 +305,7 @@ def _command(words: list[str], folder: Path) -> None:
 
 
 def _records(path: Path) -> np.ndarray:
-    """Return the records of TAPE5, shape (n, 7).
-
-    Each is 7 numbers between two copies of the record's length.
-    """
+    """Return TAPE5, shape (n, 7): records between copies of their lengths."""
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]
 

@@ -14,10 +14,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of equations 16-18, the rates of change of omega (rad/s2).
-
-    `coefficients` are A, B, C of Euler's equations, `m` is torque over moment of inertia (1/s2).
-    """
+    """Return F, G, H of eqs. 16-18 (rad/s2) from A, B, C, torque over moment (1/s2), omega."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -35,20 +32,13 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return force over mass along each body axis (m/s2).
-
-    With the defect `three-masses` each axis has its own mass, else all have the first.
-    """
+    """Return force over mass (m/s2); by `three-masses` each axis has its own mass."""
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque over the moments of inertia (1/s2), or None.
-
-    It acts during the first step by the conjecture `initial-torque`, and exists only for cases of
-    Table 1 given by moments.
-    """
+    """Return torque over moments (1/s2) for the conjecture `initial-torque`, or None."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None
@@ -80,11 +70,7 @@ class Record:
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add the results of a step.
-
-        `recorded_time` is TIME (s) as the program computes it; `omega` is in rad/s, `velocity` in
-        m/s. `ier` is the linear solver's error code.
-        """
+        """Add a step: TIME (s) as computed, omega (rad/s), velocity (m/s), the solver's code."""
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
         self._ier.append(ier)

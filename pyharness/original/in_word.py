@@ -52,10 +52,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a copy of a frozen dataclass with new values of some fields.
-
-    Its checks are skipped, because they would convert the values to floats.
-    """
+    """Return a changed copy, without checks, which would convert the values to floats."""
     changed = copy.copy(frozen)
     vars(changed).update(fields)
     return changed

@@ -86,10 +86,7 @@ def formats_of(program: str) -> dict[str, Any]:
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the torques (N m) on the input cards: initial ones of Table 1, else constant ones.
-
-    No card can express a torque that varies with time.
-    """
+    """Return the torques (N m) on the input cards, which can't vary with time."""
     cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
     first, second, third = cards.get(scene.case, scene.law.constant)
     return first, second, third

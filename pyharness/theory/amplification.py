@@ -100,10 +100,7 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return the collocation points and their weights, in units of the step size.
-
-    With the defect `dt-accumulates` the points of step k are k times those of the first.
-    """
+    """Return collocation points and weights in step sizes; `dt-accumulates` moves them."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)

@@ -221,10 +221,7 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the power of the number of steps with which errors grow, by a fit to logarithms.
-
-    `found` has a row for each initial condition and a column for each number of steps.
-    """
+    """Return the power of the steps (columns) with which errors grow, by a logarithmic fit."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 

@@ -150,10 +150,7 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a small step size (s), and its collocation matrix.
-
-    The largest element of each row is 1, as for any smaller step size.
-    """
+    """Return a step (s) small enough for rows with the largest element 1, and the matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 

@@ -27,10 +27,7 @@ STEPS = Basis(
 
 
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return how often a run rounds omega to binary64 at the end of a step.
-
-    It is 0 with compensated summation, and for SciPy's methods an estimate from `evaluations`.
-    """
+    """Return how often omega is rounded: 0 if compensated; for SciPy's methods an estimate."""
     if name in SCIPY_METHODS:
         return evaluations / (1 if name == "lsoda" else 6)
     return float(run_steps) if name in FIXED_STEP or name == "quick" else 0.0

@@ -34,10 +34,7 @@ def fractions(floats: ArrayLike) -> Fractions:
 
 
 def gamma(count: int) -> Fraction:
-    """Return n u / (1 - n u), the bound of n = `count` roundings, u = 2**-53.
-
-    Higham 2002, lemma 3.1.
-    """
+    """Return n u / (1 - n u), u = 2**-53, the bound of n roundings (Higham 2002, lemma 3.1)."""
     return count * _UNIT / (1 - count * _UNIT)
 
 

@@ -79,10 +79,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the coordinates of points (n, 3) to the right, upwards, and towards the viewer.
-
-    `toward` is the unit vector to the viewer; `upward` appears vertical.
-    """
+    """Return points' coordinates to the right, upwards, and to the viewer (a unit vector)."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward

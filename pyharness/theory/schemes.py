@@ -26,11 +26,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Store the equations and a step size (s).
-
-        If `sizes`, absolute values are stored, so that `rate` returns, for non-negative omega, the
-        sums of the magnitudes of the terms.
-        """
+        """Store the equations and a step (s); with `sizes` the sums of magnitudes of terms."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))

@@ -127,9 +127,6 @@ def basis(s: Array, n: int) -> Array:
 
 
 def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of `basis` from 0 to m points, shape (m, n).
-
-    The integral from 0 to 1 is 1 for the first polynomial and 0 for each of the others.
-    """
+    """Return the integrals of `basis` from 0 to m points, shape (m, n)."""
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
     return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

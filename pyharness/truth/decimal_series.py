@@ -312,10 +312,7 @@ class _Equations:
         return series
 
     def _inertia_series(self, time: Decimal) -> list[list[Row]]:
-        """Return the Taylor coefficients of a changing inertia matrix around `time` (s).
-
-        It is empty for a constant inertia.
-        """
+        """Return Taylor coefficients of a changing inertia around `time` (s), else []."""
         if self._changing is None:
             return []
         return [[_moved(each, time) for each in row] for row in self._changing.elements]

@@ -61,10 +61,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
 
 
 def period_of(scene: Scene) -> Decimal | None:
-    """Return the period of omega (s) without torque, or None on the separatrix.
-
-    It is accurate to nearly all digits of the current decimal arithmetic.
-    """
+    """Return the period of omega (s) to nearly all digits, or None on the separatrix."""
     return _rate_and_period(scene)[1]
 
 

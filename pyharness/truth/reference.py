@@ -52,18 +52,12 @@ class Reference:
 
     @property
     def angle_error(self) -> float:
-        """Return a bound of the error of any attitude (rad).
-
-        It is the estimated error plus the rounding error.
-        """
+        """Return a bound of the attitude's error (rad), estimated plus rounding."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return a bound of the error of any omega (rad/s).
-
-        It is the estimated error plus the rounding error of the largest omega.
-        """
+        """Return a bound of omega's error (rad/s), estimated plus rounding of the largest."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 

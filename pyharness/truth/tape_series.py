@@ -297,11 +297,7 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
 
 
 def _sum(linear: Linear | None) -> _Sum:
-    """Return a linear combination in the current arithmetic; 0 for None.
-
-    A tape's exact binary fractions are rounded like all others, so that equal numbers have the
-    difference 0.
-    """
+    """Return a linear combination, rounded, so that equal numbers have the difference 0."""
     if linear is None:
         return Decimal(0), []
     return +Decimal(linear.constant), [(+Decimal(factor), slot) for slot, factor in linear.terms]

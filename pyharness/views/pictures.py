@@ -24,10 +24,7 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is there.
-
-    It is called before any computation.
-    """
+    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is there."""
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
@@ -44,10 +41,7 @@ def numbers_beside(path: str) -> str:
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return the files of a picture by path: images and one CSV; nothing is written.
-
-    Suffixes of `paths` determine the formats; the CSV has the first name.
-    """
+    """Return images at `paths`, and one CSV beside the first, by path, unwritten."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}

@@ -13,6 +13,7 @@ from tests.campaigns import state_campaign
 from tests.campaigns.state_campaign import TOLERANCES, Result, Tally, campaign, main, truth_of
 
 
+@pytest.mark.campaign
 def test_no_result_exceeds_the_limit() -> None:
     tally = campaign(12, "test")
     assert tally.violations == []
@@ -65,6 +66,7 @@ def test_missing_rows_are_reported() -> None:
     assert tally.violations == ["here: 0 rows instead of 1, tolerance 1e-06, ended overflow"]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("seed", "number"),
     [

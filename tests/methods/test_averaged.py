@@ -34,6 +34,7 @@ def _error(found: Trajectory, truth: Array) -> float:
     return float(np.abs(found.omega - truth).max() / np.abs(truth).max())
 
 
+@pytest.mark.campaign
 def test_random_scenes_meet_the_tolerance_or_are_refused_with_a_reason() -> None:
     """The series is accurate over this time, but its own estimate may be too small."""
     reasons: Counter[str] = Counter()
@@ -61,6 +62,7 @@ def test_random_scenes_meet_the_tolerance_or_are_refused_with_a_reason() -> None
     assert reasons["near the separatrix"] >= _NUMBERS // len(MOTIONS) // 2
 
 
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore::pyharness.ImpossibleBodyWarning")
 def test_difficult_scenes_are_solved_or_refused() -> None:
     """Some have numbers near the limits of binary64, and many have strong torques."""
@@ -234,6 +236,7 @@ def test_measured_error_shows_a_fault(fault: str, monkeypatch: pytest.MonkeyPatc
     assert step() > 1e3 * right
 
 
+@pytest.mark.campaign
 def test_crossing_of_the_separatrix_is_refused_at_its_time() -> None:
     """The spin about axis 3 ceases after some 3e5 s."""
     scene = replace(SCENE, torque=TorqueLaw((0.0, 0.0, -4e-6)))

@@ -125,6 +125,7 @@ def difference(first: Any, second: Any) -> float:
     return float(apart / max(1e-3, np.abs(second).max()))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(30))
 def test_solution_reference_and_a_right_hand_side_written_by_hand_agree(seed: int) -> None:
     source = Random(f"changing {seed}")

@@ -240,6 +240,7 @@ def test_faint_disturbances_grow_as_they_should(disturbance: float, time: float)
     np.testing.assert_allclose(found, wanted, rtol=2e-15, atol=0.0)
 
 
+@pytest.mark.campaign
 def test_component_that_hardly_moves_is_rounded_once() -> None:
     """For a nearly round body only the decrease of omega3 is computed, not 1 less a little."""
     source = random.Random(9)

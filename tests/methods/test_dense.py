@@ -188,6 +188,7 @@ def test_a_fast_small_wave_is_no_roughness_of_the_method() -> None:
         assert np.abs(found.sol(times).T - truth).max() <= 0.7e-6, method
 
 
+@pytest.mark.campaign
 def test_rounding_errors_above_the_tolerance_are_not_resolved() -> None:
     """They grow with the error amplification, and no polynomial is as accurate as the tolerance."""
     scene = Scene("wing nut", (0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))

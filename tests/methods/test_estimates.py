@@ -48,6 +48,7 @@ def largest(name: str) -> Array:
     return found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", SCENES)
 def test_estimates_are_not_below_the_errors(name: str) -> None:
     scale, truth = largest(name), solved(name, 1e-14)

@@ -41,6 +41,7 @@ def second(t: Any, omega: Any) -> Any:
     return omega[1]
 
 
+@pytest.mark.campaign
 def test_planted_roots_are_found_and_none_is_invented() -> None:
     tally = campaign(3000, 7)
     assert tally.roots >= 3000
@@ -178,6 +179,7 @@ def test_function_that_is_0_everywhere_has_one_event_and_no_change_of_sign() -> 
         )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("direction", [-1, 0, 1])
 def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(direction: int) -> None:
     # Omega is 0, rises from 1 s to 1 in 2 s, and falls from 3 s to 0 in 4 s.
@@ -412,6 +414,7 @@ def test_ending_is_saved(tmp_path: Path) -> None:
     assert load(tmp_path / "found.npz").status == 1
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("rate", [1e-3, 1e-4, 1e-6])
 def test_jump_where_omega_is_slow_is_one_event(rate: float) -> None:
     """Rounding errors of omega lead there and back across the jump, for as long as they count."""
@@ -428,6 +431,7 @@ def test_jump_where_omega_is_slow_is_one_event(rate: float) -> None:
     assert found.t_events[0] == pytest.approx([3.3], abs=1e-8)
 
 
+@pytest.mark.campaign
 def test_jumps_are_the_crossings_of_their_level() -> None:
     generator = np.random.default_rng(20261125)
     for _ in range(40):

@@ -15,6 +15,7 @@ from tests.methods.independent_terms import Drawn, applied, draw, times
 SCENES = (8, 15, 23, 45, 58, 89, 92, 124)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("number", SCENES)
 def test_errors_are_within_their_limits(number: int) -> None:
     drawn = draw(Random(f"independent tests {number}"))

@@ -160,6 +160,7 @@ def test_interpreter_and_solver_go_on(keyboard: _Keyboard) -> None:
     assert solver.status == "complete"
 
 
+@pytest.mark.campaign
 def test_other_threads_are_not_disturbed(keyboard: _Keyboard) -> None:
     """Python raises the signal in the main thread: a kernel in another thread runs to its end."""
     wanted = solve(PUSHED, [5e3], "taylor")
@@ -171,6 +172,7 @@ def test_other_threads_are_not_disturbed(keyboard: _Keyboard) -> None:
     np.testing.assert_array_equal(found.result().omega, wanted.omega)
 
 
+@pytest.mark.campaign
 def test_handler_that_does_not_raise_runs_on_the_way(keyboard: _Keyboard) -> None:
     wanted = solve(PUSHED, [5e3], "taylor")
     calls: list[float] = []

@@ -105,6 +105,7 @@ def test_a_body_does_not_depend_on_the_others(kind: str, level: int) -> None:
         assert np.array_equal(solve_many(TOP, **only(drawn, slice(count))).omega, whole[:count])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_threads_change_no_bit(kind: str) -> None:
     for n, counts in ((9, (2, 7)), (601, (2, 3, 7))):
@@ -419,6 +420,7 @@ def by_loops(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, ...]]:
     return solved
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.skipif(not compiler_here(), reason="no compiler")
 def test_loops_as_written_do_what_they_do_written_out(

@@ -242,6 +242,7 @@ def test_solve_many_takes_torques_in_space_with_attitudes() -> None:
     assert np.flatnonzero(~spoilt.has_result).tolist() == [1]
 
 
+@pytest.mark.campaign
 def test_a_prepared_solver_of_many_starts_has_its_work_limit() -> None:
     scene = case_scene(5)
     starts = np.tile(scene.omega, (2, 1))

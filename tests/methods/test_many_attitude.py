@@ -13,6 +13,7 @@ from tests.many_errors import KINDS, bodies
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_sizes_and_threads_change_no_bit(kind: str, level: int) -> None:
     drawn = bodies(kind, 1000, 5)

@@ -45,6 +45,7 @@ def small(t: Any, omega: Any) -> Any:
     return omega[0] ** 2 - 0.04
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", CASES)
 def test_details_are_those_of_single_calls(name: str) -> None:
     scene, own, names = CASES[name]

@@ -57,6 +57,7 @@ def differences(
     return np.stack(columns, axis=2)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_are_within_the_limit(kind: str) -> None:
     scene, time, names = random_scene(Random(f"tested {kind}"), kind)

@@ -38,6 +38,7 @@ def by_polynomials(*given: Any, **options: Any) -> Any:
         return solve(*given, **options)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_events_are_those_of_the_polynomials(name: str) -> None:
     count = 0
@@ -57,6 +58,7 @@ def test_the_events_are_those_of_the_polynomials(name: str) -> None:
     assert count == 0 if name == "none" else count > 100
 
 
+@pytest.mark.campaign
 def test_events_of_a_million_seconds() -> None:
     found = solve(
         WING_NUT, 1e6, events=[events.flip(2), events.extremum(3), events.crosses(1, 2.0)]

@@ -63,6 +63,7 @@ def test_a_call_that_fails_leaves_no_bar(capsys: pytest.CaptureFixture[str]) -> 
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.campaign
 def test_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = written(tmp_path, text(SQUARE, top='chunk = 2\nreductions = ["end"]'))
     run_sweep(read_sweep(file), str(tmp_path / "store"), progress=True)

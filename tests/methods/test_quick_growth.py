@@ -32,6 +32,7 @@ def _shaken(scene: Scene) -> Scene:
     return replace(scene, torque=TorqueLaw(scene.law.constant, sines=[wave]))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
 @pytest.mark.parametrize("method", ["auto", "quick"])
 def test_complete_is_not_said_where_the_series_says_sensitive(

@@ -54,6 +54,7 @@ def error_of(scene: Scene, truth: Reference, found: Any) -> float:
     return error
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("number", range(24))
 def test_error_is_below_the_tolerance_and_known(number: int) -> None:
     scene, time = draw(Random(f"recorded {number}"))

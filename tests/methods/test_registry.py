@@ -23,6 +23,7 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
     assert [name for name in REGISTRY if name not in METHODS] == ["quick"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("method", METHODS)
 def test_times_may_run_either_way_on_either_side(method: str) -> None:
     scene, times = case_scene(3), [-0.5, -0.25, 0.0, 0.25, 0.5]
@@ -40,6 +41,7 @@ def test_times_may_run_either_way_on_either_side(method: str) -> None:
 
 
 # The method `averaged` takes no motion that is not nearly periodic.
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "method", [name for name in METHODS if name not in ("closed-form", "averaged")]
 )

@@ -98,6 +98,7 @@ RATIOS: dict[str, tuple[Callable[..., Any], bool]] = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("method", ["auto", "dop853"])
 @pytest.mark.parametrize("name", RATIOS)
 def test_ratio_of_exponentials_is_right_or_an_overflow(name: str, method: str) -> None:

@@ -40,6 +40,7 @@ def pulse(seed: str) -> tuple[Scene, float]:
     return Scene("", SPHERE.omega, moments=SPHERE.moments, torque=torque), 1.0 + added
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("method", SCIPY_METHODS)
 def test_short_pulse_is_not_passed(method: str) -> None:
     for number in range(3):

@@ -86,6 +86,7 @@ def _error(found: Trajectory, truth: Reference) -> float:
     return max(error, float(turned))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("number", range(20))
 def test_the_error_is_below_the_tolerance(number: int) -> None:
     scene, times = _random_scene(number)
@@ -159,6 +160,7 @@ def test_no_step_passes_a_change_of_a_table(name: str, sign: float) -> None:
     assert torque.tape.breaks == changes
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["Radau", "LSODA"])
 def test_a_stiff_torque(name: str) -> None:
     torque = replayed(lambda t, w, q: -1e6 * (w - np.array([0.1, 0.2, 0.3])))
@@ -190,6 +192,7 @@ def _one(component: Any) -> list[Any]:
     return [component, 0.0, 0.0]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize(
     ("torque", "rows"),
@@ -291,6 +294,7 @@ def test_the_work_limit_holds(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
     assert calls <= 501
 
 
+@pytest.mark.campaign
 def test_a_tolerance_that_can_not_be_met_is_refused() -> None:
     """A component of omega grows by the factor exp(21), and so does the error of the first step."""
     torque = replayed(lambda t, w, q: [6.0 * w[0], -w[1] + w[0] * w[0], -w[2]])

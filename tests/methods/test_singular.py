@@ -40,6 +40,7 @@ def test_undefined_torque_ends_with_operation_time_and_advice(name: str, method:
     assert found.message.startswith("The torque is not defined at t = ")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("method", ["auto", "dop853", "reference"])
 @pytest.mark.parametrize(
     "torque",

@@ -98,6 +98,7 @@ HELD: dict[str, tuple[Scene, float, float, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("name", "method"),
     [(name, method) for name, held in HELD.items() for method in held[3].split()],

@@ -168,6 +168,7 @@ def test_another_axis_of_space_is_another_motion() -> None:
     assert np.abs(found[0] - found[1]).max() > 0.1
 
 
+@pytest.mark.campaign
 def test_tolerance_holds_on_random_scenes() -> None:
     held = 0
     ratios = []

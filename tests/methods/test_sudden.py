@@ -128,6 +128,7 @@ POWERS: dict[str, tuple[Callable[[Any], Any], list[tuple[float, float]]]] = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", POWERS)
 def test_a_high_power_is_a_series_of_pulses(name: str) -> None:
     value, rows = POWERS[name]

@@ -113,6 +113,7 @@ def test_a_law_with_too_many_terms_for_a_recording_is_solved_body_by_body() -> N
         assert np.array_equal(found.omega[i], solver(starts[i], 0.5, turns[i])[0])
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("level", [0, 1, 2])
 def test_results_do_not_depend_on_the_other_bodies(level: int) -> None:
     scene, time = draw(Random("others"), ("field", "decay", "quotient"))

@@ -159,6 +159,7 @@ def test_levels_agree_to_rounding() -> None:
         assert 0.0 < _error(omega, found[0]) <= 1e-15
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.skipif(not compiler_here(), reason="no compiler")
 def test_loops_as_written_do_what_they_do_written_out(tmp_path: Path) -> None:
@@ -223,6 +224,7 @@ LONG_MOTIONS = [
 ]  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("with_attitude", [False, True])
 @pytest.mark.parametrize(("moments", "omega", "time"), LONG_MOTIONS)
 def test_energy_follows_a_random_walk(
@@ -269,6 +271,7 @@ def test_a_motion_that_was_expected_to_be_longer_has_its_growth(tolerance: float
     assert solve(scene, [1e4], "taylor", tolerance).growth == pytest.approx(11.1, rel=0.1)
 
 
+@pytest.mark.campaign
 def test_a_long_motion_is_not_called_sensitive_by_chance() -> None:
     found = solve(case_scene(7), [1000.0], "taylor", 1e-6)
     assert found.ended == "complete"

@@ -45,6 +45,7 @@ def _draws() -> list[tuple[Draw, Trajectory]]:
     return [(each, solve(each.scene, [each.time], "taylor", each.tolerance)) for each in draws]
 
 
+@pytest.mark.campaign
 def test_error_is_known_and_taken_off(untaken: as_written.Solve) -> None:
     measured, left, held = [], [], []
     for of, found in _draws():

@@ -69,6 +69,7 @@ def test_the_tests_of_scipy_pass(name: str) -> None:
         test(**given)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9, 1e-12])
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
 def test_errors_are_smaller_than_those_of_dop853(problem: Problem, tolerance: float) -> None:

@@ -264,51 +264,6 @@ subroutine gauss_solution(coefficients, m_constant, m_rate, n_sines, sines, n_co
   evaluations = solution%evaluations
 end subroutine gauss_solution
 
-subroutine compiled_torque_rows(functions, coefficients, moments, matrix, nodes, errors, dense, n, &
-                                start, limits, absolute, most, n_times, times, rows, n_rows, &
-                                status, evaluations, reached)
-  ! Integrate by the Runge-Kutta method of order 8 under a torque that a compiled function computes.
-  !f2py threadsafe
-  use, intrinsic :: iso_c_binding, only: c_f_procpointer, c_null_funptr, c_null_ptr
-  use runge_kutta_853, only: driven_body_t, march_853, march_t, tableau_t
-  implicit none
-  integer(8), intent(in) :: functions(2)    ! addresses of the function and of its data, or 0
-  real(8), intent(in) :: coefficients(3), moments(3)
-  real(8), intent(in) :: matrix(16, 16), nodes(16), errors(16, 2), dense(16, 4) ! tableau_t
-  integer(4), intent(in) :: n               ! 3, or 7 with the attitude
-  real(8), intent(in) :: start(7)
-  real(8), intent(in) :: limits(3)          ! local tolerance, longest step (s), phase (rad)
-  real(8), intent(in) :: absolute(7)        ! local tolerances
-  integer(8), intent(in) :: most            ! evaluations
-  integer(4), intent(in) :: n_times
-  real(8), intent(in), target :: times(n_times) ! s, ordered away from 0
-  real(8), intent(out), target :: rows(7, n_times) ! n_rows columns are set
-  integer(4), intent(out) :: n_rows, status
-  integer(8), intent(out) :: evaluations
-  real(8), intent(out) :: reached(2)        ! time, s, and the largest |omega|
-  type(driven_body_t) :: body
-  type(march_t) :: march
-
-  body%coefficients = coefficients
-  body%moments = moments
-  call c_f_procpointer(transfer(functions(1), c_null_funptr), body%torque)
-  body%data = transfer(functions(2), c_null_ptr)
-  march%n = n
-  march%start = start
-  march%relative = limits(1)
-  march%longest = limits(2)
-  march%phase = limits(3)
-  march%absolute = absolute
-  march%most = most
-  march%times => times
-  march%rows => rows
-  call march_853(body, tableau_t(matrix, nodes, errors, dense), march)
-  n_rows = march%n_rows
-  status = march%status
-  evaluations = march%evaluations
-  reached = [march%reached, march%largest]
-end subroutine compiled_torque_rows
-
 subroutine fixed_step_solution(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, &
                                cosines, omega0, n_times, times, method, step, effort, rows, &
                                n_rows, status, steps, evaluations)

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from typing import Any
 
     from pyharness import events as events
-    from pyharness import interchange as interchange
     from pyharness import torques as torques
     from pyharness.compare.comparison import Comparison, compare_programs
     from pyharness.compare.method_comparison import compare_methods
@@ -110,7 +109,7 @@ _SUBMODULES = {
     "methods.solve": ("solve",),
 }
 # Public modules, which are imported at their first use too.
-_MODULES = ("events", "interchange", "torques")
+_MODULES = ("events", "torques")
 
 
 # Type checkers read the imports above. This function is hidden from them, because with it they

@@ -101,9 +101,7 @@ def test_the_script_runs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_what_the_package_shows() -> None:
-    assert dir(pyharness) == sorted(
-        [*pyharness.__all__, "events", "interchange", "torques", "__version__"]
-    )
+    assert dir(pyharness) == sorted([*pyharness.__all__, "events", "torques", "__version__"])
     for name in dir(pyharness):
         assert getattr(pyharness, name) is not None
 

@@ -1,18 +1,16 @@
-"""Third-party solvers of `bench` that numba compiles: Runge-Kutta and numbalsoda.
+"""Runge-Kutta methods of `bench` that numba compiles.
 
 For speed, the source of each right-hand side contains the numbers of its scene, and the stages are
 written out, as by hand.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pyharness.bench.contenders import Maker, refuse_rounding
-from pyharness.compare.candidates import End, Ready, not_finite, plain
-from pyharness.methods.scipy_ivp import state_of
+from pyharness.bench.contenders import Maker
+from pyharness.compare.candidates import End, Ready, plain
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -45,41 +43,6 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
             return omega
 
         return Ready(run, lambda result: End(plain(result), evaluations=steps * len(formula[1])))
-
-    return make
-
-
-def numbalsoda(name: str, scene: Scene) -> Maker:
-    """Return a maker of numbalsoda's "dop853" or "lsoda"."""
-    import numba
-    import numbalsoda as package
-
-    solver = getattr(package, name)
-    function = numba.cfunc(package.lsoda_sig)(
-        compiled_function(_callback_source(scene, counted=False))
-    )
-    counting = numba.cfunc(package.lsoda_sig)(
-        compiled_function(_callback_source(scene, counted=True))
-    )
-    start, size = np.array(state_of(scene)), max(map(abs, scene.omega)) or 1.0
-    # numbalsoda takes one absolute tolerance for all unknowns.
-    size = size if scene.attitude is None else min(1.0, size)
-
-    def make(horizon: float, setting: float) -> Ready:
-        if name == "lsoda":
-            refuse_rounding("LSODA", setting)
-        times, calls = np.array([0.0, horizon]), np.zeros(1)
-        given = start, times, calls, setting, setting * size, MOST_STEPS
-
-        def read(result: Any) -> End:
-            rows, success = result
-            if not success:
-                return not_finite("the solver reports a failure")
-            calls[0] = 0.0
-            solver(counting.address, *given)
-            return end_of(rows[-1], int(calls[0]))
-
-        return Ready(partial(solver, function.address, *given), read)
 
     return make
 
@@ -170,17 +133,3 @@ def steps_source(scene: Scene, formula: Formula) -> str:
 def _increment(factors: Sequence[float], name: str) -> str:
     terms = [f"{factor!r} * k{name}{j}" for j, factor in enumerate(factors) if factor]
     return f" + h * ({' + '.join(terms)})" if terms else ""
-
-
-def _callback_source(scene: Scene, counted: bool) -> str:
-    """Return the right-hand side as numbalsoda calls it.
-
-    If `counted`, it counts its calls in the first element of `p`.
-    """
-    names = state_names(scene)
-    lines = ["def function(t, u, du, p):"]
-    lines += [f"    {name} = u[{i}]" for i, name in enumerate(names)]
-    lines += [f"    du[{i}] = {rate}" for i, rate in enumerate(rates(scene, "t", names))]
-    if counted:
-        lines.append("    p[0] += 1.0")
-    return "\n".join(lines) + "\n"

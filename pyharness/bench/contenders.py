@@ -49,7 +49,6 @@ class SceneContender(Contender):
     settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
     order: int = 0  # order of convergence of a method with a fixed step
     attitude: bool = False  # whether the contender can compute the attitude
-    velocity: bool = True  # whether the contender can compute omega without the attitude
 
 
 def own() -> list[SceneContender]:

@@ -1,7 +1,6 @@
-"""Solvers of `bench --ensemble` that numba or JAX compiles at their first call.
+"""Solvers of `bench --ensemble` that numba compiles at their first call.
 
-Each returns a function for omega at the end time `HORIZON` (rad/s), shape (n, 3). JAX chooses its
-threads itself.
+Each returns a function for omega at the end time `HORIZON` (rad/s), shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -119,75 +118,3 @@ def _numba_kernels() -> tuple[Any, Any]:
 
     compile_it = numba.njit(nogil=True, fastmath={"contract"})
     return compile_it(blocks), compile_it(bodies)
-
-
-def jax_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return RK4 by JAX, with an array over the bodies for each component."""
-    compiled, jnp = _jax_steps()
-    steps = round(setting)
-    given = [tuple(jnp.array(each) for each in rows.T) for rows in (load.omega0, load.acceleration)]
-    return lambda: np.stack(compiled(*given, HORIZON / steps, steps), axis=1)
-
-
-@cache
-def _jax_steps() -> tuple[Any, Any]:
-    jax, jnp = _jax()
-    a, b, c = _rates().tolist()
-
-    def slope(w: Any, torque: Any) -> Any:
-        (x, y, z), (p, q, r) = w, torque
-        return a * y * z + p, b * x * z + q, c * x * y + r
-
-    def moved(w: Any, k: Any, length: Any) -> Any:
-        return tuple(x + length * rate for x, rate in zip(w, k, strict=True))
-
-    def solve(w: Any, torque: Any, h: Any, steps: Any) -> Any:
-        def step(_: int, w: Any) -> Any:
-            k1 = slope(w, torque)
-            k2 = slope(moved(w, k1, 0.5 * h), torque)
-            k3 = slope(moved(w, k2, 0.5 * h), torque)
-            k4 = slope(moved(w, k3, h), torque)
-            parts = zip(w, k1, k2, k3, k4, strict=True)
-            return tuple(x + h / 6.0 * (p + 2.0 * (q + r) + s) for x, p, q, r, s in parts)
-
-        return jax.lax.fori_loop(0, steps, step, w)
-
-    return jax.jit(solve), jnp
-
-
-def diffrax_vmap(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return diffrax's Dopri8, with steps of its own for each body."""
-    compiled, jnp = _diffrax_solve()
-    given = jnp.array(load.omega0), jnp.array(load.acceleration), setting
-    return lambda: np.asarray(compiled(*given))
-
-
-@cache
-def _diffrax_solve() -> tuple[Any, Any]:
-    import diffrax
-
-    jax, jnp = _jax()
-    rates = jnp.array(_rates())
-
-    def slope(_: Any, w: Any, torque: Any) -> Any:
-        return rates * jnp.stack([w[1] * w[2], w[0] * w[2], w[0] * w[1]]) + torque
-
-    def solve(start: Any, torque: Any, tolerance: Any) -> Any:
-        found = diffrax.diffeqsolve(
-            diffrax.ODETerm(slope), diffrax.Dopri8(), t0=0.0, t1=HORIZON, dt0=None, y0=start,
-            args=torque, max_steps=100_000, saveat=diffrax.SaveAt(t1=True),
-            stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
-        )  # fmt: skip
-        return found.ys[0]
-
-    return jax.jit(jax.vmap(solve, in_axes=(0, 0, None))), jnp
-
-
-def _jax() -> tuple[Any, Any]:
-    """Return JAX, set to binary64, and `jax.numpy`."""
-    import jax
-    import jax.numpy as jnp
-
-    configuration: Any = jax.config
-    configuration.update("jax_enable_x64", True)
-    return jax, jnp

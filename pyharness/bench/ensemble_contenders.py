@@ -103,8 +103,7 @@ class EnsembleContender(Contender):
     """A contender for omega of many bodies at `HORIZON`."""
 
     prepare: EnsembleMaker  # the first call of the function that it returns may compile code
-    # Numbers of threads to measure with; 0 means as many as the package uses.
-    threads: tuple[int, ...] = (1, 2)
+    threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
     torque_free: bool = False  # whether the contender solves only bodies without torque
     attitude: bool = False  # whether the contender can compute attitudes
     # Several ways to prepare the solver, by a note. All are timed, and the fastest counts.

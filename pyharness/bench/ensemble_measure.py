@@ -46,7 +46,7 @@ class Rate:
     load: str
     target: float | None  # requested error; None where the steps were prescribed
     method: str
-    threads: int  # number of threads; 0 means as many as the package uses
+    threads: int
     setting: float | None  # tolerance or number of steps; None for a closed form
     bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call

@@ -49,8 +49,6 @@ def ensemble_peers() -> list[EnsembleContender]:
         one("heyoka-ensemble", "tolerance", _heyoka_ensemble, package="heyoka", variants=ensembles),
         one("numba-blocks-rk4", "steps", blocks, package="numba"),
         one("numba-bodies-rk4", "steps", alone, package="numba"),
-        one("jax-rk4", "steps", compiled.jax_rk4, (0,), package="jax"),
-        one("diffrax-dopri8", "tolerance", compiled.diffrax_vmap, (0,), package="diffrax"),
         one("numpy-rk4", "steps", _numpy_rk4, package="numpy"),
         one("scipy-dop853-loop", "tolerance", _scipy_loop, (1,), package="scipy"),
     ]

@@ -50,13 +50,8 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest method's speed over that of `row`, with as many threads, or None.
-
-    A contender that chooses its threads is compared with our largest number.
-    """
-    ours = [each for each in rows if each.method in _STYLES]
-    threads = row.threads or max((each.threads for each in ours), default=0)
-    rates = [each.rate for each in ours if each.threads == threads]
+    """Return our fastest method's speed over that of `row`, with as many threads, or None."""
+    rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 
 
@@ -68,7 +63,7 @@ def _parts(found: Ensembles) -> list[tuple[str, Table]]:
     for (load, target), rows in tables.items():
         what = "body-steps" if target is None else "bodies"
         columns = [
-            Column("", left=True), Column("cores", lambda n: "all" if n == 0 else str(n)),
+            Column("", left=True), Column("cores"),
             Column("setting", _setting), Column("bodies"), Column("error", short),
             Column(f"million {what}/s", digits(".3g", 1e-6)), Column("ours over it", _ratio),
         ]  # fmt: skip
@@ -119,16 +114,15 @@ def _notes(found: Ensembles) -> list[str]:
         "solve at 1e-15. setting: the coarsest that keeps the error in the title; of a tolerance "
         "decades, of steps factors of 2**(1/4).",
         "ours over it: the best rate of ours on as many cores over the own one. Compiling is not "
-        "in the times. JAX and diffrax take the cores they like. heyoka-ensemble copies its "
-        "integrator for each batch; heyoka-batch has one, in a loop of Python's. Of several sizes "
-        "of a batch the fastest counts.",
+        "in the times. heyoka-ensemble copies its integrator for each batch; heyoka-batch has one, "
+        "in a loop of Python's. Of several sizes of a batch the fastest counts.",
     ]
     return lines + grouped((name, why, place) for place, name, why in found.rates.refused)
 
 
 def _data(rates: Rates) -> Table:
     rows = [
-        [row.load, row.target, row.method, row.threads or None, row.setting, row.bodies,
+        [row.load, row.target, row.method, row.threads, row.setting, row.bodies,
          row.seconds, row.error, row.bodies_a_second, row.note]
         for row in rates.rows
     ]  # fmt: skip
@@ -143,7 +137,6 @@ def _record(found: Ensembles) -> dict[str, Any]:
         "rows": [
             asdict(row)
             | {
-                "threads": row.threads or None,
                 "bodies_a_second": row.bodies_a_second,
                 "note": row.note or None,
             }

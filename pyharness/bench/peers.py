@@ -10,7 +10,6 @@ import numpy as np
 from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
 from pyharness.bench.heyoka_equations import Formula, heyoka_equations
-from pyharness.bench.orekit_peer import orekit
 from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.dynamics.system import slopes_of
 from pyharness.methods.scipy_ivp import RightHandSide, state_of, with_attitude
@@ -27,11 +26,7 @@ def peers() -> list[SceneContender]:
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> SceneContender:
         settings = finest if name == "heyoka" else TOLERANCES
-        # numbalsoda-dop853 writes to the standard output if it considers a motion stiff.
-        attitude = name != "numbalsoda-dop853"
-        return SceneContender(
-            name, "tolerance", prepare, settings, package=package, attitude=attitude
-        )
+        return SceneContender(name, "tolerance", prepare, settings, package=package, attitude=True)
 
     def fixed(name: str, order: int) -> SceneContender:
         prepare = partial(compiled.numba_fixed, name)
@@ -41,15 +36,10 @@ def peers() -> list[SceneContender]:
         adaptive("heyoka", "heyoka", heyoka_maker),
         fixed("rk4", 4),
         fixed("dop8", 8),
-        adaptive("numbalsoda-dop853", "numbalsoda", partial(compiled.numbalsoda, "dop853")),
-        adaptive("numbalsoda-lsoda", "numbalsoda", partial(compiled.numbalsoda, "lsoda")),
         adaptive("odeint", "scipy", _odeint),
         *(
             adaptive(f"solve_ivp-{name.lower()}", "scipy", partial(_solve_ivp, name))
             for name in _SOLVE_IVP
-        ),
-        SceneContender(
-            "orekit", "none", orekit, (0.0,), package="orekit_jpype", attitude=True, velocity=False
         ),
     ]
 

@@ -23,12 +23,15 @@ from pyharness.model.values import parsed_float, parsed_whole
 FORMATS = ("table", "json", "csv", "markdown")
 # Options that several verbs share, each with its help text. An option takes a value if a
 # placeholder, as N in "--case N", follows its name.
-SCENE = {
+BODY = {
     "--case N": "Use the scene (body, initial state, torque and steps) of this case of Table 1 of "
     "the thesis, 1 to 7.",
     "--scene FILE": "Read the scene (body, initial state, torque and steps) from this TOML file.",
     "--omega0 A,B,C": "Three components of the initial angular velocity in the body's axes, rad/s "
     "(default: those of the scene).",
+}
+SCENE = {
+    **BODY,
     "--step-size H": "Step size of the integration, s, above 0 (default: the scene's).",
     "--steps N": "Number of integration steps from time 0, at least 1 (default: the scene's).",
 }
@@ -145,9 +148,9 @@ def chosen_scene(
         if len(values) != 3:
             raise InputError(f"--omega0: {len(values)} numbers; allowed: three, as in 0,1,10")
         changes["omega"] = tuple(values)
-    if options.step_size is not None:
+    if getattr(options, "step_size", None) is not None:
         changes["step_size"] = number(options.step_size, "--step-size")
-    if options.steps is not None:
+    if getattr(options, "steps", None) is not None:
         changes["steps"] = whole(options.steps, "--steps")
     warn_of_attitude(scene)
     scene = checked_scene(replace(scene, **changes), any_axes, any_torque, any_state, changing)

@@ -1,4 +1,4 @@
-"""SciPy's methods for torques that depend on the state; DOP853 is compiled if the torque is.
+"""SciPy's methods for torques that depend on the state, recorded or opaque.
 
 How such a torque amplifies local errors is unknown. Therefore the local tolerance is reduced until
 the difference of two integrations shows that the second meets the tolerance.
@@ -12,20 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.dynamics.system import slopes_of
-from pyharness.methods.compiled_run import integrated
 from pyharness.methods.scipy_run import (
     FINEST_STEP,
-    LARGEST_PHASE,
     NoNumberError,
     RightHandSide,
     Run,
     rows_of,
 )
 from pyharness.methods.scipy_spans import Span, bounds_of, series_beside
-from pyharness.model.attitude import IDENTITY
-from pyharness.model.compiled_torque import CompiledTorque
 from pyharness.model.errors import InputError, TimedError, printable
-from pyharness.model.extension import GAVE_UP, OVERFLOW
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
@@ -61,8 +56,6 @@ _TRIAL = (1e-7, 1e-8)
 # Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
 # of a tape; and of an opaque function.
 _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
-# The same of a compiled right-hand side with a compiled torque.
-_COMPILED_WORK = 0.05
 
 
 class _Rows(NamedTuple):
@@ -92,7 +85,6 @@ def solve_state(
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
         run.check_undefined()
-        _check_attitude(scene)
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
@@ -125,20 +117,6 @@ def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
     largest = max(found.largest, float(np.abs(rows[:, :3]).max()))
     first, second = found._replace(largest=largest), _Rows(rows, True, largest)
     return _difference(first, second) <= _AGREEMENT * tolerance
-
-
-def _check_attitude(scene: Scene) -> None:
-    """Raise InputError if a compiled torque is NaN for want of the attitude alone."""
-    torque = scene.torque
-    assert isinstance(torque, StateTorque)
-    function = torque.function
-    if torque.needs_attitude or not isinstance(function, CompiledTorque):
-        return
-    if all(map(math.isfinite, function(0.0, scene.omega, IDENTITY))):
-        raise InputError(
-            "[torque]: the compiled function depends on the attitude; allowed: "
-            "opaque(function, needs_attitude=True)"
-        )
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
@@ -231,14 +209,11 @@ class _StateRun(Run):
             )
         slopes = slopes_of(scene)
         rate = max(map(abs, scene.euler_coefficients))
-        self._scene, self._compiled = scene, None
-        if name == "DOP853" and isinstance(torque.function, CompiledTorque):
-            self._compiled = torque.function
-        limit = int(most * _WORK / (_COMPILED_WORK if self._compiled else _WORK + work))
+        limit = int(most * _WORK / (_WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
         own = self._between_breaks(slopes)
         if torque.tape is None:
-            own = self._guarded(slopes, isinstance(torque.function, CompiledTorque))
+            own = self._guarded(slopes)
         super().__init__(start, own, rate, end, name, effort, limit)
         self.name = name
         self.is_smooth = torque.tape is not None
@@ -257,7 +232,7 @@ class _StateRun(Run):
 
         return between
 
-    def _guarded(self, slopes: RightHandSide, is_compiled: bool) -> RightHandSide:
+    def _guarded(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side that raises InputError if an opaque function fails.
 
         The time of a NaN is kept: it is no failure if SciPy passes it by shorter steps.
@@ -275,10 +250,8 @@ class _StateRun(Run):
                     "in N m",
                     float(time),
                 ) from error
-            # A large omega may be about to become infinite, and a compiled function may lack the
-            # attitude.
-            is_odd = any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY
-            if is_odd and not is_compiled:
+            # A large omega may be about to become infinite.
+            if any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY:
                 self._undefined = float(time)
             return found
 
@@ -340,8 +313,6 @@ class _StateRun(Run):
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
-        if self._compiled:
-            return self._compiled_rows(self._compiled, times, local, sizes, longest, scale)
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
         # SciPy does not know where a table changes: each integration ends there.
@@ -373,22 +344,6 @@ class _StateRun(Run):
             # SciPy returns an empty list if it reached no time.
             return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
         return np.empty((0, len(self.start)))
-
-    def _compiled_rows(
-        self, function: CompiledTorque, times: Sequence[float], local: float,
-        sizes: Sequence[float], longest: float, scale: float,
-    ) -> _Rows:  # fmt: skip
-        left = max(0, self.most - self.evaluations)
-        found = integrated(self._scene, function, times, local, sizes, longest, left)
-        self.evaluations += found.evaluations
-        self._reached, self._largest = found.reached, found.largest
-        if found.status == GAVE_UP:
-            raise self.work_error(found.reached)
-        if found.status == OVERFLOW and found.largest < _UNBOUNDED * scale:
-            phase = self.rate * abs(found.reached) * found.largest
-            if phase > LARGEST_PHASE:
-                raise self.phase_error(found.reached / self.unit)
-        return self._found(found.state, len(times))
 
     def _found(self, rows: Array, wanted: int) -> _Rows:
         rows = np.reshape(rows, (-1, len(self.start)))

@@ -16,7 +16,6 @@ OPTIONAL = {
     "zarr": "stores: sweep",
     "distributed": "clusters: sweep --executor dask",
     "python-flint": "faster proofs: prove",
-    "spiceypy": "C-kernels: pyharness.interchange",
     "argcomplete": "completion in the shell",
 }
 """Distributions that are needed for a part of the package only, with that part."""

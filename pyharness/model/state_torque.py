@@ -11,7 +11,6 @@ import numpy as np
 
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
-from pyharness.model.compiled_torque import compiled_torque
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once, recorded_twice
@@ -194,22 +193,16 @@ def recorded(function: Function) -> StateTorque:
     return _with_parameters(torque, function, called)
 
 
-def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
+def opaque(function: Any) -> StateTorque:
     """Return a torque that is evaluated by calling a function at each time step.
 
-    Only SciPy's methods solve it. With a compiled function, ``dop853`` does not call Python and is
-    faster by two orders of magnitude.
+    Only SciPy's methods solve it.
 
     Parameters
     ----------
     function : callable
         A function of (t, omega) or (t, omega, attitude), a float and arrays, that returns the
-        torque about the body axes (N m). Or a `scipy.LowLevelCallable`, a function of ctypes or a
-        cfunc of numba: ``void (double, double *, double *, double *, void *)``, with the time (s),
-        the addresses of omega (rad/s), attitude and torque, and the user's data.
-    needs_attitude : bool
-        Whether a compiled function depends on the attitude, which may else be NaN. A Python
-        function does if it has three arguments.
+        torque about the body axes (N m).
 
     Returns
     -------
@@ -219,7 +212,7 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     Raises
     ------
     InputError
-        If `function` has other arguments, or none for an attitude that it needs.
+        If `function` has other arguments.
 
     Examples
     --------
@@ -230,16 +223,7 @@ def opaque(function: Any, *, needs_attitude: bool = False) -> StateTorque:
     >>> solve(scene, 1.0, "dop853").omega.round(6)
     array([[0.9, 0. , 0. ]])
     """
-    compiled = compiled_torque(function)
-    if compiled:
-        return StateTorque(None, compiled, needs_attitude)
-    takes_attitude = _takes_attitude(function)
-    if needs_attitude and not takes_attitude:
-        raise InputError(
-            "[torque]: needs_attitude is given, but the function has no argument for the attitude; "
-            "allowed: a function of (t, omega, attitude)"
-        )
-    return StateTorque(None, function, takes_attitude)
+    return StateTorque(None, function, _takes_attitude(function))
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:

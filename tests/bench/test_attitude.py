@@ -1,16 +1,14 @@
 """`bench --attitude`: methods are judged by omega and attitude; timings are not asserted."""
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness.bench import compiled_peers, measure, orekit_peer, peers
+from pyharness.bench import compiled_peers, measure, peers
 from pyharness.bench.contenders import SceneContender, own
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
@@ -18,7 +16,6 @@ from pyharness.bench.scores import groups
 from pyharness.cli.main import main
 from pyharness.compare.candidates import End
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.truth.reference import Reference, reference
@@ -28,12 +25,6 @@ TURNED = (0.5, -0.1, 0.7, 0.5)
 SCENE = replace(case_scene(5), attitude=TURNED)
 FREE = replace(case_scene(4), attitude=TURNED)
 ABLE = [each for each in (*own(), *peers.peers()) if each.attitude]
-OREKIT = next(each for each in ABLE if each.name == "orekit")
-
-
-@pytest.fixture(autouse=True)
-def _cold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(orekit_peer, "WARMING", 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +71,7 @@ def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.external
 @pytest.mark.usefixtures("_wrong_sign")
-@pytest.mark.parametrize("name", ["heyoka", "numbalsoda-lsoda", "odeint", "solve_ivp-dop853"])
+@pytest.mark.parametrize("name", ["heyoka", "odeint", "solve_ivp-dop853"])
 @pytest.mark.filterwarnings("ignore")
 def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
     peer = next(each for each in ABLE if each.name == name)
@@ -88,41 +79,6 @@ def test_a_wrong_sign_is_seen(name: str, truths: dict[str, Reference]) -> None:
         pytest.skip(f"{peer.package} is not installed")
     # Only omega is right.
     assert _error(peer, FREE, truths[FREE.name]) > 0.1
-
-
-@pytest.mark.external
-def test_orekit_turns_as_the_closed_form(
-    truths: dict[str, Reference], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if not OREKIT.is_installed:
-        pytest.skip(f"{OREKIT.package} is not installed")
-    # The second call reuses the Java virtual machine that the first one started.
-    for _ in range(2):
-        assert _error(OREKIT, FREE, truths[FREE.name]) < 1e-12
-    right = orekit_peer._end
-
-    def turned_back(found: Any) -> End:
-        end = right(found)
-        assert end.attitude is not None
-        return replace(end, attitude=end.attitude * [1.0, -1.0, -1.0, -1.0])
-
-    monkeypatch.setattr(orekit_peer, "_end", turned_back)
-    assert _error(OREKIT, FREE, truths[FREE.name]) > 0.1
-
-
-def test_orekit_takes_no_torque_and_needs_java(monkeypatch: pytest.MonkeyPatch) -> None:
-    by_coefficients = replace(FREE, moments=None, coefficients=(0.5, -0.7, 0.2))
-    for scene in (SCENE, by_coefficients):
-        with pytest.raises(InputError, match="TorqueFree"):
-            OREKIT.prepare(scene)
-
-    def no_java(_: str) -> None:
-        raise OSError("no\nlibjvm")
-
-    monkeypatch.setitem(sys.modules, "jpype", SimpleNamespace(isJVMStarted=lambda: False))
-    monkeypatch.setitem(sys.modules, "orekit_jpype", SimpleNamespace(initVM=no_java))
-    with pytest.raises(InputError, match="no libjvm"):
-        OREKIT.prepare(FREE)
 
 
 @pytest.mark.parametrize("name", ["auto", "taylor", "solve_ivp-dop853"])

@@ -308,7 +308,7 @@ def test_source_written_for_numba_is_runge_kutta_of_the_scene(scene: Scene) -> N
 
 
 @pytest.mark.external
-@pytest.mark.parametrize("name", ["heyoka", "numba-dop8", "numbalsoda-dop853", "numbalsoda-lsoda"])
+@pytest.mark.parametrize("name", ["heyoka", "numba-dop8"])
 @pytest.mark.filterwarnings("ignore")
 def test_peer_solves_every_law(name: str) -> None:
     peer = next(each for each in peers() if each.name == name)

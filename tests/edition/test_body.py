@@ -18,12 +18,12 @@ from pyharness.cli.main import main
 from pyharness.edition.body import AGREEMENT, PROGRAM, SPEEDS, context, data, moments_of_box
 from pyharness.edition.bundle import bundle
 from pyharness.model.extension import extension
-from pyharness.scenes.free_motions import KINDS, Motion, draw
 from pyharness.theory.flips import flip_times
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
 from tests.attitude_errors import largest_error
 from tests.exact_attitude import exact
 from tests.ports import WEB, run_javascript
+from tests.scenes.free_motions import KINDS, Motion, draw
 
 BODY = WEB / "body"
 IDENTITY = [1.0, 0.0, 0.0, 0.0]

@@ -14,8 +14,8 @@ from pyharness import Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.methods.sensitivity import torque_noise
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave
-from pyharness.scenes.cancelling import LEFT, MERGED, cancelling
 from pyharness.truth.reference import reference
+from tests.scenes.cancelling import LEFT, MERGED, cancelling
 
 
 def _triple(source: random.Random, size: float) -> Triple:

@@ -18,10 +18,10 @@ from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
-from pyharness.scenes.free_motions import draw, draw_top
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 from tests.exact_tops import DIGITS, exact_top
+from tests.scenes.free_motions import draw, draw_top
 
 _UNIT = 2.0**-53
 _BOUND = 16 * _UNIT

@@ -20,8 +20,8 @@ from pyharness.methods.registry import METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.scenes.timed_kinds import timed_scenes
 from pyharness.truth.reference import Reference, reference
+from tests.scenes.timed_kinds import timed_scenes
 
 _MAKER = Path(__file__).parent.parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)

@@ -11,8 +11,8 @@ from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.problem import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.scenes.timed_kinds import NASTY, timed_scenes
 from pyharness.truth.reference import reference
+from tests.scenes.timed_kinds import NASTY, timed_scenes
 
 
 @cache

@@ -12,13 +12,13 @@ import numpy as np
 from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, torques
 from pyharness.model.attitude import IDENTITY
 from pyharness.scenes import state_scenes
-from pyharness.scenes.cancelling import MERGED, cancelling
-from pyharness.scenes.free_motions import KINDS as FREE
-from pyharness.scenes.free_motions import draw as draw_free
 from pyharness.scenes.kinds import KINDS as DRAWN
 from pyharness.scenes.random_scenes import random_scene
-from pyharness.scenes.timed_kinds import KINDS as TIMED
-from pyharness.scenes.timed_kinds import timed_scenes
+from tests.scenes.cancelling import MERGED, cancelling
+from tests.scenes.free_motions import KINDS as FREE
+from tests.scenes.free_motions import draw as draw_free
+from tests.scenes.timed_kinds import KINDS as TIMED
+from tests.scenes.timed_kinds import timed_scenes
 from tests.within import Motion, true_motion
 
 Timed = tuple[Scene, float]

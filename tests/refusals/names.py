@@ -14,7 +14,6 @@ from pyharness import (
     TorqueLaw,
     case_scene,
     events,
-    interchange,
     opaque,
     torques,
 )
@@ -22,7 +21,7 @@ from tests.refusals.names_cli import *  # noqa: F403
 from tests.refusals.names_model import *  # noqa: F403
 
 __all__ = ["BRICK", "IN_SPACE", "SHRINKING", "WEAK", "SimpleNamespace", "case_scene", "events",
-           "inf", "interchange", "nan", "np", "opaque", "pi", "pyharness", "replace",
+           "inf", "nan", "np", "opaque", "pi", "pyharness", "replace",
            "torques"]  # fmt: skip
 
 BRICK = Scene("brick", (0.1, 1.0, 0.2), moments=(1.0, 2.0, 2.5))

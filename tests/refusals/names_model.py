@@ -6,16 +6,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import pytest
-
 from pyharness import (
     ChangingMoments,
     Scene,
     StateTorque,
     TorqueLaw,
-    interchange,
     read_scene,
-    solve,
 )
 from pyharness.dynamics.scene_reader import scene_of
 from pyharness.ensembles.sweep_file import read_sweep
@@ -23,10 +19,10 @@ from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text
 from tests.ensembles.sweeps import BASE, PROGRAM, TILT, text
 
-__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "EPOCH", "GRAVITY", "LAW",
-           "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNS", "Decimal", "Fraction",
-           "aem", "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
-           "text", "torque", "write_ck"]  # fmt: skip
+__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GRAVITY", "LAW",
+           "PROGRAM", "READINGS", "START", "TILT", "TILTED", "Decimal", "Fraction",
+           "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
+           "text", "torque"]  # fmt: skip
 
 LAW = TorqueLaw((1.0, 2.0, 3.0), sines=[((1.0, 0.0, 0.5), 4.0)])
 TILTED = ((40.0, 2.0, -1.0), (2.0, 30.0, 3.0), (-1.0, 3.0, 20.0))
@@ -48,30 +44,6 @@ values = ["four-term", "runge-kutta"]
 [[axis]]
 field = "reading"
 values = ["adopted", "do-variable"]
-"""
-EPOCH = "2026-01-31T23:59:58.25"
-TURNS = solve(
-    Scene("wing nut", (1e-3, 2.0, 1e-3), (1.0, 2.0, 3.0)),
-    [-3.0, 20.0], attitude=True, dense_output=True,
-)  # fmt: skip
-AEM = """\
-CCSDS_AEM_VERS = 2.0
-CREATION_DATE = 2026-01-31T00:00:00
-ORIGINATOR = TEST
-META_START
-OBJECT_NAME = BRICK
-OBJECT_ID = UNKNOWN
-REF_FRAME_A = EME2000
-REF_FRAME_B = SC_BODY_1
-TIME_SYSTEM = TAI
-START_TIME = 2026-01-31T00:00:00
-STOP_TIME = 2026-01-31T00:00:02
-ATTITUDE_TYPE = QUATERNION
-META_STOP
-DATA_START
-2026-01-31T00:00:00.5 0 0 0 1
-2026-01-31T00:00:01 0 0 0 1
-DATA_STOP
 """
 
 _FOLDER = TemporaryDirectory()  # beside that of the row, in which no file may be made
@@ -113,15 +85,3 @@ def sweep(*axes: str, **parts: str) -> Any:
 def axis(field: str, more: str) -> str:
     """Return a table of a sweep file."""
     return f'[[axis]]\nfield = "{field}"\n{more}\n'
-
-
-def aem(old: str, new: str) -> Any:
-    """Read an attitude ephemeris message that has another text in one place."""
-    assert old in AEM
-    return interchange.read_aem(file(AEM.replace(old, new, 1), "a.aem"))
-
-
-def write_ck(*given: Any, **named: Any) -> None:
-    """Write a C-kernel, if spiceypy is installed."""
-    pytest.importorskip("spiceypy")
-    interchange.write_ck(*given, **named)

@@ -9,9 +9,9 @@ import pytest
 from pyharness import Scene
 from pyharness.model.attitude import product
 from pyharness.model.scene import Triple
-from pyharness.scenes.free_motions import KINDS, draw
 from pyharness.truth.free_attitude import conjugate, free_attitude, is_steady, period_of
 from tests.exact_attitude import DIGITS, exact
+from tests.scenes.free_motions import KINDS, draw
 
 
 @pytest.mark.sampled

@@ -148,19 +148,14 @@ def chosen(
 ) -> list[SceneContender]:
     """Return the solvers for single scenes that the option `where` selects.
 
-    By default all; those that compute omega only with the attitude are omitted without `attitude`.
-    Raise InputError if a listed one does not fit `attitude`.
+    By default all. Raise InputError if a listed one can't compute the attitude despite `attitude`.
     """
     if text is None:
-        return [each for each in contenders if attitude or each.velocity]
+        return list(contenders)
     found = named(contenders, text, what, where)
     if attitude and (lacking := [each.name for each in found if not each.attitude]):
         able = ", ".join(each.name for each in contenders if each.attitude)
         raise InputError(f"{where}: {lacking[0]} does not compute attitudes; allowed: {able}")
-    if not attitude and (lacking := [each.name for each in found if not each.velocity]):
-        raise InputError(
-            f"{where}: {lacking[0]} computes omega only together with the attitude; add --attitude"
-        )
     return found
 
 

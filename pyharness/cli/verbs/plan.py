@@ -8,7 +8,7 @@ from pyharness.methods.report import plan_report
 from pyharness.methods.solver import PREPARED
 
 OPTIONS = {
-    **shared.SCENE,
+    **shared.BODY,
     "--method M": "Plan a solution by this method: auto (default) or another method of "
     "docs/reference/methods.md.",
     "--tolerance E": "Relative tolerance of the angular velocity, at most 1 (default: the method's "

@@ -8,7 +8,7 @@ from pyharness.theory.rotations import steady_rotations
 from pyharness.theory.rotations_report import rotations_report
 
 OPTIONS = {
-    **shared.SCENE,
+    **shared.BODY,
     "--disturbance D": "Magnitude of the perturbation of each steady rotation, as a fraction of "
     "the rotation's magnitude, above 0 and below 1 (default 0.001).",
     **shared.outputs(plot="the polhodes, and of growth rates of perturbations for all moments,"),

@@ -15,8 +15,8 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.scenes.rotated import rotated
-from pyharness.scenes.timed_kinds import NASTY, timed_scenes, triple
 from tests.campaigns.estimates.truth import Truth, truth_of
+from tests.scenes.timed_kinds import NASTY, timed_scenes, triple
 
 _MOST_TURNS = 330.0
 _SHORT = 0.3  # fraction of scenes that end within a revolution or a few

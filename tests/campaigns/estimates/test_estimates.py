@@ -14,7 +14,6 @@ from pyharness.model.attitude import product
 from pyharness.model.report import short
 from pyharness.model.trajectory import Trajectory
 from pyharness.scenes.rotated import restarted_at
-from pyharness.scenes.timed_kinds import triple
 from pyharness.truth.free_attitude import free_attitude
 from pyharness.truth.reference import reference
 from pyharness.views.table import write
@@ -23,6 +22,7 @@ from tests.campaigns.estimates.campaign import COLUMNS, ENTRANCES, SENSITIVE, An
 from tests.campaigns.estimates.report import report
 from tests.campaigns.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.campaigns.estimates.truth import Truth, compiler_here, truth_of
+from tests.scenes.timed_kinds import triple
 
 pytestmark = [
     pytest.mark.external,

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 PASSED = ROOT / "tests" / "passed.txt"
 # Folders of tests by the beginning of a path; the rest of `pyharness` has those of its name.
 TESTS = {
-    "docs/": (), "README.md": (), "CHANGELOG.md": (), "CONTRIBUTING.md": (), ".github/": (),
+    "docs/article/": ("edition",), "docs/": (), "README.md": (), "CHANGELOG.md": (), "CONTRIBUTING.md": (), ".github/": (),
     ".ci/": (), "verify-port/": (), "tests/messages.txt": (), "tests/passed.txt": (),
     "web/": ("edition", "browser"), "pyharness/edition/": ("edition", "browser"),
     "pyharness/data/": ("history", "original", "edition"), "fortran/original/": ("original",),

@@ -39,6 +39,7 @@ def test_a_module_has_the_tests_that_import_it() -> None:
     assert nearest(["fortran/modern/taylor_march.f90"], sources())
 
 
+@pytest.mark.campaign
 def test_every_source_has_tests() -> None:
     kept = (".py", ".f90", ".fypp", ".c")
     paths = [path for folder in ("pyharness", "fortran") for path in (ROOT / folder).rglob("*")]

@@ -41,6 +41,7 @@ def _error(contender: SceneContender, scene: Scene, truth: Reference) -> float:
     return error
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.parametrize("contender", ABLE, ids=lambda each: each.name)
 @pytest.mark.filterwarnings("ignore")

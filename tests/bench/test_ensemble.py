@@ -119,6 +119,7 @@ def test_the_fastest_variant_counts() -> None:
 COMMAND = ["bench", "--ensemble", "--bodies", "10", "--seed", "1", "--peers", "numpy,scipy"]
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("hurried")
 def test_table_has_every_part(capsys: Capture) -> None:
     assert main(COMMAND) == 0
@@ -132,6 +133,7 @@ def test_table_has_every_part(capsys: Capture) -> None:
     assert re.search(r"^ +1000 ", shown, flags=re.MULTILINE)  # a hundred times as many bodies
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("hurried")
 def test_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     pytest.importorskip("matplotlib")
@@ -152,11 +154,13 @@ def test_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     assert {"load", "target", "method", "cores", "error", "bodies_a_second"} <= set(rows[0])
 
 
+@pytest.mark.campaign
 def test_memory_is_at_most_twice_the_arrays() -> None:
     for each in memory(300_000):
         assert each.ratio is None or 0.5 < each.ratio < 2.0
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("hurried")
 def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     there = property(lambda each: each.package in ("", "numpy"))

@@ -240,6 +240,7 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
     assert "case 5: exact" in told
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("hurried")
 def test_every_contender_of_ours_meets_its_order_or_tolerance_and_counts() -> None:
     """Check every contender on Case 3, which has a closed form and suits every method."""
@@ -326,6 +327,7 @@ def test_peer_solves_every_law(name: str) -> None:
 ONLY = ["bench", "--case", "4", "--methods", "auto,rk4", "--peers", "none"]
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("hurried")
 def test_verb_writes_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     assert main([*ONLY, "--horizon", "1", "--format", "json"]) == 0

@@ -75,6 +75,7 @@ def test_a_number_of_a_seed_is_one_scene_whatever_else_is_drawn(loads: list[Work
     assert loads[5].scene.name == "6: ten waves, slow, compact"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("number", [2, 3, 10, 12])
 def test_truth_and_growth_are_those_of_others(number: int, loads: list[Workload]) -> None:
     load = loads[number - 1]

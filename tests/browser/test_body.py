@@ -58,6 +58,7 @@ def _slide(browser: Chrome, id: str, value: int) -> None:
     browser.execute_script(script, id, value)
 
 
+@pytest.mark.campaign
 def test_the_drawings_show_the_state_of_the_address(browser: Chrome, body: Open) -> None:
     body("#body=case-4&time=1000000")
     found = solve(case_scene(4), [1e6], "closed-form", attitude=True)
@@ -91,6 +92,7 @@ def test_every_body_is_drawn_and_in_the_address(browser: Chrome, body: Open) -> 
     assert choice.first_selected_option.text.startswith("Case 4")
 
 
+@pytest.mark.campaign
 def test_dragging_the_time_draws_at_once(browser: Chrome, body: Open) -> None:
     body("#body=racket")
     before = [_picture(browser, id) for id in CANVASES]
@@ -118,6 +120,7 @@ def slider_position(browser: Chrome) -> str:
     return str(browser.find_element(By.ID, "slider").get_property("value"))
 
 
+@pytest.mark.campaign
 def test_the_next_flip_is_a_flip(browser: Chrome, body: Open) -> None:
     body("#body=racket")
     flip = float(flip_times((0.0015725, 0.01226, 0.0138125), (0.02, 6.0, 0.0))[0])
@@ -130,6 +133,7 @@ def test_the_next_flip_is_a_flip(browser: Chrome, body: Open) -> None:
     assert np.diff(times) == pytest.approx([flip, flip], rel=1e-9)
 
 
+@pytest.mark.campaign
 def test_fields_take_any_body_and_say_what_is_wrong(browser: Chrome, body: Open) -> None:
     body("#body=case-4")
     _enter(browser, "moments", "10, 20, 40")
@@ -155,6 +159,7 @@ def test_fields_take_any_body_and_say_what_is_wrong(browser: Chrome, body: Open)
     assert browser.find_element(By.ID, "scene-file").is_displayed()
 
 
+@pytest.mark.campaign
 def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
     body("#body=brick&time=x&spin=1")
     told = text_of(browser, "problems")
@@ -168,6 +173,7 @@ def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
     assert not browser.find_element(By.ID, "flip").is_enabled()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -190,6 +196,7 @@ def test_special_motions_are_drawn_and_told(
         assert _drawn(browser, id) > 20, id
 
 
+@pytest.mark.campaign
 def test_it_moves_when_it_is_played(browser: Chrome, body: Open) -> None:
     """The browser of the tests prefers reduced motion, so that nothing moves before."""
     body("#body=racket")
@@ -218,6 +225,7 @@ def test_it_moves_when_it_is_played(browser: Chrome, body: Open) -> None:
     WebDriverWait(browser, 5).until(lambda _: play.text == "Play")
 
 
+@pytest.mark.campaign
 def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> None:
     """Neither for a reader who wants little motion, nor if the address names a time."""
     features = [{"name": "prefers-reduced-motion", "value": "no-preference"}]
@@ -240,6 +248,7 @@ def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> 
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
+@pytest.mark.campaign
 def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
     browser: Chrome, body: Open
 ) -> None:
@@ -253,6 +262,7 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
                 assert _drawn(browser, id) > 500, (id, width)
 
 
+@pytest.mark.campaign
 def test_colours_change_with_the_theme_and_the_viewpoint_turns(browser: Chrome, body: Open) -> None:
     body("#body=case-4&time=1")
     before = _picture(browser, "space")
@@ -265,6 +275,7 @@ def test_colours_change_with_the_theme_and_the_viewpoint_turns(browser: Chrome, 
     assert fragment(browser) == "body=case-4&time=1"
 
 
+@pytest.mark.campaign
 def test_a_frame_takes_little_time(
     browser: Chrome, body: Open, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -283,6 +294,7 @@ def test_a_frame_takes_little_time(
         print(f"\nA change of the time in the page: {taken:.1f} ms")
 
 
+@pytest.mark.campaign
 def test_without_scripts_there_is_a_picture(browser: Chrome, site: Path) -> None:
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:

@@ -65,6 +65,7 @@ def test_the_program_comes_first_and_the_apparatus_on_demand(browser: Chrome, si
         assert not within(browser, 860, ".scan").is_displayed()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("view", VIEWS)
 def test_a_deep_link_shows_its_card_at_once(
@@ -88,6 +89,7 @@ def test_a_deep_link_shows_its_card_at_once(
         assert too_wide(browser) <= 0
 
 
+@pytest.mark.campaign
 def test_a_reader_jumps_to_a_card(browser: Chrome, site: Path) -> None:
     with screen(browser, 800):
         go(browser, site, "runge-kutta.html")
@@ -114,6 +116,7 @@ def test_a_reader_jumps_to_a_card(browser: Chrome, site: Path) -> None:
         assert browser.current_url.endswith("#100")
 
 
+@pytest.mark.campaign
 def test_without_scripts_links_lead_to_pages_and_cards(browser: Chrome, site: Path) -> None:
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
@@ -129,6 +132,7 @@ def test_without_scripts_links_lead_to_pages_and_cards(browser: Chrome, site: Pa
         browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("width", [800, 1440])
 def test_notes_are_shown_on_hover_and_on_focus(browser: Chrome, site: Path, width: int) -> None:
     with screen(browser, width):
@@ -156,6 +160,7 @@ def test_notes_are_shown_on_hover_and_on_focus(browser: Chrome, site: Path, widt
         assert number.get_dom_attribute("aria-describedby") == notes.get_dom_attribute("id")
 
 
+@pytest.mark.campaign
 def test_the_address_keeps_the_view_and_a_view_keeps_the_card(browser: Chrome, site: Path) -> None:
     with screen(browser, 1440):
         go(browser, site, "two-term.html#1260")
@@ -172,6 +177,7 @@ def test_the_address_keeps_the_view_and_a_view_keeps_the_card(browser: Chrome, s
         assert browser.current_url.endswith("two-term.html#1260")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("view", VIEWS)
 def test_print_keeps_marks_numbers_of_notes_and_the_citation(
     browser: Chrome, site: Path, view: str
@@ -199,6 +205,7 @@ def test_print_keeps_marks_numbers_of_notes_and_the_citation(
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.campaign
 def test_the_cards_that_the_scan_lacks_are_copied_with_brackets(
     browser: Chrome, site: Path
 ) -> None:
@@ -211,6 +218,7 @@ def test_the_cards_that_the_scan_lacks_are_copied_with_brackets(
     assert [line for line in text.splitlines() if line.strip().startswith("[")] == ["[C]"] * 3
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("view", VIEWS)
 def test_no_view_is_too_wide_or_has_a_barrier(browser: Chrome, site: Path, view: str) -> None:
     found: dict[str, Any] = {}
@@ -226,6 +234,7 @@ def test_no_view_is_too_wide_or_has_a_barrier(browser: Chrome, site: Path, view:
     assert found == {"barriers": []}
 
 
+@pytest.mark.campaign
 def test_the_comparison_is_a_table_or_a_list(browser: Chrome, site: Path) -> None:
     with screen(browser, 1440):
         go(browser, site, "collation.html")

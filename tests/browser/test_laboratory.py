@@ -70,6 +70,7 @@ def _click(browser: Chrome, selector: str) -> None:
     browser.execute_script("document.querySelector(arguments[0]).click()", selector)
 
 
+@pytest.mark.campaign
 def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
     twin = run_program(case_scene(2), subset("runge-kutta"), "python")
@@ -84,6 +85,7 @@ def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
     assert browser.execute_script("return document.querySelectorAll('canvas').length") == 6
 
 
+@pytest.mark.campaign
 def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original")
     draw = "return document.querySelector('canvas').toDataURL()"
@@ -97,6 +99,7 @@ def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: 
     assert browser.execute_script(draw) != before
 
 
+@pytest.mark.campaign
 def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> None:
     words = "case=5&program=two-term&listing=corrected&keep=x3-reads-acl2&steps=30"
     laboratory(f"#{words}")
@@ -119,6 +122,7 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
     assert browser.find_element(By.ID, "stop-test").is_displayed()
 
 
+@pytest.mark.campaign
 def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=5&program=two-term&listing=corrected")
     told = text_of(browser, "status")
@@ -133,6 +137,7 @@ def test_the_link_that_skips_the_menu_leaves_the_state(browser: Chrome, laborato
     assert text_of(browser, "problems") == ""
 
 
+@pytest.mark.campaign
 def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=7&program=runge-kutta&listing=original")
     browser.find_element(By.ID, "case").click()
@@ -148,6 +153,7 @@ def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> No
     assert {"omega0", "lipschitz", "step", "address", "printer-page"} <= seen
 
 
+@pytest.mark.campaign
 def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
     browser: Chrome, laboratory: Open
 ) -> None:
@@ -169,6 +175,7 @@ def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
     assert "quotient: V1 " in told
 
 
+@pytest.mark.campaign
 def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
     twin = run_program(case_scene(2), subset("runge-kutta"), "python")
@@ -210,6 +217,7 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     )
 
 
+@pytest.mark.campaign
 def test_every_card_of_a_step_has_its_place_in_the_listing(
     browser: Chrome, laboratory: Open, site: Path
 ) -> None:
@@ -223,6 +231,7 @@ def test_every_card_of_a_step_has_its_place_in_the_listing(
         assert [each for each in links if f'id="{each}"' not in text] == []
 
 
+@pytest.mark.campaign
 def test_a_pinned_run_stays_in_charts_and_address(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original&no-stop")
     assert not browser.find_element(By.ID, "difference").is_displayed()
@@ -256,6 +265,7 @@ def test_a_pinned_run_stays_in_charts_and_address(browser: Chrome, laboratory: O
     assert browser.switch_to.active_element.get_dom_attribute("id") == "pin"
 
 
+@pytest.mark.campaign
 def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
     for words, told, shown in (
         ("", "2 y(t/2) - y(0)", True),
@@ -271,6 +281,7 @@ def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
     assert not browser.find_element(By.ID, "quotient").is_displayed()
 
 
+@pytest.mark.campaign
 def test_the_end_is_explained(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
     assert text_of(browser, "why-head") == "Why did it stop?"
@@ -280,6 +291,7 @@ def test_the_end_is_explained(browser: Chrome, laboratory: Open) -> None:
     assert "The stop test is switched off." in text_of(browser, "why")
 
 
+@pytest.mark.campaign
 def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original")
     box = browser.find_element(By.CSS_SELECTOR, "input[value=torque-held]")
@@ -293,6 +305,7 @@ def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -
     assert "idle" not in str(label.get_dom_attribute("class"))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
 def test_an_experiment_is_predicted_run_and_explained(
     browser: Chrome, laboratory: Open, experiment: dict[str, Any]
@@ -324,6 +337,7 @@ def test_an_experiment_is_predicted_run_and_explained(
         assert f"Stopped at step {expected['steps']} of" in text_of(browser, "status")
 
 
+@pytest.mark.campaign
 def test_on_a_phone_the_choices_are_beside_the_chart(browser: Chrome, laboratory: Open) -> None:
     with screen(browser, 360):
         laboratory("")
@@ -380,6 +394,7 @@ def test_mistakes_are_told_and_the_rest_holds(browser: Chrome, laboratory: Open)
     assert field.get_attribute("aria-invalid") is None
 
 
+@pytest.mark.campaign
 def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original&fix=stage-base")
     field = browser.find_element(By.ID, "steps")
@@ -401,6 +416,7 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     assert field.get_property("value") == "100"
 
 
+@pytest.mark.campaign
 def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
     browser: Chrome, laboratory: Open
 ) -> None:
@@ -413,6 +429,7 @@ def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
             assert too_wide(browser) <= 0, width
 
 
+@pytest.mark.campaign
 def test_colours_change_with_the_theme(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
     draw = "return document.querySelector('canvas').toDataURL()"
@@ -423,6 +440,7 @@ def test_colours_change_with_the_theme(browser: Chrome, laboratory: Open) -> Non
     assert browser.execute_script(draw) == before
 
 
+@pytest.mark.campaign
 def test_without_script_the_default_state_is_there(site: Path) -> None:
     text = (site / "laboratory.html").read_text()
     assert "step 25 by V2" in re.sub(r"\s+", " ", text)
@@ -431,6 +449,7 @@ def test_without_script_the_default_state_is_there(site: Path) -> None:
     assert repr(float(twin.omega[-1, 0])) in text
 
 
+@pytest.mark.campaign
 def test_how_long_a_change_takes(
     browser: Chrome, laboratory: Open, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -152,6 +152,7 @@ def _violations(browser: Chrome, context: str, options: dict[str, Any]) -> list[
     ]
 
 
+@pytest.mark.campaign
 def test_no_page_has_an_error_or_is_wider_than_the_screen_whatever_the_font(
     browser: Chrome, site: Path
 ) -> None:
@@ -176,6 +177,7 @@ def test_no_page_has_an_error_or_is_wider_than_the_screen_whatever_the_font(
     assert found == {}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "body",
     [
@@ -195,6 +197,7 @@ def test_what_a_font_makes_too_wide_is_found(browser: Chrome, tmp_path: Path, bo
         assert too_wide(browser) > 0
 
 
+@pytest.mark.campaign
 def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
     errors(browser)
     found: dict[str, list[Any]] = {}
@@ -207,6 +210,7 @@ def test_no_page_has_a_barrier(browser: Chrome, site: Path) -> None:
     assert found == {}, json.dumps(found, indent=1)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("bad", "rule"),
     [
@@ -249,6 +253,7 @@ def test_styles_select_by_nothing_that_the_samples_leave_out() -> None:
         assert not re.search("nth-|of-type", path.read_text())
 
 
+@pytest.mark.campaign
 def test_contrast_is_measured_of_one_element_of_each_style(browser: Chrome, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     rows = "<tr><td>first<td class=pale>second</tr>" * 20
@@ -275,6 +280,7 @@ def test_contrast_is_measured_of_one_element_of_each_style(browser: Chrome, tmp_
         assert contrast(examined, "#ddd", "#fff") == 0  # each path is examined once
 
 
+@pytest.mark.campaign
 def test_what_is_wrong_is_found(browser: Chrome, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text(
@@ -337,6 +343,7 @@ def test_the_search_finds_a_card_and_keeps_its_words_in_the_address(
     )
 
 
+@pytest.mark.campaign
 def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> None:
     browser.get((site / "listing/two-term.html").as_uri())
 
@@ -363,6 +370,7 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     assert shown() == every
 
 
+@pytest.mark.campaign
 def test_without_scripts_pages_say_what_they_have(browser: Chrome, site: Path) -> None:
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:

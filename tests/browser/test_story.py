@@ -55,6 +55,7 @@ def _largest(case: int, program: str, listing: Listing, components: slice = slic
     return float(np.abs(run.omega - truth)[:, components].max())
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("letter", "has"), [("A", "two terms"), ("B", "Runge-Kutta")])
 def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: str) -> None:
     assert _text(browser, "claim") == ""
@@ -69,6 +70,7 @@ def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: 
         assert _points(browser, "claim", name) == _first_points("claim", name)
 
 
+@pytest.mark.campaign
 def test_a_reader_predicts_before_the_run(browser: Chrome) -> None:
     curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
     assert curve.value_of_css_property("visibility") == "hidden"
@@ -112,6 +114,7 @@ def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
     assert _value(browser, "at-step") == run.stop.step
 
 
+@pytest.mark.campaign
 def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
     assert _points(browser, "half-speed", "runge-kutta") == _first_points(
         "half-speed", "runge-kutta"
@@ -135,6 +138,7 @@ def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
         ].is_displayed()
 
 
+@pytest.mark.campaign
 def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
     assert _value(browser, "blind-error-1") < 1e-14
     for case, program in ((5, "runge-kutta"), (5, "two-term"), (2, "four-term")):
@@ -151,6 +155,7 @@ def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
         assert shown == [f"chart-blind-{case}"]
 
 
+@pytest.mark.campaign
 def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> None:
     for listing in ("corrected", "original"):
         click(browser, f"input[name=race][value={listing}]")
@@ -161,6 +166,7 @@ def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> 
     assert _value(browser, "ratio") == pytest.approx(errors[0] / errors[1], rel=1e-9)
 
 
+@pytest.mark.campaign
 def test_all_actions_can_be_reached_with_the_keyboard(browser: Chrome) -> None:
     reached = []
     for _ in range(60):
@@ -171,6 +177,7 @@ def test_all_actions_can_be_reached_with_the_keyboard(browser: Chrome) -> None:
     assert set(wanted.split()) <= set(reached)
 
 
+@pytest.mark.campaign
 def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
     """A reader who takes every action once sees fewer words than 250 a minute."""
     for selector in ("input[name=trust]", "#run", "#omega-alone", "input[value=corrected]"):
@@ -184,6 +191,7 @@ def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
     assert 600 < len(words) < 1000, len(words)
 
 
+@pytest.mark.campaign
 def test_on_paper_every_answer_is_shown(browser: Chrome) -> None:
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     try:
@@ -202,6 +210,7 @@ def test_on_paper_every_answer_is_shown(browser: Chrome) -> None:
     assert "you predicted" not in text
 
 
+@pytest.mark.campaign
 def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> None:
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
@@ -216,6 +225,7 @@ def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> N
         browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
 
+@pytest.mark.campaign
 def test_the_menu_of_a_phone_takes_a_line_until_it_is_opened(browser: Chrome, site: Path) -> None:
     with screen(browser, 360):
         browser.get((site / "index.html").as_uri())

@@ -52,6 +52,7 @@ def test_why_the_run_stopped(reader: Reader) -> None:
     assert reader.clicks == 2
 
 
+@pytest.mark.campaign
 def test_one_fault_switched_off(reader: Reader) -> None:
     reader.go("Laboratory")
     before = reader.see("#status").text
@@ -73,6 +74,7 @@ def test_a_card_found_and_cited(reader: Reader) -> None:
     assert reader.clicks == 2
 
 
+@pytest.mark.campaign
 def test_what_the_thesis_says_of_case_6(reader: Reader) -> None:
     reader.go("Thesis and claims")
     sentences = reader.browser.find_elements(By.CSS_SELECTOR, ".sentence")

@@ -32,6 +32,7 @@ def _boxes(browser: Chrome, *selectors: str) -> list[dict[str, float]]:
     return found
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("page", "name", "folded"),
     [("claims.html", "vi-superior", 2), ("thesis.html", "sentence-27", 2)],
@@ -47,6 +48,7 @@ def test_an_address_opens_what_is_folded_there_alone(
     assert errors(browser) == []
 
 
+@pytest.mark.campaign
 def test_a_link_within_the_page_opens_its_claim(browser: Chrome, site: Path) -> None:
     browser.get((site / "claims.html").as_uri())
     assert browser.execute_script(_OPEN, "v2-case-2-stopped")["open"] == 0
@@ -74,6 +76,7 @@ def test_verdicts_are_in_the_margin_or_below_the_sentence(browser: Chrome, site:
         assert said["bottom"] <= margin["top"] < margin["bottom"] <= more["top"]
 
 
+@pytest.mark.campaign
 def test_figures_of_the_paper_are_beside_ours(browser: Chrome, site: Path) -> None:
     places = ("#paper-7 .paper", "#figure-07", "#figure-07-corrected")
     with screen(browser, 1440):
@@ -86,6 +89,7 @@ def test_figures_of_the_paper_are_beside_ours(browser: Chrome, site: Path) -> No
         assert paper["bottom"] <= printed["top"] < printed["bottom"] <= corrected["top"]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("page", "least"), [("claims.html", 116), ("thesis.html", 78)])
 def test_print_keeps_verdicts_and_numbers(
     browser: Chrome, site: Path, page: str, least: int

@@ -99,6 +99,7 @@ def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
     assert {check.id.split("/")[1] for check in failed} == set(shows.split())
 
 
+@pytest.mark.campaign
 def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
     engine = shlex.split(node(WEB))[0]
     source = random.Random(1982)

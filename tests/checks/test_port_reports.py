@@ -68,6 +68,7 @@ def test_times_are_those_of_the_answers(tmp_path: Path, capsys: Capture) -> None
     assert "longest (ms)\nport/two-term        1" in capsys.readouterr().out
 
 
+@pytest.mark.campaign
 def test_random_scenes_are_repeated_by_their_command(tmp_path: Path, capsys: Capture) -> None:
     """A port with a wrong torque passes no random scene, and the command shows the same again."""
     right = scene_port(tmp_path / "right.py")
@@ -109,6 +110,7 @@ def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
     assert all(each.failed >= 4 for each in found[1:])
 
 
+@pytest.mark.campaign
 def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None:
     command = answering(tmp_path / "port.py", BIT)
     record = _json(capsys, command, "--self-test", "--cell", CELL, status=1)
@@ -193,6 +195,7 @@ def test_several_outputs_are_those_of_one_run(tmp_path: Path, capsys: Capture) -
     assert [each["passed"] for each in json.loads(record)["checks"]] == [False, False]
 
 
+@pytest.mark.campaign
 def test_every_kind_of_check_has_a_page(capsys: Capture) -> None:
     assert main(["verify", "--only", "orders", "--format", "markdown"]) == 0
     page = capsys.readouterr().out

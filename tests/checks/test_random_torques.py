@@ -31,6 +31,7 @@ def checks(only: str, draws: int = 100) -> list[Check]:
         return list(made(random_torques(chosen), chosen.only))
 
 
+@pytest.mark.campaign
 def test_all_pass_and_have_names_of_their_own() -> None:
     found = checks("")
     assert [check.id for check in found if not check.passed] == []

@@ -43,6 +43,7 @@ def checks_of(scene: Scene, *only: str) -> list[Check]:
     return list(stress(only, room.scene_trials(scene, " --scene x.toml")))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("kind", SCENES)
 def test_all_checks_pass_and_have_names_of_their_own(kind: str) -> None:
     found = checks_of(SCENES[kind]())

@@ -134,6 +134,7 @@ def test_the_stored_picture_is_current(tmp_path: Path) -> None:
     assert stored.with_suffix(".svg").exists()
 
 
+@pytest.mark.campaign
 def test_plot_of_regions_draws_the_regions(tmp_path: Path) -> None:
     target = tmp_path / "regions.svg"
     only = "regions/runge-kutta/original/polynomial"

@@ -25,6 +25,7 @@ from pyharness.scenes.extreme import EXTREMES, in_steps
 from tests.checks.stressed import checks_of, failed
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["separatrix", "near-symmetry", "shapes", "scales"])
 def test_bounds_hold(name: str) -> None:
     """Test one in five circumstances; `stress` itself tests all of them."""

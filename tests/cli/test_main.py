@@ -128,6 +128,7 @@ def test_run_tells_of_error_growth_and_digits(printed: Printed) -> None:
     assert {name: record["trajectory"][name] for name in told} == dict.fromkeys(told)
 
 
+@pytest.mark.campaign
 def test_strict_takes_what_is_sensitive_for_a_failure(capsys: Capture) -> None:
     for command, code in (
         (f"{_FAR} 1e-12", 0),

@@ -228,6 +228,7 @@ def test_a_link_that_leads_nowhere_is_refused(
 IMPOSSIBLE = "[body]\nmoments=[200,10,20]\n[initial]\nomega=[0.1,1,0.2]\n"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [

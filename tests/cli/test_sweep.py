@@ -42,6 +42,7 @@ def test_record_is_strict_json(printed: Printed) -> None:
     assert "reduction,of,scenes" in printed("sweep sweep.toml --out store --format csv")
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("content", [text(TILT, SQUARE), text(TILT), PROGRAM])
 def test_picture_is_drawn_with_its_numbers(content: str, printed: Printed, tmp_path: Path) -> None:
     written(tmp_path, content)

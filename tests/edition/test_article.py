@@ -90,6 +90,7 @@ def _explained(text: str) -> str:
     return re.sub("|".join(NAMES), "", text)
 
 
+@pytest.mark.campaign
 @pytest.mark.claims
 def test_the_article_is_that_of_today(found: dict[str, Any]) -> None:
     """Compare the files; `python -m docs.article.build` writes them."""

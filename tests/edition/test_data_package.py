@@ -65,6 +65,7 @@ def _rows(package: Package, path: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(package[path].decode())))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_deck_is_made_of_the_table_alone(
     package: Package, program: str, printed: Printed

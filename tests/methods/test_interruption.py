@@ -135,6 +135,7 @@ def keyboard() -> Iterator[_Keyboard]:
     signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", LONG)
 def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch

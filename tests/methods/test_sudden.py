@@ -64,6 +64,7 @@ def test_a_pulse_of_time_is_not_missed(name: str, width: float) -> None:
         assert error <= tolerance + 4e-15
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("name", PULSES)
 def test_the_reference_misses_no_pulse_of_time(name: str, width: float) -> None:

@@ -278,6 +278,7 @@ def test_a_long_motion_is_not_called_sensitive_by_chance() -> None:
     assert found.growth == pytest.approx(222.0, rel=0.05)
 
 
+@pytest.mark.campaign
 def test_variations_are_as_accurate_as_the_motion() -> None:
     """Variations of a fixed order lost their phase in 190 000 steps: 1e-3 was exceeded unseen."""
     wave = (-4.738442472713716, -5.436985716429409, 8.688557959572783), 0.8007463433344562

@@ -125,6 +125,7 @@ def test_says_where_no_digit_is_left() -> None:
     assert sum(each > 1.0 for each in lost) > 20
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "tolerance", "factor"),
     [("case 5", 1e-4, 3.0), ("case 5", 1e-6, 30.0), ("waves", 1e-4, 3.0), ("waves", 1e-7, 2.5)],

@@ -107,6 +107,7 @@ def integrals(scene: Scene, end: float) -> Array:
 CHECKED = [(name, full) for name in TORQUES for full in (False, True) if name != "opaque"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("name", "full"), [*CHECKED, ("opaque", False)])
 def test_work_is_the_integral_of_the_power(name: str, full: bool) -> None:
     scene = scene_with(TORQUES[name], full)

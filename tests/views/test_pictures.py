@@ -43,6 +43,7 @@ def _ends(figure: "Figure") -> list[tuple[int, float, float]]:
     ]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "options",
     [
@@ -82,6 +83,7 @@ def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]", printed: P
         assert time == pytest.approx(0.56 if panel % 3 == 0 else 0.24)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "command",
     [

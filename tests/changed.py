@@ -16,9 +16,11 @@ ROOT = Path(__file__).parent.parent
 PASSED = ROOT / "tests" / "passed.txt"
 # Folders of tests by the beginning of a path; the rest of `pyharness` has those of its name.
 TESTS = {
-    "docs/article/": ("edition",), "docs/": (), "README.md": (), "CHANGELOG.md": (), "CONTRIBUTING.md": (), ".github/": (),
-    ".ci/": (), "verify-port/": (), "tests/messages.txt": (), "tests/passed.txt": (),
-    "web/": ("edition", "browser"), "pyharness/edition/": ("edition", "browser"),
+    "docs/article/": ("edition",), "docs/": ("test_docs.py", "test_gallery.py"),
+    "README.md": ("test_docs.py",), "CHANGELOG.md": (), "CONTRIBUTING.md": (), ".github/": (),
+    ".ci/": (), "verify-port/": ("test_verify_port.py",), "tests/messages.txt": (),
+    "tests/passed.txt": (), "web/": ("edition", "browser"),
+    "pyharness/edition/": ("edition", "browser"),
     "pyharness/data/": ("history", "original", "edition"), "fortran/original/": ("original",),
 }  # fmt: skip
 # Packages on which nearly all others depend.

@@ -55,6 +55,7 @@ def _blocks() -> list[tuple[Path, str, str]]:
     return found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("path", "command", "output"), _blocks())
 def test_output_is_current(
     path: Path, command: str, output: str, printed: Printed, monkeypatch: pytest.MonkeyPatch
@@ -128,6 +129,7 @@ def test_pictures_of_the_report_are_current() -> None:
         assert path.with_suffix(".svg").exists()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("path", [*DOCS, README], ids=lambda path: path.stem)
 def test_examples_in_the_documents_run(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Shown outputs and the numbers of pictures are current: `python -m docs.gallery.build`."""
@@ -204,6 +206,7 @@ def test_reference_lists_every_method_with_its_tolerances() -> None:
         assert finest == ("by the scene" if name in SCIPY_METHODS else own), name
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "command",
     [

@@ -19,6 +19,7 @@ GUIDE = (ROOT / "docs/how-to/ports.md").read_text()
 COMMANDS = re.findall(r"```sh\n(.*?)```", GUIDE, re.DOTALL)[1:]
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_the_guide_runs(command: str, tmp_path: Path) -> None:

@@ -176,6 +176,7 @@ def test_notebook_has_code_output_and_picture_of_its_page(name: str) -> None:
     assert all(question(TEXTS[Path(each).stem]) in prose for each in pictures)
 
 
+@pytest.mark.campaign
 def test_a_notebook_runs_in_jupyter(tmp_path: Path) -> None:
     """A kernel executes the notebook of a page, prints its output and shows its picture."""
     text = TEXTS["wing-nut"]

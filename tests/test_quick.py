@@ -82,7 +82,7 @@ def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) ->
     ("paths", "wanted"),
     [
         ([], []),
-        (["docs/index.md", "tests/messages.txt"], []),
+        (["CHANGELOG.md", "tests/messages.txt"], []),
         (["pyharness/history/account.py", "web/story/story.js"],
          ["tests/browser", "tests/edition", "tests/history"]),
         (["tests/bench/test_terms.py", "tests/browser/screen.py"],

@@ -51,6 +51,7 @@ def test_the_script_checks_the_port_in_c(tmp_path: Path) -> None:
     assert ElementTree.parse(reports / "junit.xml").getroot().get("tests") == "263"
 
 
+@pytest.mark.campaign
 def test_a_wrong_port_ends_with_1_and_has_its_reports(tmp_path: Path) -> None:
     command = answering(tmp_path / "port.py", "rows[2][1] = 1")
     done = _run(tmp_path, PORT_COMMAND=command, PORT_CELLS=CELL, PORT_REPORTS="a folder/reports")
@@ -60,6 +61,7 @@ def test_a_wrong_port_ends_with_1_and_has_its_reports(tmp_path: Path) -> None:
     assert ElementTree.parse(reports / "junit.xml").getroot().get("failures") == "1"
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -83,6 +85,7 @@ def test_values_are_never_read_by_a_shell(
     assert [path.name for path in tmp_path.rglob("*")] == ["port-reports"]
 
 
+@pytest.mark.campaign
 def test_a_command_is_not_read_by_a_shell(tmp_path: Path) -> None:
     done = _run(tmp_path, PORT_COMMAND="true; touch made", PORT_CELLS=CELL)
     assert done.returncode == 1

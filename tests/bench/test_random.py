@@ -31,6 +31,7 @@ def loads() -> list[Workload]:
     return [random_load(SEED, number) for number in range(1, 25)]
 
 
+@pytest.mark.campaign
 def test_every_kind_comes_in_turn_with_every_body_and_speed(loads: list[Workload]) -> None:
     assert [load.kinds[1] for load in loads] == list(LAWS) * 4
     seen = {pair for load in loads for pair in product(load.kinds, load.kinds)}

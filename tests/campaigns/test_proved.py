@@ -53,6 +53,7 @@ def _precise(known: Reference) -> Reference:
     return replace(known, remainder=known.remainder + 1e-24)
 
 
+@pytest.mark.campaign
 def test_no_promise_is_broken_in_a_few_scenes() -> None:
     pytest.importorskip("flint")
     tally = proved.campaign(8, "a few")
@@ -63,6 +64,7 @@ def test_no_promise_is_broken_in_a_few_scenes() -> None:
     assert "0 promises broken" in tally.text()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "fault", "result"),
     [

@@ -55,6 +55,7 @@ def _faults(record: Any) -> set[str]:
     return {each["name"] for each in record["findings"]}
 
 
+@pytest.mark.campaign
 def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
     record = _json(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
     assert record["findings"] == []
@@ -76,6 +77,7 @@ def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
     )
 
 
+@pytest.mark.campaign
 def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
     words = ("--order", "5", "--cell", "free-0", "--seed", "a b")
     record = _json(capsys, command_of(RK4), *words, status=1)
@@ -120,6 +122,7 @@ MISTAKES = (
 )  # fmt: skip
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("old", "new", "fault"), MISTAKES)
 def test_a_mistake_in_the_source_is_named(
     old: str, new: str, fault: str, tmp_path: Path, capsys: Capture
@@ -158,6 +161,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("label", "order"), [("original", "1"), ("corrected", "4")])
 def test_the_program_of_the_thesis_is_an_integrator(
     label: str, order: str, tmp_path: Path, capsys: Capture
@@ -169,6 +173,7 @@ def test_the_program_of_the_thesis_is_an_integrator(
     assert _faults(record) == ({"thesis-runge-kutta"} if label == "original" else set())
 
 
+@pytest.mark.campaign
 def test_a_first_order_splitting_is_named_and_may_refuse_torques(capsys: Capture) -> None:
     command = command_of(Path(__file__).with_name("splitting.py"))
     record = _json(capsys, command, "--seed", "s", "--draws", "1")
@@ -186,6 +191,7 @@ def test_rounding_errors_are_not_named_first_order() -> None:
     assert convergence("omega", steps, steps, 1e-12, False).is_first
 
 
+@pytest.mark.campaign
 def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
     text = RK4.read_text().replace("(i2 - i3)", "(i3 - i2)").replace("(i3 - i1)", "(i1 - i3)")
     text = text.replace("(i1 - i2)", "(i2 - i1)")
@@ -221,6 +227,7 @@ def test_drawn_integrators_have_the_right_verdict() -> None:
         assert is_right(each, found), (each.says, integrator_campaign.named(found))
 
 
+@pytest.mark.sampled
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("last", "seconds", "failed"),
@@ -242,6 +249,7 @@ def test_a_late_failure_is_noticed(last: str, seconds: float, failed: str) -> No
     assert integrator_campaign.named(found) == {"unknown"}
 
 
+@pytest.mark.sampled
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("axis", [1, 2, 3])
 def test_the_sign_of_one_gyroscopic_term_is_named_where_the_motion_is_finite(axis: int) -> None:
@@ -251,6 +259,7 @@ def test_the_sign_of_one_gyroscopic_term_is_named_where_the_motion_is_finite(axi
     assert integrator_campaign.named(found) == {wrong.fault}
 
 
+@pytest.mark.campaign
 def test_an_explicit_method_of_order_1_may_drift() -> None:
     """With steps of 1/32 s, it overflows in this scene within 512 s."""
     euler = Drawn("", solve_of((METHODS[0][1], METHODS[-1][1])), "", 1.0)
@@ -289,6 +298,7 @@ ANSWERS = (
 )  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("body", "message"), ANSWERS)
 def test_an_invalid_answer_is_a_line(
     body: str, message: str, tmp_path: Path, capsys: Capture
@@ -313,6 +323,7 @@ def test_an_integrator_that_refuses_everything_does_not_pass(
     assert main(["verify", "--integrator", command_of(path), "--self-test", "--draws", "1"]) == 1
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("more", [[], ["--self-test"]])
 def test_a_port_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
     assert main(["verify", "--integrator", documented_command(), "--draws", "1", *more]) == 2
@@ -443,6 +454,7 @@ def test_a_request_has_what_the_guide_says() -> None:
         read_motion(b'{"omega": [[1, 2, 3]]}', 2)
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 @pytest.mark.parametrize(("words", "order"), [("RK45 fixed", 5), ("DOP853 fixed", 8), ("LSODA", 1)])
 def test_integrators_of_scipy_have_their_orders(words: str, order: int, capsys: Capture) -> None:

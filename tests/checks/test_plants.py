@@ -59,6 +59,7 @@ def _truth() -> Reference:
     return reference(_SCENE, _SCENE.times())
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("name", "program"), _seen_by("schemes", "stops"))
 def test_fault_in_both_languages_is_seen(name: str, program: str) -> None:
     """The fault is far too small to show in a measured order."""

@@ -63,6 +63,7 @@ def test_all_cells_are_asked_for_but_where_fewer_are_named() -> None:
     ]
 
 
+@pytest.mark.campaign
 def test_one_bit_is_found_where_it_is(tmp_path: Path, capsys: Capture) -> None:
     cell = "two-term/case-2/original"
     bit = "rows[6][2] = math.nextafter(float.fromhex(rows[6][2]), math.inf).hex()"
@@ -172,6 +173,7 @@ def _answers_wrongly(command: str) -> Check:
     return checks[-1]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("script", "words"),
     [
@@ -194,6 +196,7 @@ def test_a_port_that_does_not_answer(script: str, words: str, tmp_path: Path) ->
     assert check.id == f"port/{sample()[0].name}"
 
 
+@pytest.mark.campaign
 def test_too_few_rows_and_a_crash_later_end_the_checks(tmp_path: Path, capsys: Capture) -> None:
     command = answering(tmp_path / "port.py", "del rows[50:]")
     assert main(["verify", "--port", command, "--program", "two-term", "--case", "2"]) == 1

@@ -62,6 +62,7 @@ def test_there_are_many_faults_of_all_programs() -> None:
     assert any(fault["cell"].startswith("random/") for fault in FAULTS)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault["what"])
 def test_a_fault_of_one_line_is_found_where_it_is(fault: dict[str, str], tmp_path: Path) -> None:
     assert SOURCE.count(fault["from"]) == 1

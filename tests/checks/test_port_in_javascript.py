@@ -24,6 +24,7 @@ from pyharness.scenes.random_scenes import draw
 from tests.ports import WEB, node, sample
 
 
+@pytest.mark.campaign
 def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
     """Random scenes show what no cell shows, for example a test of velocity before omega."""
     seen = set()
@@ -44,6 +45,7 @@ def test_the_javascript_has_the_twins_bits_in_random_scenes() -> None:
     assert {program for program, _ in seen} == set(PROGRAMS)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("waves", ["sines", "cosines"])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_torque_of_waves_alone_acts(program: str, waves: str) -> None:
@@ -86,6 +88,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
     name, here, planted, shows = FAULTS[fault]

@@ -124,6 +124,7 @@ def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None
     assert "FAILED none: no fault: nothing may fail" in capsys.readouterr().out
 
 
+@pytest.mark.campaign
 def test_a_check_that_sees_nothing_would_fail_the_self_test(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

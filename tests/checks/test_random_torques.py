@@ -75,6 +75,7 @@ FAULTS: dict[str, tuple[Any, str, Any, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("fault", FAULTS)
 def test_fault_is_seen(fault: str) -> None:
     module, name, planted, subject = FAULTS[fault]

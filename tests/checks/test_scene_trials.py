@@ -99,6 +99,7 @@ def test_wrong_order_and_other_bits_are_seen() -> None:
         assert not any(check.passed for check in checks_of(scene, "threads/auto"))
 
 
+@pytest.mark.campaign
 def test_verb_stress_with_a_scene(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -122,6 +122,7 @@ def test_weights_of_moved_points() -> None:
         assert weight_of_squares(Listing.original("four-term"), n) == Fraction(1, 3)
 
 
+@pytest.mark.campaign
 def test_the_stored_picture_is_current(tmp_path: Path) -> None:
     made = saved(regions_picture(regions()), "regions.csv.svg")
     stored = FIGURES / "stability-regions.csv"

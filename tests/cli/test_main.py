@@ -337,6 +337,7 @@ def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.campaign
 def test_as_a_module_and_as_a_command() -> None:
     for command in (["-m", "pyharness"], ["-c", "from pyharness.cli.main import main; main()"]):
         done = _python(*command, "defects")
@@ -421,6 +422,7 @@ def test_json_of_a_scene_and_of_drifts_is_that_of_the_findings(
             assert (each["order_state"], round(each["order"])) == ("as due", 2)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("line", "wanted"),
     [

@@ -68,6 +68,7 @@ def test_every_verb_with_a_scene_is_tried(scene: str, takers: set[str]) -> None:
     assert with_scene - takers <= {each.split()[0] for each in COMMANDS if scene in each}
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("damped")
 def test_methods_and_their_plan_take_a_torque_that_depends_on_the_state(
     capsys: pytest.CaptureFixture[str],

@@ -150,6 +150,7 @@ def test_picture_is_that_of_its_numbers(name: str) -> None:
         assert (error < 1e-5 * np.abs(was[own]).max(axis=0)).all(), curve
 
 
+@pytest.mark.campaign
 def test_pictures_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(draw, "_HERE", tmp_path)
     monkeypatch.setattr(draw, "PLOTS", {"slew": draw.PLOTS["slew"]})

@@ -253,6 +253,7 @@ def test_the_impulse_of_a_late_pulse_is_torque_times_duration(start: float) -> N
         assert found.omega[0, 0] == pytest.approx(1.0, abs=4e-15)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("duration", [1e-2, 1e-5, 1e-7])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_short_pulse_on_a_body_at_rest_sets_its_scale(duration: float, side: float) -> None:

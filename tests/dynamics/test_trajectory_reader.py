@@ -165,6 +165,7 @@ def check_same(found: Trajectory, saved: Trajectory) -> None:
         assert len(set(in_space)) == 1
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", FOUND)
 @pytest.mark.filterwarnings("error")
 def test_every_bit_returns(name: str, tmp_path: Path) -> None:
@@ -192,6 +193,7 @@ def test_events_return(tmp_path: Path) -> None:
     assert [each.tolist() for each in found.y_events] == [[[1.0] * 7] * 2]
 
 
+@pytest.mark.campaign
 def test_attitudes_and_numbers_of_scenes_return() -> None:
     """Draw scenes whose numbers have all digits; quaternions are not rounded again."""
     draw = np.random.default_rng(7)

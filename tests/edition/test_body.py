@@ -129,6 +129,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_closed_form_is_found(fault: str, tmp_path: Path) -> None:
     name, here, planted = FAULTS[fault]
@@ -223,6 +224,7 @@ def test_an_address_restores_its_state() -> None:
     assert default["moments"] == list(context()["first"].moments)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("words", "told"),
     [

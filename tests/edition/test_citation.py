@@ -50,6 +50,7 @@ def test_the_date_is_that_of_the_publication_if_there_is_one(
     assert linked_data()["@graph"][0]["datePublished"] == "2031-05-06"
 
 
+@pytest.mark.campaign
 def test_the_page_has_the_citation_and_the_linked_data(built_site: dict[str, bytes]) -> None:
     page = pages(built_site)["about.html"]
     text = "".join(page.text)

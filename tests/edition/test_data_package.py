@@ -75,6 +75,7 @@ def test_a_deck_is_made_of_the_table_alone(
     assert printed(f"deck --program {program}") == "".join(lines)
 
 
+@pytest.mark.campaign
 def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: Printed) -> None:
     """The counts of the last table of `pyharness claims`, from `claims.json`."""
     found = _json(package, "claims.json")["claims"]
@@ -233,6 +234,7 @@ def _judged(package: Package, folder: Path, text: str) -> subprocess.CompletedPr
     )  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("altered", [False, True])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_the_script_judges_a_page_like_the_command(

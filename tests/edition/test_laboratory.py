@@ -160,6 +160,7 @@ def test_only_what_differs_is_in_the_address() -> None:
     assert found[4][1] == f"pyharness run {given}"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -350,6 +351,7 @@ _STEPS = [
 ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("words", "step"), _STEPS)
 def test_every_card_of_a_step_gives_the_value_beside_it(words: str, step: int) -> None:
     """Compute each card, as FORTRAN, from the values that the cards before it have given."""
@@ -411,6 +413,7 @@ def _value(formula: str, known: dict[str, float]) -> float:
     return float(eval(text, {"known": known, "ABS": abs, "SQRT": math.sqrt}))
 
 
+@pytest.mark.campaign
 def test_a_trace_changes_no_bit_of_a_run() -> None:
     body = """return given.map((words) => {
       const { state } = S.stateFrom(data, words);
@@ -524,6 +527,7 @@ def test_every_program_converges_to_its_limit() -> None:
 EXPERIMENTS = facts("experiments")["experiment"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
 def test_guided_experiments_show_what_they_say(experiment: dict[str, Any]) -> None:
     body = """const { state, pinned, problems } = S.stateFrom(data, given);
@@ -599,6 +603,7 @@ def test_the_reason_of_an_end_is_computed_from_the_run() -> None:
     assert "In step 62 U1 was near a turning point" in later
 
 
+@pytest.mark.campaign
 def test_quotients_end_the_run_where_they_exceed_the_limit() -> None:
     body = """return given.map((words) => {
       const found = E.experiment(data, S.stateFrom(data, words).state);
@@ -625,6 +630,7 @@ def test_quotients_end_the_run_where_they_exceed_the_limit() -> None:
     assert stopped > 20
 
 
+@pytest.mark.campaign
 def test_a_switch_without_effect_is_found_by_running() -> None:
     body = """return given.map((words) => {
       const { state } = S.stateFrom(data, words);

@@ -161,6 +161,7 @@ def _last_line(
     return _page(deck, changes, {"1530": end} if end else {})[-1]
 
 
+@pytest.mark.sampled
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 @pytest.mark.parametrize(
     ("case", "changes", "end", "first", "step"),
@@ -190,6 +191,7 @@ def test_changed_decks_print_what_lesson_and_notes_say(
     assert told in LESSON + NOTES
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 def test_other_moments_in_case_1_have_the_effects_that_the_notes_say() -> None:
     corrected = Listing.corrected("runge-kutta")

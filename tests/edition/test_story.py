@@ -105,6 +105,7 @@ def test_what_ends_a_run_whose_omega_is_right(slots: Slots, built_site: dict[str
     assert b'data-text="alone-variable">U1<' in built_site["index.html"]
 
 
+@pytest.mark.campaign
 def test_ratios_are_those_of_the_largest_errors(slots: Slots) -> None:
     ratios = {
         case: [

@@ -63,6 +63,7 @@ def test_x3_on_acl2_gives_the_acceleration_that_is_told(
     assert told in entry("x3-reads-acl2")["why"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("case", [3, 5])
 def test_corrected_velocity_is_that_of_one_mass(program: str, case: int) -> None:

@@ -49,6 +49,7 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> str:
     return f"--atlas {store} --sweep {sweep}"
 
 
+@pytest.mark.campaign
 def test_a_coarse_atlas_has_the_shares_that_were_seen(coarse: str, printed: Printed) -> None:
     rows = list(csv.DictReader(printed(f"claims {coarse} --format csv").splitlines()))
     assert {row["claim"] for row in rows} == set(JUDGED)

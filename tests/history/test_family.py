@@ -55,6 +55,7 @@ ORDERS = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("case", ORDERS)
 def test_orders_are_those_derived_or_better(
     case: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch
@@ -87,6 +88,7 @@ def test_derived_orders() -> None:
     assert [predicted_order(Member("galerkin", 3, None, k)) for k in range(5)] == [1, 2, 3, 3, 3]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("points", "order"),
     [
@@ -263,6 +265,7 @@ def test_points_of_no_member_are_refused(arguments: Any) -> None:
         Member(*arguments)
 
 
+@pytest.mark.campaign
 def test_solution_that_leaves_every_bound_is_refused() -> None:
     with pytest.raises(InputError, match=r"0\.9"):
         order_table(replace(GROWING, step_size=0.3, steps=4))

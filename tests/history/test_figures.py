@@ -103,6 +103,7 @@ def test_a_caption_tells_what_its_own_curves_do(found: dict[str, FigureFinding])
             assert share_of_range(curve.trajectory.omega, finding.reference.omega) < 0.01
 
 
+@pytest.mark.campaign
 def test_numbers_are_those_of_the_trajectories(found: dict[str, FigureFinding]) -> None:
     assert list(found) == ALL
     for finding in found.values():
@@ -162,6 +163,7 @@ def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding])
     assert wild.ending == "overflow after step 56"
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("fast")
 def test_list_of_files(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["figures", "--out", str(tmp_path)]) == 0

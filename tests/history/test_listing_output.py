@@ -27,6 +27,7 @@ def printed(folder: Path, program: str, case: int, word: str, *, mended: bool = 
     return str(path)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("program", "case", "word", "mended", "alike"),
     [

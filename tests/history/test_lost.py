@@ -17,6 +17,7 @@ def found() -> dict[str, Ranked]:
     return {each.mistake: each for each in ranked()}
 
 
+@pytest.mark.campaign
 def test_without_a_mistake_they_work(found: dict[str, Ranked]) -> None:
     assert not found["none"].in_either
     for weighting in lost.WEIGHTINGS:

@@ -60,6 +60,7 @@ def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
         assert claim(identity)["where"].startswith("V.")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("identity", JUDGED)
 def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
     few = FEWER if identity.startswith("v3") else FEW
@@ -69,6 +70,7 @@ def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
     assert found.tolist() == _codes(identity, Laboratory(True), few)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("identity", [each for each in JUDGED if each.startswith("v2")])
 def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
     """Test corrected programs and other readings, with a few starts of each."""

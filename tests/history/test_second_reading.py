@@ -31,6 +31,7 @@ def test_chapman_corrects_lincoln_and_petersen() -> None:
     assert chapman(2000, 1000, 500) == pytest.approx(4000, rel=2e-3)
 
 
+@pytest.mark.campaign
 def test_interval_contains_the_size_as_often_as_promised() -> None:
     """All samples of a small population: the interval has the size in 95 % or more of them."""
     size, first = 12, 7

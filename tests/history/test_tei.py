@@ -80,10 +80,12 @@ def _unresolved(root: xml.Element) -> set[str]:
     return {p for p in pointers if p[0] == "#" and p[1:] not in ids}
 
 
+@pytest.mark.campaign
 def test_document_is_valid(schema: Any) -> None:
     assert schema.validate(etree.fromstring(TEXT.encode())), schema.error_log
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("ours", "other"),
     [

@@ -48,6 +48,7 @@ def found() -> dict[tuple[int, str, str], WordCell]:
 Found = dict[tuple[int, str, str], WordCell]
 
 
+@pytest.mark.campaign
 def test_double_is_the_run_in_53_bits(found: Found) -> None:
     for cell in found.values():
         if (run := cell.of(53, "nearest-even")) is not None:
@@ -115,6 +116,7 @@ def test_report_has_every_run(found: Found) -> None:
     assert len(words_report(short).text) == 3
 
 
+@pytest.mark.campaign
 def test_verb(printed: Printed, tmp_path: Path) -> None:
     picture = tmp_path / "words.png"
     with few_steps(10), patch.object(options, "progress") as progress:

@@ -60,6 +60,7 @@ def test_two_references_agree() -> None:
             assert abs(x - y) < mpmath.mpf(10) ** -40, kind
 
 
+@pytest.mark.sampled
 @pytest.mark.property
 @pytest.mark.parametrize("kind", KINDS)
 def test_any_body_at_any_time(kind: str) -> None:
@@ -72,6 +73,7 @@ def test_any_body_at_any_time(kind: str) -> None:
         assert of_omega <= _OMEGA_BOUND, motion
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_any_order_and_sign_of_axes(order: tuple[int, ...], turned: bool) -> None:

@@ -83,6 +83,7 @@ def test_difficult_scenes_are_solved_or_refused() -> None:
     assert 10 < solved < 100
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
     "law",
@@ -145,6 +146,7 @@ def test_recorded_torque_with_slow_changes_is_solved() -> None:
     assert _error(found, solve(scene, times, "taylor", 1e-14).omega) < 1e-11
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("coefficients", [(0.3, -0.5, 0.2), (-0.3, 0.5, 0.2), (0.3, -0.5, 0.3)])
 def test_torque_whose_first_mean_is_zero_is_averaged(coefficients: tuple[float, ...]) -> None:
     """The first sweep changes nothing; it was taken for the last one, and the scene refused."""

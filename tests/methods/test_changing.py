@@ -146,6 +146,7 @@ def test_solution_reference_and_a_right_hand_side_written_by_hand_agree(seed: in
         assert np.abs(found.attitude - truth.attitude).max() <= allowed
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(4))
 def test_reference_agrees_with_mpmath(seed: int) -> None:
     scene, _ = draw(Random(f"mpmath {seed}"), full=seed % 2 == 1)

@@ -128,6 +128,7 @@ def test_scipy_integrates_a_component(library: Any) -> None:
     assert found == slowly
 
 
+@pytest.mark.campaign
 def test_capsule_and_function_keep_the_solver() -> None:
     start, state = np.array(BRICK.omega), np.empty(3)
     call = prepare(BRICK).ctypes

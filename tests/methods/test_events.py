@@ -84,6 +84,7 @@ def test_every_kind_of_function_has_roots() -> None:
         assert sum(len(planted(kind, np.random.default_rng(k)).roots) for k in range(9)) > 9
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("method", METHODS)
 def test_events_of_a_body_are_those_of_scipy(method: str) -> None:
     tolerance = 1e-10
@@ -154,6 +155,7 @@ def test_function_without_a_derivative() -> None:
     assert steep == pytest.approx([4.4], rel=1e-12)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("end", [1.0, 2.7, -2.0, 40.0])
 def test_roots_of_odd_multiplicity_are_as_exact_as_the_sign(end: float) -> None:
     # Omega is the time.

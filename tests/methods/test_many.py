@@ -66,6 +66,7 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
     assert np.count_nonzero(same) < 10
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-6, 1e-8, 1e-10])
 def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float) -> None:
     """Bodies leave their middle axis under a faint torque: local errors grow by e2 to e16.

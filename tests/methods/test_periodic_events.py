@@ -79,6 +79,7 @@ def test_events_of_a_million_seconds() -> None:
     assert 2.0 * gaps.mean() == pytest.approx(period_of(WING_NUT), rel=1e-12)
 
 
+@pytest.mark.campaign
 def test_terminal_events_and_directions() -> None:
     for direction, limit in ((1, 30), (-1, 31), (0, 32)):
         ready = events.flip(2, terminal=limit, direction=direction)

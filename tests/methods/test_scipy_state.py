@@ -107,6 +107,7 @@ def test_the_random_scenes_have_both_kinds_of_state() -> None:
     assert {each.needs_attitude for each in torques} == {True, False}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("number", [0, 1, 2, 3])
 def test_an_opaque_torque_has_the_results_of_the_recorded_one(number: int, name: str) -> None:

@@ -84,6 +84,7 @@ def momentum(scene: Scene, times: Array) -> Array:
     return np.asarray(found)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "time"),
     [("waves", -2.0), *zip(SCENES, itertools.cycle((2.0, -2.0)), strict=False)],

@@ -161,6 +161,7 @@ def test_a_high_power_is_a_series_of_pulses(name: str) -> None:
     assert true.omega[0, 0] - 0.1 == pytest.approx(change[0], abs=4e-15 * scale)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-9, 1e-12])
 def test_a_power_beside_a_divisor_of_its_size_is_not_missed(unit: float) -> None:
     """The unit of a length changes no Hill function of it."""

@@ -263,6 +263,7 @@ def test_growth_of_a_motion_that_becomes_fast_is_that_of_every_tolerance(
         assert found.steps < found.evaluations < 1.05 * found.steps
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-13])
 def test_a_motion_that_was_expected_to_be_longer_has_its_growth(tolerance: float) -> None:
     """A torque that swings: the beginning lets expect more radians than the work limit allows."""

@@ -195,6 +195,7 @@ def test_growth_on_the_middle_axis_is_exponential() -> None:
     assert np.log(found.growth or 1.0) == pytest.approx(60.0 * rate, rel=0.02)
 
 
+@pytest.mark.campaign
 def test_growth_stands_where_the_way_is_too_long_to_measure_it_again() -> None:
     found = solve(Scene("", (0.0, 2.0, 0.0), BODY), [2e7], "taylor", 1e-6)
     assert found.ended == "sensitive"

@@ -48,6 +48,7 @@ def test_flags_are_the_ones_that_keep_the_bits() -> None:
     assert "fast" not in flags
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
     """F2py maps an unknown kind to C float without an error; the build must not."""
@@ -71,6 +72,7 @@ def _hook(*folders: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.campaign
 def test_an_editable_install_in_build_isolation_is_refused(tmp_path: Path) -> None:
     """Pip puts the build tools into a folder on the path of the build alone, and removes it."""
     backend = ROOT / ".ci"
@@ -134,6 +136,7 @@ def test_a_build_with_such_flags_is_refused_in_one_line(variable: str, tmp_path:
     assert "leave out options such as -Ofast, -ffast-math" in line
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) -> None:
     tools = tmp_path / "bin"

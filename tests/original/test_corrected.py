@@ -57,6 +57,7 @@ def test_corrected_programs_have_their_orders_under_every_reading_and_conjecture
     assert not list(_misses([_listing(each) for each in ASSUMED]))
 
 
+@pytest.mark.campaign
 def test_the_faults_that_readings_and_conjectures_are_cost_an_order_where_they_are_kept() -> None:
     """The test above would find a reading or conjecture in a corrected statement by its order."""
     kept = {

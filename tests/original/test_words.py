@@ -35,6 +35,7 @@ def test_bits_are_those_of_numpy(name: str) -> None:
     assert differing(name, 8_000, "test") == []
 
 
+@pytest.mark.sampled
 @pytest.mark.bitwise
 @pytest.mark.parametrize("p", [11, 24, 48])
 @pytest.mark.parametrize("rule", RULES)

@@ -72,6 +72,7 @@ def test_end_of_a_program_is_marked(drawn: "list[Figure]", printed: Printed) -> 
     assert "x: stopped at step 25 by V2" in drawn[0].texts[0].get_text()
 
 
+@pytest.mark.campaign
 def test_end_out_of_view_is_marked_at_the_edge(drawn: "list[Figure]", printed: Printed) -> None:
     """Case 6: two-term original overflows at step 57, at 1e111."""
     printed("compare --case 6 --plot x.png --out x.txt")

@@ -139,6 +139,7 @@ def _beside(scene: Scene, small: np.ndarray) -> Scene:
     return replace(scene, omega=omega, attitude=product(scene.attitude, (1.0, x, y, z)))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", [*SCENES, *JOINT])
 def test_growth_is_the_norm_of_the_derivative(name: str) -> None:
     """Perturb the state in every direction at intermediate times."""
@@ -193,6 +194,7 @@ def test_number_of_a_seed_is_one_scene() -> None:
     assert FINEST <= first.tolerance <= COARSEST
 
 
+@pytest.mark.campaign
 def test_few_dozen_scenes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     asked = ["--scenes", "24", "--seed", "test", "--out", str(tmp_path / "answers.csv")]
     code = main(asked)

@@ -65,6 +65,7 @@ def test_sine_and_cosine_of_many_angles_keep_their_bounds() -> None:
 _LITERALS = re.findall(r"\d\.\d+(?:e-\d+)?(?=_dp)", LANES.read_text().split("contains")[0])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("literal", [each for each in _LITERALS if each not in {"1.5", "2.0"}])
 def test_a_changed_digit_of_a_constant_exceeds_the_bounds(literal: str) -> None:
     assert len(_LITERALS) == 17
@@ -172,6 +173,7 @@ def test_longer_product_keeps_its_bound() -> None:
     assert f"| {limit:.0f} u³ |" in PAGE
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("path", "old", "new", "name"),
     [

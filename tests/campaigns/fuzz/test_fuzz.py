@@ -147,6 +147,7 @@ def test_scene_comes_through_a_pipe() -> None:
     assert "I = (3, 2, 1) kg m2" in done.stdout
 
 
+@pytest.mark.campaign
 def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> None:
     """Regression test: UnicodeEncodeError; the picture read a name with dollars as a formula."""
     path = tmp_path / "\udcff ü.toml"
@@ -256,6 +257,7 @@ def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> Non
             solve(scene, [0.7], method, 1e-9)
 
 
+@pytest.mark.campaign
 def test_limits_of_a_scene_that_its_solver_can_not_begin() -> None:
     """Regression test: AttributeError, because no rows are a list, not an array."""
     coefficients = (1.1e-16, 1.1e-16, 4.4e17)

@@ -113,6 +113,7 @@ def _drawn(seed: str, n: int) -> list[Mutation]:
     return list(islice(draw(seed), n))
 
 
+@pytest.mark.campaign
 def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
     first = [(each.file, each.id) for each in _drawn("a", 2)]
     assert first == [(each.file, each.id) for each in _drawn("a", 2)]
@@ -120,6 +121,7 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
     assert len(set(first)) == 2
 
 
+@pytest.mark.campaign
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
     short = ("dynamics/system.py", "modern/tape.f90", "checks/kinds.py", "methods/sides.py")
@@ -157,6 +159,7 @@ def test_every_language_has_its_share() -> None:
     assert not any("report" in file or "picture" in file for file in files())
 
 
+@pytest.mark.campaign
 def test_names_are_unique_and_the_change_is_one() -> None:
     for file in ("pyharness/methods/gauss.py", "fortran/modern/sphere.f90"):
         found = mutations(file)

@@ -33,7 +33,7 @@ def main(arguments: Sequence[str]) -> int:
         PASSED.write_text(_git("rev-parse", "HEAD"))
         return 0
     paths = changed(arguments[0] if arguments else PASSED.read_text().strip())
-    folders = tests_of(paths)
+    folders = campaigns_of(paths)
     if not folders:
         print("test-changed: no package with campaign tests differs")
         return 0
@@ -55,7 +55,7 @@ def changed(base: str) -> list[str] | None:
         return None
 
 
-def tests_of(paths: Sequence[str] | None) -> list[str]:
+def campaigns_of(paths: Sequence[str] | None) -> list[str]:
     """Return the folders and files of tests that belong to changed files; all for None."""
     found: set[str] = set()
     for path in ["meson.build"] if paths is None else paths:

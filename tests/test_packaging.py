@@ -77,6 +77,7 @@ def _mypy(folder: Path, *scripts: Path) -> tuple[set[tuple[str, int]], str]:
     return {(Path(name).name, int(line)) for name, line in found}, done.stdout
 
 
+@pytest.mark.campaign
 def test_types_accept_what_runs_and_refuse_what_does_not(tmp_path: Path) -> None:
     mistakes = tmp_path / "mistakes.py"
     names = "Listing, Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset"

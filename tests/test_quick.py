@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.changed import campaigns_of
 from tests.changed import changed as changed_since
-from tests.changed import tests_of
 from tests.quick import ROOT, main, nearest, sources
 
 TESTS = {
@@ -94,5 +94,5 @@ def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) ->
     ],
 )  # fmt: skip
 def test_campaigns_of_what_differs(paths: list[str] | None, wanted: list[str]) -> None:
-    assert tests_of(paths) == wanted
+    assert campaigns_of(paths) == wanted
     assert changed_since("no-such-commit") is None

@@ -10,7 +10,7 @@ TESTS = """
 import pytest, time
 def busy():
     begin = time.process_time()
-    while time.process_time() < begin + 0.1: pass
+    while time.process_time() < begin + 0.02: pass
 def test_long(): busy()
 @pytest.mark.campaign
 def test_marked(): busy()
@@ -30,7 +30,7 @@ def test_a_long_test_is_marked(
     mark: list[str], passed: list[str], failed: list[str],
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(tiers, "LIMIT", 0.05)
+    monkeypatch.setattr(tiers, "LIMIT", 0.01)
     monkeypatch.setattr(tiers, "_slowness", lambda: 1.0)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n campaign\n sampled\n")
     (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)

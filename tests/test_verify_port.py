@@ -31,6 +31,7 @@ def _run(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.campaign
 @pytest.mark.external
 def test_the_script_checks_the_port_in_c(tmp_path: Path) -> None:
     """The summary is added to that of the job, and all reports are of the same run."""

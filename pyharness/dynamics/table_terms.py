@@ -85,6 +85,8 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
+    Steps of the integration end where a pulse begins or ends.
+
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)

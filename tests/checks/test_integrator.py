@@ -201,6 +201,7 @@ def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
     assert _faults(record) == {"gyroscopic-sign", "quaternion-transposed"}
 
 
+@pytest.mark.campaign
 def test_every_planted_fault_is_named() -> None:
     found = list(self_test(command_of(RK4), problems("plants", 1)))
     assert [each.plant for each in found] == [None, *PLANTS]
@@ -211,6 +212,7 @@ def test_every_planted_fault_is_named() -> None:
     assert {each.name for each in PLANTS} <= known
 
 
+@pytest.mark.campaign
 def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "faulty.py"
     path.write_text(RK4.read_text().replace("0.5 * (-b", "0.6 * (-b"))
@@ -219,6 +221,7 @@ def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Cap
     assert "FAILED control" in capsys.readouterr().out
 
 
+@pytest.mark.campaign
 def test_drawn_integrators_have_the_right_verdict() -> None:
     """The campaign draws more of them: a wrong one fails, and its fault is named or unknown."""
     chosen = problems("drawn", 1, ["free", "wave"])
@@ -354,6 +357,7 @@ def test_an_integrator_that_forgets_its_request_is_noticed(tmp_path: Path, capsy
     assert checks["integrator/repeated/free-0"]["value"] == 1.0
 
 
+@pytest.mark.campaign
 def test_single_precision_and_no_attitude(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "single.py"
     text = RK4.read_text().replace(
@@ -369,6 +373,7 @@ def test_single_precision_and_no_attitude(tmp_path: Path, capsys: Capture) -> No
     _json(capsys, command_of(path), "--draws", "1", "--seed", "single", "--order", "4", status=1)
 
 
+@pytest.mark.campaign
 def test_pictures_and_reports_are_written(tmp_path: Path, capsys: Capture) -> None:
     picture, page = tmp_path / "i.svg", tmp_path / "page.md"
     words = ["verify", "--integrator", command_of(RK4), "--cell", "free-0", "--seed", "p"]

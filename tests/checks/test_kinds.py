@@ -214,6 +214,7 @@ def test_record_that_was_changed_fails_and_is_mended(
     assert path.read_text() == good
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("damage", ["junk=", "x = 1\n", "trajectory = 3\n", "\xff", ""])
 def test_record_that_is_none_is_told_in_one_line_and_mended(
     damage: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

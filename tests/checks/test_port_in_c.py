@@ -18,6 +18,7 @@ SEED = "port"
 pytestmark = pytest.mark.external
 
 
+@pytest.mark.campaign
 def test_the_port_in_c_has_the_twins_bits(tmp_path: Path) -> None:
     """The C library of the port has the same sines and cosines as Python."""
     command = compiled_port(tmp_path)

@@ -98,6 +98,7 @@ def test_draws_come_after_the_cells_of_the_same_programs() -> None:
     assert random_cells("s", 5, ["two-term"]) == []
 
 
+@pytest.mark.campaign
 def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
     """All faults have an effect in the cells, and their names are different."""
     assert len(PLANTS) >= 40

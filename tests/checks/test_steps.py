@@ -30,6 +30,7 @@ from tests.checks.stressed import checks_of
 FIGURES = Path(__file__).parent.parent.parent / "docs/figures"
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("only", "limits"),
     [

@@ -153,6 +153,7 @@ def test_interrupt_during_an_import_ends_in_a_line(module: str) -> None:
     assert found.stderr == "pyharness: interrupted\n"
 
 
+@pytest.mark.campaign
 def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
     verbs = ["compare", "verify", "here", "processes", "dask"]
     for each in trials(5, 4.0, 2, signal.SIGINT, verbs):

@@ -142,6 +142,7 @@ def test_strict_takes_what_is_sensitive_for_a_failure(capsys: Capture) -> None:
         assert capsys.readouterr().out
 
 
+@pytest.mark.campaign
 def test_compare_tells_of_the_growth_of_the_motion(printed: Printed) -> None:
     record = _record(printed, _BESIDE)
     assert record["sensitive"] is True
@@ -218,6 +219,7 @@ def test_scene_file_on_the_command_line(capsys: Capture, tmp_path: Path) -> None
         assert bool(words) == bool(captured.err)
 
 
+@pytest.mark.campaign
 def test_files_are_written_whole(printed: Printed, tmp_path: Path) -> None:
     out, picture = tmp_path / "found.json", tmp_path / "found.png"
     assert printed(f"compare --case 3 --format json --out {out} --plot {picture}") == ""

@@ -109,6 +109,7 @@ WRONG: tuple[Any, ...] = (
 )
 
 
+@pytest.mark.campaign
 def test_what_the_schema_refuses_the_reader_refuses() -> None:
     source = Random("schema 2611")
     scenes = [tomllib.loads(path.read_text()) for path in FILES]

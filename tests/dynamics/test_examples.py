@@ -37,6 +37,7 @@ def test_every_program_is_an_example() -> None:
     assert len(programs) == 6
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", draw.PLOTS)
 def test_end_is_that_of_scipy(name: str) -> None:
     found = example(name)

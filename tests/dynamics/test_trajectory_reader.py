@@ -536,6 +536,7 @@ def test_wrong_value_of_the_header_is_refused(name: str, value: Any, tmp_path: P
         load(tmp_path / "found.npz")
 
 
+@pytest.mark.campaign
 def test_each_value_of_the_header_is_checked(tmp_path: Path) -> None:
     saved = replace(
         with_attitude(scene_with(written, moments=CHANGING)), stop=of_program("runge-kutta", 2).stop

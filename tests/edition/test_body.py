@@ -91,6 +91,7 @@ def test_the_closed_form_is_that_of_fortran_to_a_few_units_in_the_last_place() -
     assert np.median(found) <= 2.0**-53
 
 
+@pytest.mark.campaign
 def test_the_closed_form_is_true() -> None:
     """Compare with decimal and with integer arithmetic; neither uses a theta function."""
     source = random.Random(1982)

@@ -195,6 +195,7 @@ def test_the_readme_lists_every_file(package: Package) -> None:
     assert sorted(listed) == sorted({*package} - {"README.md"})
 
 
+@pytest.mark.campaign
 def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
     """Another process with other settings writes the same bytes, and without optional packages."""
     script = (

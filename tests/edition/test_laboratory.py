@@ -41,6 +41,7 @@ def ask(body: str, given: Any) -> Any:
     return run_javascript(modules, body, data=data(), given=given)
 
 
+@pytest.mark.campaign
 def test_printer_pages_are_those_of_the_program() -> None:
     cells = list(itertools.product(case_numbers(), PROGRAMS, ("original", "corrected"), (100, 300)))
     found = ask(
@@ -111,6 +112,7 @@ def _words() -> list[str]:
     return found
 
 
+@pytest.mark.campaign
 def test_states_go_round_through_words_and_mean_what_the_command_line_means(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -217,6 +219,7 @@ def _motions() -> list[Scene]:
     return found + [replace(scene, steps=min(scene.steps, 30)) for scene in drawn]
 
 
+@pytest.mark.campaign
 def test_the_reference_is_the_decimal_one_to_rounding() -> None:
     scenes = _motions()
     given = [{"scene": requested_scene(scene), "times": scene.times()} for scene in scenes]
@@ -229,6 +232,7 @@ def test_the_reference_is_the_decimal_one_to_rounding() -> None:
         assert error < 1e-15 * max(1.0, growth), (scene, error)
 
 
+@pytest.mark.campaign
 def test_rounding_of_the_reference_does_not_add_up() -> None:
     scenes = [replace(case_scene(number), steps=MOST_STEPS) for number in (2, 3, 4)]
     given = [{"scene": requested_scene(scene), "times": scene.times()} for scene in scenes]
@@ -456,6 +460,7 @@ def test_what_a_pin_has_wrong_is_told(pin: str, told: str) -> None:
     assert fragment.endswith("listing=original")
 
 
+@pytest.mark.campaign
 def test_limits_are_those_that_python_computes() -> None:
     cells = [(n, program) for n in case_numbers() for program in ("two-term", "runge-kutta")]
     body = """return given.map(([number, program]) => {
@@ -496,6 +501,7 @@ def _switched() -> Iterator[str]:
             yield words + (f"&keep={keep}" if keep else "")
 
 
+@pytest.mark.campaign
 def test_every_program_converges_to_its_limit() -> None:
     body = """const distance = (state, parts) => {
         const finer = { ...state, stepSize: state.stepSize / parts, steps: state.steps * parts };

@@ -194,6 +194,7 @@ def test_what_others_wrote_is_what_its_checksum_says() -> None:
             assert hashlib.sha256(files[name].read_bytes()).hexdigest() == digest
 
 
+@pytest.mark.campaign
 def test_two_builds_have_the_same_bytes(
     built_site: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:

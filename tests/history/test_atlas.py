@@ -80,6 +80,7 @@ def test_numbers_beside_the_page_are_those_beside_its_picture() -> None:
         )
 
 
+@pytest.mark.campaign
 def test_a_chunk_of_the_atlas_has_the_stored_means() -> None:
     """Compute the directions of one magnitude, with the adopted assumptions, over 100 steps."""
     sweep = read_sweep(ATLAS / "history.toml", FUNCTIONS)
@@ -93,6 +94,7 @@ def test_a_chunk_of_the_atlas_has_the_stored_means() -> None:
         assert sum_of_points([codes]).mean() == pytest.approx(told, abs=1e-3)
 
 
+@pytest.mark.campaign
 def test_an_atlas_is_told_and_drawn(coarse: str, printed: Printed, tmp_path: Path) -> None:
     picture = tmp_path / "atlas.svg"
     text = printed(f"claims {coarse} --plot {picture}")

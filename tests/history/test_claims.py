@@ -417,6 +417,7 @@ def test_a_verdict_that_turns_on_either_side_does_not_survive(
     assert not any(each.survives for each in survivals)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("word", ["cdc48", "cdc48-rounded"])
 def test_programs_run_in_the_word_that_is_assumed(word: str) -> None:
     """The verdicts about stops are those of binary64; the numbers are the word's."""

@@ -50,6 +50,7 @@ def _rows(finding: FigureFinding, curve: str) -> np.ndarray:
     return np.array([[row[2], *row[4:]] for row in table if row[0] == curve], dtype=float)
 
 
+@pytest.mark.campaign
 def test_figure_is_the_same_bytes_in_every_form_and_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found: dict[str, FigureFinding]
 ) -> None:

@@ -48,6 +48,7 @@ def test_a_page_tells_its_word(
     assert {(each.listing == "corrected") for each in found if each.is_whole} == {mended}
 
 
+@pytest.mark.campaign
 def test_every_program_and_case_is_tried(tmp_path: Path) -> None:
     lines = read_page(printed(tmp_path, "four-term", 4, "binary64"))
     best = fits(lines, ["two-term", "four-term", "runge-kutta"], range(1, 8))[0]

@@ -44,6 +44,7 @@ def test_symmetric_matrix_does_not_mind_being_transposed() -> None:
     assert same.all()
 
 
+@pytest.mark.campaign
 def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
     """In 24 bits the error has the size of their rounding; on the CDC it is far below the print.
 

@@ -67,6 +67,7 @@ def test_error_is_known_and_taken_off(untaken: as_written.Solve) -> None:
     assert max(held) < 0.3
 
 
+@pytest.mark.campaign
 def test_growth_is_that_of_differences() -> None:
     ratios = [
         (found.growth or 0.0) / of.truth.growth

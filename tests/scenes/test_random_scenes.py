@@ -1,6 +1,7 @@
 """Random scenes: a seed gives the same scenes as when it was first used."""
 
 import hashlib
+import re
 from itertools import islice
 from random import Random
 
@@ -47,7 +48,9 @@ def test_scenes_of_trials_are_as_they_were(kind: str, recorded: str) -> None:
 
 def test_scenes_with_times_are_as_they_were() -> None:
     found = [list(islice(timed_scenes(kind, [1982, 3]), 40)) for kind in timed_kinds.KINDS]
-    assert digest(found) == "58852fc320a89988"
+    # The last digits of powers depend on the processor.
+    rounded = re.sub(r"-?\d+\.\d+(e[-+]\d+)?", lambda m: f"{float(m[0]):.12g}", repr(found))
+    assert digest(rounded) == "6f241ee7b5f47c5a"
 
 
 def test_other_motions_are_as_they_were() -> None:

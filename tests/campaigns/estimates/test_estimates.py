@@ -62,6 +62,7 @@ def _apart(one: Truth, other: Truth) -> np.ndarray:
     return np.concatenate([omega[-1], small])
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", SCENES)
 def test_truth_is_that_of_the_reference(name: str) -> None:
     scene, time = SCENES[name]

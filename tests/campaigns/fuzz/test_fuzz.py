@@ -31,6 +31,7 @@ EXAMPLES = {
 BODY = "[body]\nmoments=[3,2,1]\n[initial]\nomega=[1,2,3]\n"
 
 
+@pytest.mark.campaign
 @pytest.mark.property
 @pytest.mark.parametrize("kind", [kind for kind, count in EXAMPLES.items() if count])
 def test_random_input_is_solved_or_refused_in_one_line(kind: str, tmp_path: Path) -> None:

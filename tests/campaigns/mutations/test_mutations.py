@@ -212,6 +212,7 @@ def test_planted_mutations_and_their_tests_are_there() -> None:
         assert f"def {name}(" in (ROOT / path).read_text()
 
 
+@pytest.mark.campaign
 def test_equivalent_ones_are_argued_and_still_there() -> None:
     known = equivalent()
     assert stale(known) == []

@@ -18,6 +18,7 @@ TESTS = {
 }
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("path", "wanted"),
     [
@@ -48,6 +49,7 @@ def test_every_source_has_tests() -> None:
     assert [name for name in names if not nearest([name], tests)] == []
 
 
+@pytest.mark.campaign
 def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
     cases = [
         (60.0, "pass", 0, "2 tests passed of 2"),

@@ -16,6 +16,7 @@ def test_long(): busy()
 def test_marked(): busy()
 def test_short(): pass
 @pytest.mark.sampled
+@pytest.mark.campaign
 @pytest.mark.parametrize("n", [1, 2])
 def test_some(n): pass
 """

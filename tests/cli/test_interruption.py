@@ -160,7 +160,7 @@ def test_commands_interrupted_at_random_moments_end_in_a_line() -> None:
         assert each.outcome in ("interrupted", "interpreter's", "had ended"), each
 
 
-@pytest.mark.sampled
+@pytest.mark.campaign
 @pytest.mark.parametrize("executor", ["processes", "dask"])
 def test_workers_end_with_the_process_that_started_them(executor: str, tmp_path: Path) -> None:
     pytest.importorskip("distributed")

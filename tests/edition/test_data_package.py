@@ -98,6 +98,7 @@ def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: 
         assert row.split() == " ".join([kind, str(len(of_kind)), *told]).split()
 
 
+@pytest.mark.campaign
 def test_outputs_of_verbs_are_in_the_package(package: Package, printed: Printed) -> None:
     assert package["claims.json"].decode() == printed("claims --format json")
     assert package["apparatus.json"].decode() == printed("defects --format json")

@@ -158,7 +158,7 @@ def test_starts_and_times_of_other_kinds_are_converted() -> None:
     assert solver([1.0, 2.0, 3.0], 10**300).tolist() == pytest.approx([np.nan] * 3, nan_ok=True)
 
 
-@pytest.mark.sampled
+@pytest.mark.campaign
 def test_call_leaks_no_reference() -> None:
     solver, start, out = prepare(case_scene(2)), np.array([0.0, 1.0, 10.0]), np.empty(3)
     single = start.astype("f4")

@@ -77,6 +77,7 @@ def test_growth_is_that_of_differences() -> None:
     assert 0.4 < min(ratios) <= max(ratios) < 2.5
 
 
+@pytest.mark.campaign
 def test_march_made_again_knows_it_well() -> None:
     ratios = [
         (found.growth or 0.0) / of.truth.growth

@@ -30,13 +30,8 @@ _OTHERS = (
 
 
 def table(name: str) -> dict[str, str]:
-    """Return the rows of all tables whose file names begin with a name."""
-    found: dict[str, str] = {}
-    for path in sorted(HERE.glob(f"{name}*.toml")):
-        rows = tomllib.loads(path.read_text())
-        assert not set(rows) & set(found), path
-        found |= rows
-    return found
+    """Return the rows of a table."""
+    return tomllib.loads((HERE / f"{name}.toml").read_text())
 
 
 CALLS, COMMANDS, FILES = (table(name) for name in ("calls", "commands", "files"))

@@ -10,28 +10,31 @@ TESTS = """
 import pytest, time
 def busy():
     begin = time.process_time()
-    while time.process_time() < begin + 0.02: pass
+    while time.process_time() < begin + 0.2: pass
 def test_long(): busy()
 @pytest.mark.campaign
 def test_marked(): busy()
 def test_short(): pass
+first = []
+def test_slow_once():
+    if not first: first.append(busy())
 @pytest.mark.sampled
-@pytest.mark.campaign
 @pytest.mark.parametrize("n", [1, 2])
 def test_some(n): pass
 """
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("mark", "passed", "failed"),
-    [(["-m", tiers.FAST], ["test_short", "test_some[1]"], ["test_long"]),
+    [(["-m", tiers.FAST], ["test_short", "test_slow_once", "test_some[1]"], ["test_long"]),
      ([], ["test_long", "test_marked", "test_short", "test_some[1]", "test_some[2]"], [])],
 )  # fmt: skip
 def test_a_long_test_is_marked(
     mark: list[str], passed: list[str], failed: list[str],
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(tiers, "LIMIT", 0.01)
+    monkeypatch.setattr(tiers, "LIMIT", 0.1)
     monkeypatch.setattr(tiers, "_slowness", lambda: 1.0)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n campaign\n sampled\n")
     (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)

@@ -93,7 +93,7 @@ def test_heyoka_refuses_what_it_cannot_evaluate() -> None:
 CONTENDERS = [*term_methods(), *term_peers(SCENES)]
 
 
-@pytest.mark.sampled
+@pytest.mark.campaign
 @pytest.mark.parametrize("contender", CONTENDERS, ids=lambda each: each.name)
 def test_contender_comes_to_the_truth(contender: Any) -> None:
     if not contender.is_installed:

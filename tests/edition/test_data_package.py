@@ -337,6 +337,7 @@ def test_the_command_writes_the_package(
     assert (folder / "notes.txt").read_text() == "mine"
 
 
+@pytest.mark.campaign
 def test_the_examples_of_the_guide_run(
     package: Package, tmp_path: Path, printed: Printed, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -151,6 +151,7 @@ def test_any_text_is_a_torque_or_one_line(text: str) -> None:
     _is_torque_or_one_line(text)
 
 
+@pytest.mark.campaign
 @settings(max_examples=1500, deadline=2000, derandomize=True, database=None)
 @given(st.lists(st.sampled_from(_PIECES), max_size=40).map("".join))
 def test_any_sequence_of_words_is_a_torque_or_one_line(text: str) -> None:

@@ -32,7 +32,9 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     begin, modules = _spent(), len(sys.modules)
     result = yield
     seconds = _spent() - begin
-    is_judged = item.config.option.markexpr == FAST and len(sys.modules) - modules < _MODULES
+    # The build with run-time checks is slow.
+    is_fast = item.config.option.markexpr == FAST and "PYHARNESS_TRAPS" not in os.environ
+    is_judged = is_fast and len(sys.modules) - modules < _MODULES
     if is_judged and seconds > LIMIT and _again(item, seconds) > LIMIT * _slowness():
         pytest.fail(
             f"took {seconds:.1f} s of CPU, allowed is {LIMIT:g} s: make it smaller, or mark it "

@@ -313,6 +313,7 @@ def test_assumptions_reach_the_runs() -> None:
     assert changed.listing("two-term").readings == frozenset()
 
 
+@pytest.mark.campaign
 def test_claims_in_every_form(capsys: Capture) -> None:
     def told(*options: str) -> str:
         assert main(["claims", *options]) == 0

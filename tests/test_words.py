@@ -14,7 +14,7 @@ LIMITS = {"CHANGELOG.md": 1500, "README.md": 700}
 # Outside the public API, functions whose docstring has more lines than their body.
 LONGER = 60
 # Share of the sequences of four words that occurred before on the page.
-REPEATED = 0.016
+REPEATED = 0.015
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|^\|[^\n]*\|$|\]\([^)\n]*\)", re.DOTALL | re.MULTILINE)
 _DEFINITIONS = (ast.Module, ast.ClassDef, ast.FunctionDef)
 

@@ -18,13 +18,13 @@ from pyharness import (
     torques,
 )
 from tests.refusals.names_cli import *  # noqa: F403
+from tests.refusals.names_cli import BRICK
 from tests.refusals.names_model import *  # noqa: F403
 
 __all__ = ["BRICK", "IN_SPACE", "SHRINKING", "WEAK", "SimpleNamespace", "case_scene", "events",
            "inf", "nan", "np", "opaque", "pi", "pyharness", "replace",
            "torques"]  # fmt: skip
 
-BRICK = Scene("brick", (0.1, 1.0, 0.2), moments=(1.0, 2.0, 2.5))
 IN_SPACE = replace(BRICK, torque=TorqueLaw((1.0, 0.0, 0.0), frame="space"))
 # For the method `averaged`.
 WEAK = replace(BRICK, omega=(0.3, 0.2, 1.1), torque=TorqueLaw((1e-6, 2e-6, 1e-6)))

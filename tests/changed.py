@@ -21,6 +21,7 @@ TESTS = {
     ".ci/": (), "verify-port/": ("test_verify_port.py",), "tests/messages.txt": (),
     "tests/passed.txt": (), "web/": ("edition", "browser"),
     "pyharness/edition/": ("edition", "browser"),
+    "tests/changed.py": ("test_quick.py",), "tests/quick.py": ("test_quick.py",),
     "pyharness/data/": ("history", "original", "edition"), "fortran/original/": ("original",),
 }  # fmt: skip
 # Packages on which nearly all others depend.
@@ -63,11 +64,13 @@ def campaigns_of(paths: Sequence[str] | None) -> list[str]:
         parts = PurePosixPath(path).parts
         if begin is not None:
             found.update(f"tests/{name}" for name in TESTS[begin])
-        elif parts[0] == "tests" and (ROOT / path).exists() and len(parts) > 2:
-            found.add(path if parts[-1].startswith("test_") else "/".join(parts[:-1]))
+        elif parts[0] == "tests" and parts[-1].startswith("test_"):
+            found.add(path)
+        elif parts[0] == "tests" and len(parts) > 2:
+            found.add("/".join(parts[:-1]))
         elif parts[0] == "pyharness" and len(parts) > 2 and not path.startswith(SHARED):
             found.add(f"tests/{parts[1]}")
-        elif not (parts[0] == "tests" and not (ROOT / path).exists()):
+        else:
             return ["tests"]
     return sorted(each for each in found if (ROOT / each).exists())
 

@@ -12,7 +12,13 @@ import pytest
 from pyharness.checks.port import port, random_cells
 from tests.ports import C_FLAGS, TEMPLATE, compiled_port, sample
 
-FAULTS = tomllib.loads((Path(__file__).parent / "port_in_c.toml").read_text())["fault"]
+TABLES = tomllib.loads(Path(__file__).with_name("port_in_c.toml").read_text())
+FAULTS = [
+    {"what": what, "cell": cell, "seen": seen, "from": texts[0], "to": texts[1]}
+    for cell, results in TABLES.items()
+    for seen, faults in results.items()
+    for what, texts in faults.items()
+]
 SOURCE = (TEMPLATE / "port.c").read_text()
 SEED = "port"
 pytestmark = pytest.mark.external

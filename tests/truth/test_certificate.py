@@ -10,7 +10,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
 from itertools import pairwise
-from math import nextafter
+from math import factorial, nextafter
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -28,17 +28,12 @@ from tests import intervals
 from tests.campaigns import lohner
 
 Record = dict[str, Any]
-WAVES = Scene(
-    "waves",
-    (0.3, -1.0, 2.0),
-    moments=(40.0, 30.0, 20.0),
-    torque=TorqueLaw(
-        (1.0, -2.0, 0.3),
-        (0.1, 0.0, -7.0),
-        sines=[((3.0, 0.0, 1.0), 5.0), ((0.0, 1e-3, 0.0), 100.0), ((1.0, 1.0, 1.0), 0.0)],
-        cosines=[((0.0, 2.0, -1.0), -0.7), ((0.1, 0.2, -1.0), 5.0)],
-    ),
-)
+LAW = TorqueLaw(
+    (1.0, -2.0, 0.3), (0.1, 0.0, -7.0),
+    sines=[((3.0, 0.0, 1.0), 5.0), ((0.0, 1e-3, 0.0), 100.0), ((1.0, 1.0, 1.0), 0.0)],
+    cosines=[((0.0, 2.0, -1.0), -0.7), ((0.1, 0.2, -1.0), 5.0)],
+)  # fmt: skip
+WAVES = Scene("waves", (0.3, -1.0, 2.0), moments=(40.0, 30.0, 20.0), torque=LAW)
 TOP = Scene("top", (0.1, 0.7, 1.3), coefficients=(0.5, -0.25, 0.125))
 SCENES = {
     "case 3": (case_scene(3), 0.7),
@@ -50,15 +45,9 @@ SCENES = {
 }
 # The kinds of random scenes whose numbers are neither huge nor tiny.
 KINDS = (
-    "plain",
-    "near-symmetric",
-    "near-separatrix",
-    "violent torque",
-    "from rest",
-    "slow waves",
-    "many speeds",
-    "coefficients",
-)
+    "plain", "near-symmetric", "near-separatrix", "violent torque", "from rest", "slow waves",
+    "many speeds", "coefficients",
+)  # fmt: skip
 
 
 @cache
@@ -136,14 +125,19 @@ def test_moments_of_a_principal_scene_are_exact() -> None:
     assert check(certificate) > 0
 
 
+def begun(record: Record) -> tuple[System, list[int], list[int]]:
+    """Return the system of a certificate, its omega and its waves at time 0."""
+    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
+    omega = [int(Fraction(x) * 2 ** record["bits"]) for x in record["scene"]["omega"]]
+    return system, omega, [0, 1 << record["bits"]] * len(system.frequencies)
+
+
 def replayed(record: Record) -> tuple[System, list[tuple[int, int, list[list[int]], int]]]:
     """Return the system, and for each step its begin, length, polynomials and radius.
 
     The last entry has the end of the last step.
     """
-    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
-    middle = [int(Fraction(x) * 2 ** record["bits"]) for x in record["scene"]["omega"]]
-    waves = [0, 1 << record["bits"]] * len(system.frequencies)
+    system, middle, waves = begun(record)
     time, found = 0, []
     for h, _, radius, after in record["steps"]:
         series = system.expand([*middle, *waves], time, h, record["order"])[0]
@@ -162,121 +156,49 @@ def stated(
     return decimals(Balls(tuple(Fraction(x, unit) for x in middle), size / unit))
 
 
-def _digit(source: Random, text: str, first: int, last: int) -> str:
-    """Return a decimal string with another digit in a place of a range."""
-    places = [n for n, each in enumerate(text) if each.isdigit() and first <= n < last]
-    place = source.choice(places)
+def digit(source: Random, text: str, last: int) -> str:
+    """Return a decimal string with another digit in a place before the last."""
+    place = source.choice([n for n, each in enumerate(text[:last]) if each.isdigit()])
     other = source.choice([each for each in "0123456789" if each != text[place]])
     return text[:place] + other + text[place + 1 :]
 
 
-def _step(source: Random, record: Record) -> list[Any]:
-    step: list[Any] = source.choice(record["steps"])
-    return step
+def put(holder: Any, key: Any, value: Any) -> None:
+    """Put a value at a place, or a function of what is there."""
+    holder[key] = value(holder[key]) if callable(value) else value
 
 
-def _middle(source: Random, record: Record) -> None:
-    middle = _step(source, record)[3]
-    axis = source.randrange(3)
-    text = str(middle[axis])
-    middle[axis] = int(_digit(source, text, 0, len(text)))
+def a_step(source: Random, record: Record) -> Any:
+    return source.choice(record["steps"])
 
 
-def _least_digit(source: Random, record: Record) -> None:
-    _step(source, record)[3][source.randrange(3)] += source.choice((-1, 1))
+def a_row(source: Random, record: Record) -> Any:
+    return source.choice(record["rows"])
 
 
-def _stated(source: Random, record: Record) -> None:
-    step = _step(source, record)
-    step[2] = source.choice((step[2] - 1, step[2] // 2, 0, -step[2]))
+def sign(source: Random, record: Record) -> None:
+    step = a_step(source, record)
+    holder, key = (step, 0) if source.random() < 0.4 else (step[3], source.randrange(3))
+    holder[key] *= -1
 
 
-def _tube(source: Random, record: Record) -> None:
-    place = source.randrange(1, len(record["steps"]))
-    # The error at the begin of the step is outside the tube.
-    record["steps"][place][1] = source.randint(-5, record["steps"][place - 1][2])
-
-
-def _length(source: Random, record: Record) -> None:
-    step = _step(source, record)
-    step[0] = source.choice((step[0] + 1, step[0] * 2, step[0] * 1000, step[0] * 3 // 2 + 1))
-
-
-def _sign(source: Random, record: Record) -> None:
-    step = _step(source, record)
-    if source.random() < 0.4:
-        step[0] = -step[0]
-    else:
-        axis = source.randrange(3)
-        step[3][axis] = -step[3][axis]
-
-
-def _shortened(source: Random, record: Record) -> None:
-    del record["steps"][source.randrange(len(record["steps"]))]
-
-
-def _swapped(source: Random, record: Record) -> None:
-    place = source.randrange(1, len(record["steps"]))
-    record["steps"][place - 1 : place + 1] = record["steps"][place - 1 : place + 1][::-1]
-
-
-def _doubled(source: Random, record: Record) -> None:
-    place = source.randrange(len(record["steps"]))
-    record["steps"].insert(place, record["steps"][place])
-
-
-def _omega(source: Random, record: Record) -> None:
-    axis = source.randrange(3)
-    omega = record["scene"]["omega"]
-    omega[axis] = source.choice((-omega[axis], nextafter(omega[axis], 9.0), omega[axis] + 1e-9))
-
-
-def _body(source: Random, record: Record) -> None:
-    scene, axis = record["scene"], source.randrange(3)
-    body = scene["moments" if "moments" in scene else "coefficients"]
-    body[axis] = source.choice((1.5 * body[axis], nextafter(body[axis], 100.0)))
-
-
-def _amplitude(source: Random, record: Record) -> None:
+def amplitude(source: Random, record: Record) -> None:
     torque = record["scene"]["torque"]
     places = [each[0] for each in torque["sines"] + torque["cosines"]]
     place = source.choice([*places, torque["constant"], torque["rate"]])
-    axis = source.randrange(3)
-    place[axis] = source.choice((place[axis] + 1.0, place[axis] + 1e-9))
+    put(place, source.randrange(3), lambda x: source.choice((x + 1.0, x + 1e-9)))
 
 
-def _frequency(source: Random, record: Record) -> None:
+def frequency(source: Random, record: Record) -> None:
     torque = record["scene"]["torque"]
     torque["cosines"].append([[0.1, 0.2, 0.3], 2.0])
     wave = source.choice(torque["sines"] + torque["cosines"])
     wave[1] += source.choice((0.5, 1e-6))
 
 
-def _torque_sign(source: Random, record: Record) -> None:
-    torque = record["scene"]["torque"]
-    torque["constant"] = [-x - 1.0 for x in torque["constant"]]
-
-
-def _row_digit(source: Random, record: Record) -> None:
-    row, axis = source.choice(record["rows"]), source.randrange(3)
-    # The last digits are within the radius, which is at least 1e-24.
-    first = row["omega"][axis].index(".")
-    row["omega"][axis] = _digit(source, row["omega"][axis], 0, first + 18)
-
-
-def _row_radius(source: Random, record: Record) -> None:
-    row = source.choice(record["rows"])
-    row["radius"] *= source.choice((0.9, 0.5, 0.0, -1.0))
-
-
-def _row_time(source: Random, record: Record) -> None:
-    row = source.choice(record["rows"])
-    row["time"] = source.choice((nextafter(row["time"], 9.0), 2 * row["time"], 0.0))
-
-
-def _row_outside(source: Random, record: Record) -> None:
+def row_outside(source: Random, record: Record) -> None:
     """Move a row to a time in a step before or after its own, or in no step."""
-    row = source.choice(record["rows"])
+    row = a_row(source, record)
     clock = 1 << record["clock"]
     ends = [0.0]
     for h, *_ in record["steps"]:
@@ -286,7 +208,7 @@ def _row_outside(source: Random, record: Record) -> None:
     row["time"] = source.choice((*middles, -row["time"], 1.5 * ends[-1]))
 
 
-def _row_of_a_neighbour(source: Random, record: Record) -> None:
+def row_of_a_neighbour(source: Random, record: Record) -> None:
     """Take the middle and the radius of a row from the step before its own."""
     place, row = 0, record["rows"][-1]
     system, states = replayed(record)
@@ -296,7 +218,7 @@ def _row_of_a_neighbour(source: Random, record: Record) -> None:
     row["omega"], row["radius"] = stated(system, series, (time, h), radius, row["time"])
 
 
-def _row_radius_of_a_neighbour(source: Random, record: Record) -> None:
+def row_radius_of_a_neighbour(source: Random, record: Record) -> None:
     """Give a row the radius of the first step, with its own middle."""
     system, states = replayed(record)
     row = record["rows"][-1]
@@ -304,89 +226,109 @@ def _row_radius_of_a_neighbour(source: Random, record: Record) -> None:
     row["omega"], row["radius"] = stated(system, series, (time, h), states[0][3], row["time"])
 
 
-def _row_order(source: Random, record: Record) -> None:
-    record["rows"].reverse()
-
-
-def _order(source: Random, record: Record) -> None:
-    record["order"] = source.choice((record["order"] // 2, record["order"] - 3, 1, 0, -1))
-
-
-def _scales(source: Random, record: Record) -> None:
-    factor = source.choice((2, 4))
-    double = source.random() < 0.5
+def scales(source: Random, record: Record) -> None:
+    factor, double = source.choice((2, 4)), source.random() < 0.5
     record["scales"] = [x * factor if double else x // factor for x in record["scales"]]
 
 
-def _scale_sign(source: Random, record: Record) -> None:
-    record["scales"][source.randrange(3)] *= source.choice((0, -1))
-
-
-def _bits(source: Random, record: Record) -> None:
-    record["bits"] += source.choice((-3, -1, 1, 8))
-
-
-def _clock(source: Random, record: Record) -> None:
-    record["clock"] += source.choice((-3, -1, 1, 8, record["bits"]))
-
-
-def _no_integer(source: Random, record: Record) -> None:
+def no_integer(source: Random, record: Record) -> None:
     kind = source.choice((float, bool, str))
-    place: Any = source.choice(("bits", "clock", "order", "scales", "step", "middle"))
-    holder: Any = record
+    place = source.choice(("bits", "clock", "order", "scales", "step", "middle"))
     if place in {"scales", "step", "middle"}:
-        step = _step(source, record)
-        holder = {"scales": record["scales"], "step": step, "middle": step[3]}[place]
-        place = source.randrange(3)
-    holder[place] = kind(holder[place])
+        step = a_step(source, record)
+        lists = {"scales": record["scales"], "step": step, "middle": step[3]}
+        put(lists[place], source.randrange(3), kind)
+    else:
+        put(record, place, kind)
 
 
-def _missing(source: Random, record: Record) -> None:
+def missing(source: Random, record: Record) -> None:
     holder = source.choice((record, record["scene"], record["scene"]["torque"], record["rows"][0]))
     del holder[source.choice([each for each in holder if each != "name"])]
 
 
-def _unknown(source: Random, record: Record) -> None:
+def unknown(source: Random, record: Record) -> None:
     scene = record["scene"]
+    body = "coefficients" if "moments" in scene else "moments"
     choices: list[tuple[Record, str, Any]] = [
-        (scene["torque"], "frame", "space"),
-        (scene, "inertia", [[1.0]]),
-        (scene, "coefficients" if "moments" in scene else "moments", [1.0, 2.0, 1.5]),
-    ]
-    holder, key, value = source.choice(choices)
-    holder[key] = value
+        (scene["torque"], "frame", "space"), (scene, "inertia", [[1.0]]),
+        (scene, body, [1.0, 2.0, 1.5]),
+    ]  # fmt: skip
+    put(*source.choice(choices))
 
 
-def _format(source: Random, record: Record) -> None:
-    record["format"] = source.choice(("pyharness-certificate-1", None, 1))
-
-
-def _nothing(source: Random, record: Record) -> None:
-    record["rows"] = []
-    record["steps"] = record["steps"][: source.randrange(3)]
-
-
-def _other_list(source: Random, record: Record) -> None:
-    place = source.choice(("steps", "scales", "rows", "scene"))
-    record[place] = source.choice((None, 3, "steps", [[1]]))
-
-
-def _long_list(source: Random, record: Record) -> None:
-    choices = (record["scene"]["omega"], record["scales"], _step(source, record)[3])
-    place = source.choice((*choices, _step(source, record)))
+def long_list(source: Random, record: Record) -> None:
+    choices = (record["scene"]["omega"], record["scales"], a_step(source, record)[3])
+    place = source.choice((*choices, a_step(source, record)))
     if source.random() < 0.5:
         place.append(place[0])
     else:
         place.pop()
 
 
-FALSIFIED: dict[str, Callable[[Random, Record], None]] = {
-    name[1:]: function
-    for name, function in list(globals().items())
-    if name.startswith("_")
-    and callable(function)
-    and getattr(function, "__module__", "") == __name__
-    and name not in {"_digit", "_step"}
+# Changes of a record `r` by a source `s` of random numbers.
+FALSIFIED: dict[str, Callable[[Random, Record], object]] = {
+    "middle": lambda s, r: put(
+        a_step(s, r)[3], s.randrange(3), lambda x: int(digit(s, str(x), 9999))
+    ),
+    "least_digit": lambda s, r: put(
+        a_step(s, r)[3], s.randrange(3), lambda x: x + s.choice((-1, 1))
+    ),
+    "stated": lambda s, r: put(a_step(s, r), 2, lambda x: s.choice((x - 1, x // 2, 0, -x))),
+    # The error at the begin of the step is outside the tube.
+    "tube": lambda s, r: put(
+        r["steps"][n := s.randrange(1, len(r["steps"]))], 1, s.randint(-5, r["steps"][n - 1][2])
+    ),
+    "length": lambda s, r: put(
+        a_step(s, r), 0, lambda x: s.choice((x + 1, x * 2, x * 1000, x * 3 // 2 + 1))
+    ),
+    "sign": sign,
+    "shortened": lambda s, r: r["steps"].pop(s.randrange(len(r["steps"]))),
+    "swapped": lambda s, r: put(
+        r["steps"], slice(n := s.randrange(len(r["steps"]) - 1), n + 2), lambda x: x[::-1]
+    ),
+    "doubled": lambda s, r: r["steps"].insert(n := s.randrange(len(r["steps"])), r["steps"][n]),
+    "omega": lambda s, r: put(
+        r["scene"]["omega"], s.randrange(3), lambda x: s.choice((-x, nextafter(x, 9.0), x + 1e-9))
+    ),
+    "body": lambda s, r: put(
+        r["scene"].get("moments") or r["scene"]["coefficients"],
+        s.randrange(3),
+        lambda x: s.choice((1.5 * x, nextafter(x, 100.0))),
+    ),
+    "amplitude": amplitude,
+    "frequency": frequency,
+    "torque_sign": lambda s, r: put(
+        r["scene"]["torque"], "constant", lambda x: [-each - 1.0 for each in x]
+    ),
+    # The last digits are within the radius, which is at least 1e-24.
+    "row_digit": lambda s, r: put(
+        a_row(s, r)["omega"], s.randrange(3), lambda x: digit(s, x, x.index(".") + 18)
+    ),
+    "row_radius": lambda s, r: put(
+        a_row(s, r), "radius", lambda x: x * s.choice((0.9, 0.5, 0.0, -1.0))
+    ),
+    "row_time": lambda s, r: put(
+        a_row(s, r), "time", lambda x: s.choice((nextafter(x, 9.0), 2 * x, 0.0))
+    ),
+    "row_outside": row_outside,
+    "row_of_a_neighbour": row_of_a_neighbour,
+    "row_radius_of_a_neighbour": row_radius_of_a_neighbour,
+    "row_order": lambda s, r: r["rows"].reverse(),
+    "order": lambda s, r: put(r, "order", lambda x: s.choice((x // 2, x - 3, 1, 0, -1))),
+    "scales": scales,
+    "scale_sign": lambda s, r: put(r["scales"], s.randrange(3), lambda x: x * s.choice((0, -1))),
+    "bits": lambda s, r: put(r, "bits", lambda x: x + s.choice((-3, -1, 1, 8))),
+    "clock": lambda s, r: put(r, "clock", lambda x: x + s.choice((-3, -1, 1, 8, r["bits"]))),
+    "no_integer": no_integer,
+    "missing": missing,
+    "unknown": unknown,
+    "format": lambda s, r: put(r, "format", s.choice(("pyharness-certificate-1", None, 1))),
+    "nothing": lambda s, r: r.update(rows=[], steps=r["steps"][: s.randrange(3)]),
+    "other_list": lambda s, r: put(
+        r, s.choice(("steps", "scales", "rows", "scene")), s.choice((None, 3, "steps", [[1]]))
+    ),
+    "long_list": long_list,
 }
 
 
@@ -457,13 +399,10 @@ def test_every_digit_of_a_row_counts() -> None:
 def test_error_of_the_waves_counts() -> None:
     """An error of a sine changes omega by at most its amplitude over the moment, times the time."""
     record = genuine("waves")
-    system = System(record["scene"], record["bits"], record["clock"], record["scales"])
-    state = [int(Fraction(x) * 2 ** record["bits"]) for x in record["scene"]["omega"]]
-    waves = [0, 1 << record["bits"]] * len(system.frequencies)
+    system, omega, waves = begun(record)
     h = record["steps"][0][0]
-    expansion = system.expand([*state, *waves], 0, h, record["order"])
-    tube = 1 << record["bits"] - 10
-    wide = 1 << record["bits"] - 20
+    expansion = system.expand([*omega, *waves], 0, h, record["order"])
+    tube, wide = 1 << record["bits"] - 10, 1 << record["bits"] - 20
     narrow, _ = system.radii(3, 0, expansion, tube, h)
     wider, kept = system.radii(3, wide, expansion, tube, h)
     seconds = Fraction(h, 1 << record["clock"])
@@ -479,12 +418,9 @@ def test_bounds_of_a_step_are_upper_bounds() -> None:
     """The residual, at many points of a step, is at most its bound; so is an omitted term."""
     for name in ("waves", "before", "coefficients"):
         record = genuine(name)
-        system = System(record["scene"], record["bits"], record["clock"], record["scales"])
-        unit = 1 << record["bits"]
-        state = [int(Fraction(x) * unit) for x in record["scene"]["omega"]]
-        waves = [0, unit] * len(system.frequencies)
-        h = record["steps"][0][0]
-        series, residuals, wave_residual = system.expand([*state, *waves], 0, h, 6)
+        system, start, waves = begun(record)
+        unit, h = 1 << record["bits"], record["steps"][0][0]
+        series, residuals, wave_residual = system.expand([*start, *waves], 0, h, 6)
         length = Fraction(h, 1 << record["clock"])
         for s in (Fraction(n, 7) for n in range(8)):
             values = [sum(x * s**k for k, x in enumerate(each)) / unit for each in series]
@@ -510,46 +446,37 @@ def test_logarithmic_norm_is_an_upper_bound() -> None:
     """
     for name in ("case 3", "case 5", "coefficients"):
         record = genuine(name)
-        system = System(record["scene"], record["bits"], record["clock"], record["scales"])
-        unit, h = 1 << record["bits"], record["steps"][0][0]
-        tube = unit // 4
+        system, start, _ = begun(record)
+        h = record["steps"][0][0]
         # A constant polynomial, whose mean absolute value is exact.
-        omega = [Fraction(x) for x in record["scene"]["omega"]]
-        series = [[int(x * unit)] for x in omega]
-        bound = Fraction(system.growth(series, tube, h), certificate_checker.UNIT)
+        growth = system.growth([[x] for x in start], (1 << record["bits"]) // 4, h)
+        bound = Fraction(growth, certificate_checker.UNIT)
         scales = [x / 2**certificate_checker.SCALE_BITS for x in system.scales]
         a = [float(Fraction(terms[0], common)) for common, terms in system.rows]
         source = Random(name)
         for _ in range(200):
             x = [source.gauss(0.0, 1.0) for _ in range(3)]
-            y = [
-                float(w) + source.uniform(-0.25, 0.25) * s
-                for w, s in zip(omega, scales, strict=False)
-            ]
+            pairs = zip(record["scene"]["omega"], scales, strict=False)
+            y = [w + source.uniform(-0.25, 0.25) * s for w, s in pairs]
             moved = [
                 a[i] * (y[i - 2] * x[i - 1] * scales[i - 1] + y[i - 1] * x[i - 2] * scales[i - 2])
                 for i in range(3)
             ]
-            lower = sum(u * v / s for u, v, s in zip(x, moved, scales, strict=False)) / sum(
-                u * u for u in x
-            )
+            product = sum(u * v / s for u, v, s in zip(x, moved, scales, strict=False))
+            lower = product / sum(u * u for u in x)
             assert lower * abs(h) / 2 ** record["clock"] <= float(bound) * (1 + 1e-9)
 
 
 def test_exponential_and_mean_are_upper_bounds() -> None:
     unit = certificate_checker.UNIT
-    exact = sum(Fraction(1, 2**k) / _factorial(k) for k in range(40))
+    exact = sum(Fraction(1, 2**k * factorial(k)) for k in range(40))
     assert exact * unit <= certificate_checker.exponential(unit // 2) <= exact * unit + 99
-    whole = sum(Fraction(1) / _factorial(k) for k in range(40))
+    whole = sum(Fraction(1, factorial(k)) for k in range(40))
     assert whole * unit <= certificate_checker.exponential(unit) <= whole * unit + 999
     # The root mean square of 6 - 12 s from 0 to 1 is the root of 12.
     assert 12 * 10**12 <= certificate_checker.mean([6 * 10**6, -12 * 10**6]) ** 2 < 12.001 * 10**12
     assert certificate_checker.over(-7, 2) == -3
     assert certificate_checker.over(7, 2) == 4
-
-
-def _factorial(k: int) -> int:
-    return 1 if k < 2 else k * _factorial(k - 1)
 
 
 @pytest.mark.parametrize("x", [Fraction(12, 10**324), Fraction(1, 10**400), Fraction(1, 3), 0])
@@ -624,12 +551,8 @@ def test_checker_runs_as_a_script(tmp_path: Path) -> None:
     bad.write_text(json.dumps(record))
     script = str(certificate_checker.__file__)
     for names, status in (([good], 0), ([bad], 1), ([good, missing], 1)):
-        run = subprocess.run(
-            [sys.executable, "-I", script, *map(str, names)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command = [sys.executable, "-I", script, *map(str, names)]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
         assert (run.returncode, run.stderr) == (status, "")
         lines = run.stdout.splitlines()
         assert sum(line.startswith(f"{name}: ") for line in lines for name in names) == len(names)

@@ -264,11 +264,12 @@ EXEMPT = (
 
 def entries() -> list[tuple[str, str, str]]:
     """Return each part of a line, the weaker one, and the name of a forgery or an empty text."""
-    found = []
-    for block in (Path(__file__).with_name("weaker_lines.txt")).read_text().split("\n\n")[1:]:
-        marked = {line[0]: line[2:].replace("\\n", "\n") for line in block.splitlines()}
-        found.append((marked["-"], marked["+"], marked.get("=", "")))
-    return found
+    found: list[list[str]] = []
+    for line in Path(__file__).with_name("weaker_lines.txt").read_text().splitlines()[2:]:
+        if line[0] == "-":
+            found.append(["", "", ""])
+        found[-1]["-+=".index(line[0])] = line[2:].replace("\\n", "\n")
+    return [(old, new, name) for old, new, name in found]
 
 
 WEAKER = entries()

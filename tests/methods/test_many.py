@@ -2,14 +2,13 @@
 
 import tracemalloc
 from dataclasses import replace
-from functools import cache
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve, solve_many
+from pyharness import InputError, Scene, TorqueLaw, prepare, solve_many, torques
 from pyharness.methods import many_scenes
 from pyharness.methods.many import Ensemble
 from pyharness.methods.problem import normalized
@@ -17,9 +16,9 @@ from pyharness.methods.registry import FIXED_STEP
 from pyharness.methods.solver import CODES, PREPARED
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
-from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
-from tests.many_errors import KINDS, bodies, exceeding, scene_of
+from tests.many_errors import bodies, exceeding
+from tests.methods.tolerance_scenes import EDGES
 
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 
@@ -27,43 +26,6 @@ TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 def same(one: Ensemble, two: Ensemble) -> bool:
     """Return whether two ensembles have the same bits."""
     return one.omega.tobytes() == two.omega.tobytes() and np.array_equal(one.status, two.status)
-
-
-def only(drawn: dict[str, Any], rows: Any) -> dict[str, Any]:
-    """Return the arrays of some of the bodies."""
-    return {name: values[rows] for name, values in drawn.items()}
-
-
-@cache
-def truths(kind: str, n: int, seed: int) -> Array:
-    """Return omega of the bodies at the end; NaN where the error amplification is large."""
-    drawn = bodies(kind, n, seed)
-    ends = np.full((n, 3), np.nan)
-    for row in range(n):
-        truth = solve(scene_of(drawn, row), [drawn["t_end"][row]], "taylor", 1e-15)
-        if truth.has_all_rows and (truth.growth or np.inf) < 1e3:
-            ends[row] = truth.omega[-1]
-    return ends
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
-    drawn = bodies(kind, 60, 1982)
-    found = solve_many(TOP, tolerance=tolerance, **drawn)
-    truth = truths(kind, 60, 1982)
-    scale = np.maximum(np.abs(truth).max(axis=1), np.abs(drawn["omega0"]).max(axis=1))
-    off = np.abs(found.omega - truth).max(axis=1) / scale
-    assert np.count_nonzero(np.isfinite(off)) > 50
-    assert np.nanmax(off) <= tolerance + 4e-12
-    assert found.has_result.all()
-    # The results come from lanes: one by one they would have the single solver's bits.
-    alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(20)]
-    same = [
-        np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
-        for row, solver in enumerate(alone)
-    ]
-    assert np.count_nonzero(same) < 10
 
 
 @pytest.mark.sampled
@@ -93,40 +55,6 @@ def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float)
     assert np.count_nonzero(complete) > n / 2
     error = np.abs(found.omega - truth.omega).max(axis=1) / np.abs(truth.omega).max(axis=1)
     assert error[complete].max() <= tolerance
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_body_does_not_depend_on_the_others(kind: str, level: int) -> None:
-    n = 130
-    drawn = bodies(kind, n, 7)
-    whole = solve_many(TOP, **drawn).omega
-    order = np.random.default_rng(3).permutation(n)
-    assert np.array_equal(solve_many(TOP, **only(drawn, order)).omega, whole[order])
-    for count in (2, 7, 9, 63, 65):
-        assert np.array_equal(solve_many(TOP, **only(drawn, slice(count))).omega, whole[:count])
-
-
-@pytest.mark.sampled
-@pytest.mark.parametrize("kind", KINDS)
-def test_threads_change_no_bit(kind: str) -> None:
-    for n, counts in ((9, (2, 7)), (601, (2, 3, 7))):
-        drawn = bodies(kind, n, 11)
-        whole = solve_many(TOP, **drawn)
-        for threads in counts:
-            dealt = solve_many(TOP, threads=threads, **drawn)
-            assert np.array_equal(whole.omega, dealt.omega)
-            assert np.array_equal(whole.status, dealt.status)
-
-
-@pytest.mark.parametrize("case", range(1, 8))
-def test_every_case(case: int, level: int) -> None:
-    scene = case_scene(case)
-    starts = np.array(scene.omega) * np.linspace(0.5, 1.5, 30)[:, None]
-    many, status = prepare(scene).many(starts, 3.0)
-    assert (status == Statuses.COMPLETE).all()
-    solver = prepare(scene)
-    for start, omega in zip(starts, many, strict=True):
-        assert np.abs(omega - solver(start, 3.0)).max() <= 3e-12 * np.abs(many).max()
 
 
 @pytest.mark.parametrize("method", FIXED_STEP)
@@ -196,85 +124,32 @@ def test_what_has_no_lanes_is_solved_one_by_one() -> None:
         assert np.allclose(found, alone, rtol=0, atol=1e-5 if method == "auto" else 0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_one_body_alone_keeps_the_tolerance_of_a_single_solution(kind: str) -> None:
-    drawn = bodies(kind, 12, 23)
-    whole = solve_many(TOP, tolerance=1e-9, **drawn)
-    for row in range(12):
-        solver = prepare(scene_of(drawn, row), tolerance=1e-9)
-        alone = solver(drawn["omega0"][row], drawn["t_end"][row])
-        start, t_end = drawn["omega0"][row : row + 1], float(drawn["t_end"][row])
-        allowed = 2e-9 * max(np.abs(alone).max(), np.abs(start).max())
-        assert np.abs(solver.many(start, t_end)[0][0] - alone).max() <= allowed
-        found = solve_many(TOP, tolerance=1e-9, **only(drawn, slice(row, row + 1)))
-        assert np.abs(found.omega[0] - alone).max() <= allowed
-        assert np.array_equal(found.omega[0], whole.omega[row])
-
-
-def test_a_bad_body_spoils_no_other() -> None:
-    for kind in KINDS:
-        drawn = bodies(kind, 40, 31)
-        good = solve_many(TOP, **drawn).omega.copy()
-        drawn["omega0"][3, 1] = np.nan
-        drawn["omega0"][8] = np.inf
-        drawn["moments"][13, 0] = 0.0
-        drawn["moments"][17, 2] = -2.0
-        drawn["moments"][19, 1] = np.nan
-        drawn["t_end"][23] = np.inf
-        drawn["omega0"][29] = 1e300
-        drawn["omega0"][33] = 1e-300
-        found = solve_many(TOP, **drawn)
-        spoilt = [3, 8, 13, 17, 19, 23, 29, 33]
-        rest = np.setdiff1d(np.arange(40), spoilt)
-        assert np.array_equal(found.omega[rest], good[rest])
-        assert np.isnan(found.omega[[3, 8, 13, 17, 19, 23]]).all()
-        assert (found.status[[13, 17, 19]] == Statuses.REFUSED).all()
-        assert not found.has_result[[3, 8, 13, 17, 19, 23]].any()
-        assert set(found.ended) <= {"complete", "overflow", "refused", "gave up", "sensitive"}
-
-
-def test_bodies_near_the_ends_of_the_range_and_on_edges() -> None:
-    """Middle axis, separatrix, symmetry, spheres, rest, extreme scales: as by the single solver."""
-    edges = [
-        ((0.0, 1.0, 0.0), (40.0, 30.0, 20.0)), ((1e-9, 1.0, 0.0), (40.0, 30.0, 20.0)),
-        ((1.0, 1.0, np.sqrt(0.75)), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (2.0, 2.0, 1.0)),
-        ((1.0, 2.0, 3.0), (1.0, 2.0, 2.0)), ((1.0, 2.0, 3.0), (5.0, 5.0, 5.0)),
-        ((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), ((1e150, 2e150, 3e150), (3.0, 2.0, 1.0)),
-        ((1e-150, 2e-150, 3e-150), (3.0, 2.0, 1.0)), ((1.0, 2.0, 3.0), (1e9, 1.0, 1e9 + 1e-3)),
-        ((1.0, 0.0, 0.0), (3.0, 2.0, 1.0)), ((-1.0, -2.0, 0.5), (1.0, 3.0, 2.5)),
-    ]  # fmt: skip
+def test_bodies_on_edges_and_near_the_ends_of_the_range() -> None:
+    large, small = (np.array([1.0, 2.0, 3.0]) * 10.0**power for power in (150, -150))
+    edges = [*EDGES, (large, (3.0, 2.0, 1.0)), (small, (3.0, 2.0, 1.0))]
     omega0, moments = (np.array(each) for each in zip(*edges, strict=True))
     for t_end in (0.0, 1.0, 1e4):
         found = solve_many(TOP, t_end, omega0=omega0, moments=moments)
         for row, (start, body) in enumerate(edges):
-            solver = prepare(replace(TOP, moments=body))
-            alone = solver(start, t_end)
+            alone = prepare(replace(TOP, moments=body))(start, t_end)
             allowed = 1e-12 * np.nan_to_num(np.abs(alone).max())
             assert np.allclose(found.omega[row], alone, rtol=0, atol=allowed, equal_nan=True)
 
 
-def test_spins_that_turn_over_after_long(level: int) -> None:
-    """The starts are so near the middle axis that the mean takes more levels than blocks have."""
+def test_flips_after_long_and_orbits_next_to_the_separatrix(level: int) -> None:
+    """The mean takes more levels than blocks have, and a rounded distance changes the time."""
     tilts = np.logspace(-3, -15, 97)
-    starts = np.column_stack([tilts, np.ones_like(tilts), -0.5 * tilts])
+    spins = np.column_stack([tilts, np.ones_like(tilts), -0.5 * tilts])
     # A time during the flip.
     times = (np.log(4.0 / tilts) + np.tile([-1.0, 0.0, 1.0], 33)[:97]) * np.sqrt(3.0)
-    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
-    solver = prepare(scene)
-    alone = [solver(start, t) for start, t in zip(starts, times.tolist(), strict=True)]
-    found = solve_many(scene, times, omega0=starts)
-    assert np.abs(found.omega - alone).max() <= 1e-12
-    assert np.ptp(found.omega[:, 1]) > 0.1
-
-
-def test_orbits_next_to_the_separatrix(level: int) -> None:
-    """The rounding of the distance from the separatrix changes the time of a flip."""
     apart = 1.0 + np.logspace(-2, -14, 97) * np.tile([1.0, -1.0], 49)[:97]
-    starts = np.column_stack([apart / np.sqrt(3.0), np.full(97, 0.4), np.ones(97)])
-    scene = replace(TOP, moments=(3.0, 2.0, 1.0))
-    solver = prepare(scene)
-    alone = np.array([solver(start, 25.0) for start in starts])
-    assert np.abs(solver.many(starts, 25.0)[0] - alone).max() <= 1e-12 * np.abs(alone).max()
+    beside = np.column_stack([apart / np.sqrt(3.0), np.full(97, 0.4), np.ones(97)])
+    solver = prepare(replace(TOP, moments=(3.0, 2.0, 1.0)))
+    for starts, ends in ((spins, times), (beside, np.full(97, 25.0))):
+        alone = [solver(start, t) for start, t in zip(starts, ends.tolist(), strict=True)]
+        found = solver.many(starts, ends)[0]
+        assert np.abs(found - alone).max() <= 1e-12 * np.abs(alone).max()
+        assert np.ptp(found[:, 1]) > 0.1
 
 
 def test_coefficients_of_one_sign(level: int) -> None:
@@ -292,10 +167,9 @@ def test_coefficients_of_one_sign(level: int) -> None:
                 assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_campaign_finds_what_exceeds(kind: str) -> None:
+def test_the_campaign_finds_what_exceeds() -> None:
     """One body is spoilt; a body whose single solution is too far off as well does not count."""
-    drawn = bodies(kind, 40, 3)
+    drawn = bodies("waves", 40, 3)
     found, truth = (solve_many(TOP, tolerance=each, **drawn) for each in (1e-6, 1e-15))
     assert exceeding(drawn, 1e-6, found, truth)[0] == []
     found.omega[7] += 1e-4 * np.abs(found.omega[7]).max()
@@ -304,37 +178,6 @@ def test_the_campaign_finds_what_exceeds(kind: str) -> None:
     assert shares[7] > 10.0
     truth.omega[9] += 1e-4 * np.abs(truth.omega[9]).max()
     assert exceeding(drawn, 1e-6, found, truth)[:2] == ([7, 9], [9])
-
-
-def test_attitudes_are_those_of_a_prepared_solver() -> None:
-    rng = np.random.default_rng(2)
-    starts, attitudes = rng.standard_normal((20, 3)), rng.standard_normal((20, 4))
-    for law in (TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0))):
-        scene = replace(TOP, torque=law)
-        solver = prepare(scene, attitude=True)
-        found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes)
-        assert found.attitude is not None
-        for row, start in enumerate(starts):
-            omega, attitude = solver(start, 2.0, attitudes[row])
-            assert np.allclose(found.omega[row], omega, rtol=0, atol=2e-12)
-            assert np.allclose(found.attitude[row], attitude, rtol=0, atol=1e-12)
-
-
-def test_scenes_and_coefficients() -> None:
-    scenes = [
-        replace(TOP, torque=TorqueLaw((1.0, 0.0, 0.0), sines=[((1.0, 0.0, 0.0), 2.0)])),
-        replace(TOP, omega=(1.0, 2.0, 3.0)),
-        replace(TOP, moments=(3.0, 2.0, 1.0), torque=TorqueLaw((0.0, 0.0, 1.0))),
-    ]
-    found = solve_many(scenes, [1.0, 2.0, 3.0])
-    for scene, t_end, omega in zip(scenes, [1.0, 2.0, 3.0], found.omega, strict=True):
-        assert np.allclose(omega, solve(scene, [t_end]).omega[-1], rtol=0, atol=1e-11)
-    body = Scene("coefficients", (1.0, 1.0, 1.0), coefficients=(0.25, -0.5, 0.3))
-    given = np.array([[0.25, -0.5, 0.3], [0.3, 0.3, -0.2]])
-    found = solve_many(body, 2.0, coefficients=given)
-    for row, omega in zip(given, found.omega, strict=True):
-        alone = solve(replace(body, coefficients=tuple(row)), [2.0]).omega[-1]
-        assert np.allclose(omega, alone, rtol=0, atol=1e-11)
 
 
 def test_no_bodies() -> None:
@@ -358,10 +201,13 @@ def test_results_go_where_the_caller_says() -> None:
 
 
 @pytest.mark.parametrize("law", [TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0))])
-def test_results_of_a_solver_may_overlap_its_starts(law: TorqueLaw) -> None:
-    solver = prepare(replace(TOP, torque=law))
-    starts = np.random.default_rng(7).standard_normal((20, 3))
-    times = np.linspace(0.5, 3.0, 20)
+def test_results_may_overlap_the_starts(law: TorqueLaw) -> None:
+    scene = replace(TOP, torque=law)
+    solver = prepare(scene)
+    rng = np.random.default_rng(7)
+    starts, turns = rng.standard_normal((20, 3)), rng.standard_normal((20, 4))
+    starts[::3] = [0.0, 1.2, 1e-9]  # left to the single-body kernel
+    times = np.linspace(0.5, 30.0, 20)
     omega, status = solver.many(starts, times)
     for shift in (0, 1, 20, 25):  # rows between the starts and the results
         place = np.zeros((45, 3))
@@ -371,6 +217,14 @@ def test_results_of_a_solver_may_overlap_its_starts(law: TorqueLaw) -> None:
         assert found[0] is out
         assert out.tobytes() == omega.tobytes()
         assert found[1].tobytes() == status.tobytes()
+    place = starts.copy()
+    whole = solve_many(scene, times, omega0=starts)
+    assert same(solve_many(scene, times, omega0=place, out=place), whole)
+    wanted = solve_many(scene, times, omega0=starts, attitude0=turns)
+    both = Ensemble(starts.copy(), np.empty(20, np.int8), turns)
+    assert solve_many(scene, times, omega0=both.omega, attitude0=turns, out=both) is both
+    assert same(both, wanted)
+    assert np.array_equal(turns, wanted.attitude)  # type: ignore[arg-type]
     read_only = np.zeros((20, 3))
     read_only.flags.writeable = False
     wrongs = np.empty((19, 3)), np.empty((20, 4)), np.empty((20, 3), "f4"), place[0], read_only
@@ -480,3 +334,60 @@ def test_the_arrays_of_few_scenes_are_kept() -> None:
     alone = [solve_many(each, 3.0).omega[0] for each in scenes]
     assert np.array_equal(alone, solve_many(scenes, 3.0).omega)
     assert len(many_scenes._kept) < len(scenes)
+
+
+def test_one_attitude_for_all_and_arrays_of_the_caller() -> None:
+    starts = np.random.default_rng(1).standard_normal((30, 3))
+    turned = [0.5, -0.5, 0.5, 0.5]
+    each = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
+    out = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
+    shared = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
+    assert shared is out
+    assert shared.attitude is not None
+    assert each.attitude is not None
+    assert np.array_equal(shared.attitude, each.attitude)
+    scene = replace(TOP, attitude=(0.5, -0.5, 0.5, 0.5))
+    assert np.array_equal(solve_many(scene, 3.0, omega0=starts).omega, each.omega)
+
+
+def test_a_prepared_solver_takes_many_starts() -> None:
+    rng = np.random.default_rng(9)
+    starts, attitudes = rng.standard_normal((17, 3)), rng.standard_normal((17, 4))
+    laws = (TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0)), TorqueLaw((1.0, 0.5, 2.0), frame="space"))
+    full = Scene("", (1.0, 0.0, 0.0), inertia=[[40, 3, 1], [3, 30, -2], [1, -2, 20]])
+    for body, law in ((TOP, laws[0]), (TOP, laws[1]), (TOP, laws[2]), (full, laws[1])):
+        scene = replace(body, torque=law, attitude=(0.5, 0.5, 0.5, -0.5))
+        many = prepare(scene, tolerance=1e-9, attitude=True).many
+        found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
+        assert found.attitude is not None
+        omega, attitude, status = many(starts, 2.0, attitudes, threads=2)
+        assert np.allclose(omega, found.omega, rtol=0.0, atol=1e-8)
+        assert np.allclose(attitude, found.attitude, rtol=0.0, atol=1e-9)
+        assert np.array_equal(omega, found.omega) or body is full
+        assert not status.any()
+        usual = solve_many(scene, 2.0, omega0=starts, tolerance=1e-9)
+        assert usual.attitude is not None
+        assert np.allclose(many(starts, 2.0)[1], usual.attitude, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "torque",
+    [
+        TorqueLaw((1.0, 0.0, 0.0)),
+        TorqueLaw((1.0, 0.0, 0.0), frame="space"),
+        torques.damping([1.0, 2.0, 3.0]),
+    ],
+)
+def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> None:
+    """Under most torques one such row had raised an error, and all results were lost."""
+    starts, turns = np.ones((3, 3)), np.ones((3, 4))
+    many = prepare(replace(TOP, torque=torque, attitude=(1.0, 0.0, 0.0, 0.0)), attitude=True).many
+    good = many(starts, 1.0, turns)
+    turns[0], turns[2, 1] = 0.0, np.nan
+    omega, attitude, status = many(starts, 1.0, turns)
+    assert np.isnan(attitude[[0, 2]]).all()
+    assert np.isnan(omega[[0, 2]]).all()
+    assert status[0]
+    assert status[2]
+    assert np.array_equal(attitude[1], good[1][1])
+    assert np.array_equal(omega[1], good[0][1])

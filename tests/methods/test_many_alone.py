@@ -156,7 +156,7 @@ def rows_of(drawn: dict[str, Any]) -> Iterator[tuple[Scene, float]]:
 @pytest.mark.parametrize("tolerance", [1e-15, 1e-14, 1e-12, 1e-8, 1e-3])
 @pytest.mark.parametrize("with_torque", [False, True])
 def test_statuses_are_those_of_a_single_solver(with_torque: bool, tolerance: float) -> None:
-    drawn = unstable(60, 3, with_torque)
+    drawn = unstable(100, 3, with_torque)
     for attitude in (False, True):
         statuses = []
         for scene, time in rows_of(drawn):
@@ -164,7 +164,7 @@ def test_statuses_are_those_of_a_single_solver(with_torque: bool, tolerance: flo
             solver(scene.omega, time)
             statuses.append(solver.status)
         if attitude:
-            drawn["attitude0"] = np.tile(IDENTITY, (60, 1))
+            drawn["attitude0"] = np.tile(IDENTITY, (100, 1))
         found = solve_many(BASE, tolerance=tolerance, effort=1e-2, **drawn)
         assert found.ended.tolist() == statuses
         assert "sensitive" in statuses or tolerance == 1e-3

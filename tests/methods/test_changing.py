@@ -4,7 +4,6 @@ import math
 import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
 from random import Random
 from typing import Any
 
@@ -28,8 +27,9 @@ from pyharness import (
 )
 from pyharness.methods.registry import METHODS
 from pyharness.model.attitude import IDENTITY
-from pyharness.truth.reference import Reference, reference
+from pyharness.truth.reference import reference
 from tests.methods.tolerance_scenes import draw_changing as draw
+from tests.methods.tolerance_scenes import motions
 
 BOOMS = ChangingMoments([[40.0, 0.5, -0.01], [30.0, -0.3, 0.0, 0.001], [20.0, 0.4]])
 SCENE = Scene("booms", (0.3, 1.0, -0.6), moments=BOOMS)
@@ -46,31 +46,6 @@ def matrices_of(scene: Scene) -> list[Any]:
         np.diag([each[n] if n < len(each) else 0.0 for each in scene.changing.polynomials])
         for n in range(most)
     ]
-
-
-def size_of(scene: Scene) -> float:
-    """Return the largest element of the inertia of a scene at time 0."""
-    return float(np.abs(matrices_of(scene)[0]).max())
-
-
-def torque_of(source: Random, scene: Scene, time: float) -> Any:
-    """Return a random torque, in proportion to the moments of a scene that is solved to `time`."""
-    changing = scene.changing
-    assert changing is not None
-    size = size_of(scene)
-    # A torque that accelerates the body could make omega infinite.
-    cubic = -0.05 * math.copysign(size, time)
-    vector = [size * source.uniform(-0.3, 0.3) for _ in range(3)]
-    kinds: tuple[Callable[[], Any], ...] = (
-        TorqueLaw,
-        lambda: TorqueLaw(vector, sines=[(vector[::-1], source.uniform(0.5, 3.0))]),
-        lambda: TorqueLaw(vector, frame="space"),
-        lambda: torques.damping(0.1 * size) + TorqueLaw(vector),
-        lambda: torques.wheels(vector, TorqueLaw(0.1 * np.array(vector))),
-        lambda: torques.gravity_gradient(changing, source.uniform(0.1, 1.0)),
-        lambda: torques.in_space(vector) + (lambda t, omega: cubic * omega**3),
-    )
-    return source.choice(kinds)()
 
 
 def by_momentum(scene: Scene) -> Callable[[float, Any], list[float]]:
@@ -125,25 +100,11 @@ def difference(first: Any, second: Any) -> float:
     return float(apart / max(1e-3, np.abs(second).max()))
 
 
-@pytest.mark.sampled
-@pytest.mark.parametrize("seed", range(30))
-def test_solution_reference_and_a_right_hand_side_written_by_hand_agree(seed: int) -> None:
-    source = Random(f"changing {seed}")
-    scene, time = draw(source, full=seed % 2 == 1)
-    scene = replace(scene, torque=torque_of(source, scene, time))
-    truth = reference(replace(scene, attitude=IDENTITY), [time])
-    assert truth.attitude is not None
-    omega, attitude = scipy_end(scene, time)
-    assert difference(omega, truth.omega[0]) < 3e-11
-    assert np.abs(attitude - truth.attitude[0]).max() < 3e-11
-    for tolerance in (1e-6, 1e-12):
-        found = solve(scene, time, tolerance=tolerance, attitude=True)
-        assert found.attitude is not None
-        assert found.growth is not None
-        largest = max(np.abs(scene.omega).max(), np.abs(truth.omega).max())
-        allowed = tolerance + 4e-15 * found.growth
-        assert np.abs(found.omega - truth.omega).max() <= allowed * largest
-        assert np.abs(found.attitude - truth.attitude).max() <= allowed
+def test_true_motions_satisfy_a_right_hand_side_written_by_hand() -> None:
+    for name, motion in motions("changing inertia").items():
+        omega, attitude = scipy_end(motion.scene, motion.times[1])
+        assert difference(omega, motion.omega[1]) < 3e-11, name
+        assert np.abs(attitude - motion.attitude[1]).max() < 3e-11, name
 
 
 @pytest.mark.sampled
@@ -247,15 +208,6 @@ def test_gravity_gradient_of_a_matrix_takes_its_value_at_each_time() -> None:
     for time in (0.0, 0.4):
         expected = torques.gravity_gradient(scene.changing.at(time), 0.7).at(time, *state)
         assert torque.at(time, *state) == pytest.approx(expected, rel=1e-13)
-
-
-@cache
-def solved(seed: int) -> tuple[Scene, float, Reference]:
-    """Return a random scene, a time (s) within its span, and the reference at this time."""
-    source = Random(f"scipy {seed}")
-    scene, time = draw(source, full=seed % 2 == 1)
-    scene = replace(scene, torque=torque_of(source, scene, time))
-    return scene, time, reference(scene, [time])
 
 
 def test_opaque_torque_is_solved_by_a_method_of_scipy() -> None:

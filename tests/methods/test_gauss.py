@@ -4,7 +4,6 @@ import math
 import runpy
 from dataclasses import replace
 from decimal import Decimal, localcontext
-from functools import cache
 from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,21 +15,18 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene
 from pyharness.methods.problem import normalized
-from pyharness.methods.registry import METHODS
+from pyharness.methods.registry import GAUSS, METHODS
 from pyharness.methods.solve import solve
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.truth.reference import Reference, reference
+from pyharness.truth.reference import reference
+from tests.methods.tolerance_scenes import motions
 from tests.scenes.timed_kinds import timed_scenes
+from tests.within import check_error
 
 _MAKER = Path(__file__).parent.parent.parent / "fortran/make_gauss.py"
 _STAGES = range(1, 9)
 _SPHERE = Scene("", (1.0, 1.0, 1.0), moments=(1.0, 1.0, 1.0), torque=TorqueLaw((1.0, 2.0, 3.0)))
-
-
-@cache
-def _truth(scene: Scene, *times: float) -> Reference:
-    return reference(scene, times)
 
 
 def _run(scene: Scene, times: list[float], stages: int, step: float, effort: float = 1.0) -> Any:
@@ -93,27 +89,13 @@ def test_order_is_twice_the_stages(case: int, stages: int, steps: tuple[int, int
     assert slope == pytest.approx(2 * stages, abs=0.9)
 
 
-@pytest.mark.parametrize("case", range(1, 8))
-@pytest.mark.parametrize("stages", [1, 2, 4, 8])
-def test_tolerance_is_met(stages: int, case: int) -> None:
-    scene = case_scene(case)
-    times = [-0.1, -0.55, -1.0] if case == 5 else [0.1, 0.55, 1.0]
-    truth = _truth(scene, *times)
-    finest = METHODS[f"gauss-{stages}"].finest
-    for tolerance in (1e-3, 1e-6, finest):
-        found = solve(scene, times, f"gauss-{stages}", tolerance)
-        error = np.abs(found.omega - truth.omega).max() / np.abs(truth.omega).max()
-        assert error <= tolerance + 1e-15
+@pytest.mark.parametrize("method", GAUSS)
+def test_finest_tolerance_is_met(method: str) -> None:
+    finest = METHODS[method].finest
+    for name, motion in motions("cases").items():
+        found = solve(motion.scene, motion.times, method, finest)
+        check_error(motion, found.omega, None, finest, name, steps=found.steps)
         assert 0 < found.steps < found.evaluations
-
-
-def test_body_at_rest_is_driven_to_a_relative_error() -> None:
-    """The scale is the largest omega of the trajectory, however small, and not 1."""
-    law = TorqueLaw(sines=(((1e-9, 2e-9, -3e-9), 20.0),))
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), torque=law)
-    truth = reference(scene, [1.0])
-    found = solve(scene, [1.0], "gauss-2", 1e-8)
-    assert np.abs(found.omega - truth.omega).max() <= 1e-8 * np.abs(truth.omega).max()
 
 
 @pytest.mark.parametrize(

@@ -47,25 +47,6 @@ def solver() -> Solver:
     return prepare(PUSHED)
 
 
-def test_sphere_is_a_closed_form_under_any_torque() -> None:
-    law = TorqueLaw((1.0, -2.0, 3.0), (0.5, 0.0, -1.0), (((1.0, 2.0, 3.0), 3.0),))
-    scene = Scene("", (0.3, -1.0, 2.0), moments=(2.0, 2.0, 2.0), torque=law)
-    solver = prepare(scene)
-    assert (solver.plan.method, solver.plan.closed_form) == ("closed-form", "sphere")
-    np.testing.assert_allclose(solver(_omega(scene), 2.0), reference(scene, [2.0]).omega[0], 1e-15)
-
-
-@pytest.mark.parametrize("case", [4, 5])
-def test_another_start_than_the_scenes(case: int) -> None:
-    start = (3.0, -2.0, 0.5)
-    scene = case_scene(case)
-    solver = prepare(scene, tolerance=1e-12)
-    other = Scene("", start, moments=scene.moments, torque=scene.torque)
-    truth = reference(other, [1.0, 2.0]).omega
-    np.testing.assert_allclose(solver(np.array(start), 2.0), truth[1], rtol=1e-11)
-    np.testing.assert_allclose(solver.trajectory(start, [1.0, 2.0]).omega, truth, rtol=1e-11)
-
-
 def test_results_are_new_arrays_unless_out_is_given(solver: Solver) -> None:
     start = _omega(PUSHED)
     found = [solver(start * k, 1.0) for k in (1.0, 2.0)]

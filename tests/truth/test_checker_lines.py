@@ -23,17 +23,14 @@ PATH = Path(certificate_checker.__file__)
 SOURCE = PATH.read_text(encoding="utf-8")
 ONE = 1 << certificate_checker.SCALE_BITS
 FREE = {"constant": [0.0] * 3, "rate": [0.0] * 3, "sines": [], "cosines": []}
+LAW = {
+    "constant": [1.0, -2.0, 0.3], "rate": [0.1, 0.0, -70.0],
+    "sines": [[[3.0, 0.0, 1.0], 5.0], [[-0.5, 1e-3, 0.7], 5.0]],
+    "cosines": [[[0.0, 2.0, -1.0], -3.0], [[1.0, 0.2, -1.0], 5.0]],
+}  # fmt: skip
 WAVES: Record = {
-    "name": "waves",
-    "moments": [40.0, "30.25", 20.0],
-    "omega": [0.3, -1.0, 2.0],
-    "torque": {
-        "constant": [1.0, -2.0, 0.3],
-        "rate": [0.1, 0.0, -70.0],
-        "sines": [[[3.0, 0.0, 1.0], 5.0], [[-0.5, 1e-3, 0.7], 5.0]],
-        "cosines": [[[0.0, 2.0, -1.0], -3.0], [[1.0, 0.2, -1.0], 5.0]],
-    },
-}
+    "name": "waves", "moments": [40.0, "30.25", 20.0], "omega": [0.3, -1.0, 2.0], "torque": LAW,
+}  # fmt: skip
 TOP: Record = {"name": "", "coefficients": [0.5, -0.25, 0.125], "omega": [0.1, 0.7, 1.3]}
 TOP |= {"torque": {**FREE, "constant": [1.0, 2.0, 3.0]}}
 # The symmetric part of its Jacobian has a negative factor of the first component of omega.
@@ -166,11 +163,8 @@ def twice(values: list[Any]) -> list[Any]:
 
 def without_last_step(record: Record) -> Record:
     """Return a certificate whose rows are proved by the first two steps, and with a false third."""
-    return {
-        **record,
-        "rows": record["rows"][:2],
-        "steps": [*record["steps"][:2], [1, 1, 0, [0] * 3]],
-    }
+    steps = [*record["steps"][:2], [1, 1, 0, [0] * 3]]
+    return {**record, "rows": record["rows"][:2], "steps": steps}
 
 
 OTHERS = ("check_file", "main")  # functions that read and print
@@ -224,10 +218,7 @@ FORGERIES: dict[str, tuple[Record, Change]] = {
     # From step to step.
     "time-stays": ({"after": lambda omega, waves, r, t, h: (omega, waves, r, 0)}, dict),
     "radius-not-passed": ({"after": lambda omega, waves, r, t, h: (omega, waves, 0, t + h)}, dict),
-    "radius-lost": (
-        {"after": lambda omega, waves, r, t, h: (omega, waves, 0, t + h)},
-        put("steps", 2, 2, 9),
-    ),
+    "radius-lost": ({"after": lambda w, q, r, t, h: (w, q, 0, t + h)}, put("steps", 2, 2, 9)),
     "step-of-no-radius": ({}, put("steps", 1, 2, 0)),
     "last-step-false": ({}, without_last_step),
     "last-terms-omitted": ({"end": lambda series: [sum(x[:-1]) for x in series]}, dict),
@@ -241,25 +232,15 @@ FORGERIES: dict[str, tuple[Record, Change]] = {
     "row-too-far": ({"miss": 1}, dict),
     "row-in-no-step": ({}, put("rows", 2, "time", 99.0)),
     "row-at-another-time": ({"row": lambda number, h: (0.5 - number) * h}, dict),
-    "row-after-its-step": (
-        {"row": lambda number, h: (number + 1.5) * h, "place": Fraction(3, 2)},
-        dict,
-    ),
-    "row-before-its-step": (
-        {"row": lambda number, h: (number - 0.5) * h, "place": Fraction(-1, 2)},
-        dict,
-    ),
+    "row-after-its-step": ({"row": lambda n, h: (n + 1.5) * h, "place": Fraction(3, 2)}, dict),
+    "row-before-its-step": ({"row": lambda n, h: (n - 0.5) * h, "place": Fraction(-1, 2)}, dict),
 }
 # Lines that only name values, or of which no weaker form runs.
 EXEMPT = (
-    "self.bits, self.clock, self.scales = bits, clock, scales",
-    'if "coefficients" in scene:',
-    "self.frequencies = sorted(",
-    "self.rows = []",
-    "pushes = []",
-    'scene = certificate["scene"]',
+    "self.bits, self.clock, self.scales = bits, clock, scales", 'if "coefficients" in scene:',
+    "self.frequencies = sorted(", "self.rows = []", "pushes = []", 'scene = certificate["scene"]',
     'return len(certificate["steps"])',
-)
+)  # fmt: skip
 
 
 def entries() -> list[tuple[str, str, str]]:

@@ -51,10 +51,8 @@ def away(balls: Balls, values: Sequence[float | Decimal | Fraction]) -> float:
 
 
 def drawn(kind: str, seed: int) -> tuple[Scene, float]:
-    source = random.Random(f"enclosure {kind} {seed}")
-    moments, omega, attitude, end = draw(source, kind, 4.0)
-    scene = Scene("", tuple(omega), moments=tuple(moments), attitude=tuple(attitude))
-    return scene, end
+    moments, omega, attitude, end = draw(random.Random(f"enclosure {kind} {seed}"), kind, 4.0)
+    return Scene("", tuple(omega), moments=tuple(moments), attitude=tuple(attitude)), end
 
 
 def momentum(scene: Scene, omega: Balls, attitude: Balls) -> Balls:
@@ -123,12 +121,8 @@ def test_two_times_compose(moments: Triple, signs: Triple) -> None:
     for start in ((0.3, 1.0, 0.5), (0.5, 1.0, 0.3), (0.1, 1.0, 0.1)):
         omega = start[0] * signs[0], start[1] * signs[1], start[2] * signs[2]
         scene = Scene("", omega, moments=moments, attitude=ATTITUDE)
-        middle = [float(x.mid()) for x in enclosed(scene, 1.75, attitude=True)]
-        later = replace(
-            scene,
-            omega=(middle[0], middle[1], middle[2]),
-            attitude=(middle[3], middle[4], middle[5], middle[6]),
-        )
+        middle: Any = [float(x.mid()) for x in enclosed(scene, 1.75, attitude=True)]
+        later = Scene("", middle[:3], moments=moments, attitude=middle[3:])
         whole, rest = enclosed(scene, 5.0, attitude=True), enclosed(later, 3.25, attitude=True)
         assert max(float(abs(x - y).upper()) for x, y in zip(whole, rest, strict=True)) < 1e-13
 
@@ -152,15 +146,11 @@ def test_separatrix(omega: Triple) -> None:
 @pytest.mark.parametrize(
     ("omega", "end"),
     [
-        ((1e-3, 1.0, 1e-3), 250.0),
-        ((1e-3, -1.0, 1e-3), 300.0),
-        ((1e-150, 1.0, -1e-150), -1e3),
-        ((-1e-3, 1.0, 1e-3), 1e4),
-        ((1e-15, 1.0, 0.0), 250.0),
-        ((1e-30, 1.0, 0.0), -1e4),
+        ((1e-3, 1.0, 1e-3), 250.0), ((1e-3, -1.0, 1e-3), 300.0), ((1e-150, 1.0, -1e-150), -1e3),
+        ((-1e-3, 1.0, 1e-3), 1e4), ((1e-15, 1.0, 0.0), 250.0), ((1e-30, 1.0, 0.0), -1e4),
         ((0.0, 1.0, 1e-60), 1e3),
     ],
-)
+)  # fmt: skip
 def test_attitude_on_and_near_the_separatrix(omega: Triple, end: float) -> None:
     """The motion amplifies errors of omega by exp(0.63 t), or up to each flip."""
     scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=ATTITUDE)

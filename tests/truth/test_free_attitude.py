@@ -33,13 +33,9 @@ def test_attitude_agrees_however_far(kind: str) -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize(
     ("omega", "steady", "endless"),
-    [
-        ((0.0, 1.0, 0.0), True, False),
-        ((0.0, 0.0, 0.0), True, True),
-        ((1e-3, 1.0, 1e-3), False, True),
-        ((1e-3, 1.0, -2e-3), False, False),
-    ],
-)
+    [((0.0, 1.0, 0.0), True, False), ((0.0, 0.0, 0.0), True, True),
+     ((1e-3, 1.0, 1e-3), False, True), ((1e-3, 1.0, -2e-3), False, False)],
+)  # fmt: skip
 def test_separatrix_and_rest_are_told(omega: Triple, steady: bool, endless: bool) -> None:
     scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=(1.0, 0.0, 0.0, 0.0))
     assert is_steady(scene) == steady

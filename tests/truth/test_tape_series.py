@@ -41,11 +41,8 @@ def _field(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
 def _pulse(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
     """Use exponentials of exponentials, and a sine whose angle has no cosine beside it."""
     bell = f["exp"](-2.0 * (t - 0.5) * (t - 0.5))
-    return [
-        bell * w[1],
-        f["exp"](0.2 * w[0] - bell),
-        f["sin"](2.0 * w[2]) + 0.25 * f["tanh"](t - w[0]),
-    ]
+    last = f["sin"](2.0 * w[2]) + 0.25 * f["tanh"](t - w[0])
+    return [bell * w[1], f["exp"](0.2 * w[0] - bell), last]
 
 
 def _pointing(t: Any, w: Any, q: Any, f: _Functions) -> list[Any]:
@@ -85,11 +82,9 @@ def _by_mpmath(function: Callable[..., list[Any]], time: float) -> list[Any]:
         if q:
             a, b, c, d = q
             found += [
-                (-b * x - c * y - d * z) / 2,
-                (a * x + c * z - d * y) / 2,
-                (a * y + d * x - b * z) / 2,
-                (a * z + b * y - c * x) / 2,
-            ]
+                (-b * x - c * y - d * z) / 2, (a * x + c * z - d * y) / 2,
+                (a * y + d * x - b * z) / 2, (a * z + b * y - c * x) / 2,
+            ]  # fmt: skip
         return [back * each for each in found]
 
     start = [mpmath.mpf(x) for x in (*_OMEGA, *(_ATTITUDE if attitude else ()))]
@@ -170,13 +165,11 @@ def test_a_torque_law_on_a_tape_has_the_digits_of_the_law(
             found = found + np.array(amplitude) * np.cos(frequency * t)
         return found
 
-    law = reference(
-        Scene("", _OMEGA, _MOMENTS, torque=_LAW, attitude=attitude), times, precise=True
-    )
-    tape = reference(
-        Scene("", _OMEGA, _MOMENTS, torque=replayed(function), attitude=attitude),
-        times,
-        precise=True,
+    law, tape = (
+        reference(
+            Scene("", _OMEGA, _MOMENTS, torque=torque, attitude=attitude), times, precise=True
+        )
+        for torque in (_LAW, replayed(function))
     )
     with mpmath.workdps(40):
         for row in range(2):

@@ -18,11 +18,12 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any, NamedTuple
 
+import numpy as np
 from mpmath import mp, mpf
 
 from pyharness import InputError, solve
 from pyharness.truth.reference import reference
-from tests.methods.independent_terms import Drawn, draw
+from tests.methods.independent_terms import Drawn, draw, exact
 
 DIGITS = 34
 # Local error of a step, relative to the state.
@@ -33,8 +34,7 @@ _MOST_EVALUATIONS, _MOST_GROWTH = 12_000, 1e4
 # Error that is allowed for rounding, over the error amplification; it is judged up to _CALM.
 ALLOWED, _CALM = 4e-15, 1e6
 
-State = list[Any]
-Rows = Sequence[Sequence[Any]]
+State = Any  # an array of mpmath's numbers, or of another kind
 Slopes = Callable[[Any, State], State]
 
 
@@ -61,8 +61,8 @@ class Result:
 def integrated(drawn: Drawn) -> Truth | None:
     """Return the solution of a scene by extrapolation; None if a limit is exceeded."""
     with mp.workdps(DIGITS):
-        state = [mpf(x) for x in (*drawn.scene.omega, *(drawn.scene.attitude or (1, 0, 0, 0)))]
-        largest, rows = max(map(abs, state[:3])), []
+        state = exact([*drawn.scene.omega, *(drawn.scene.attitude or (1, 0, 0, 0))])
+        largest, rows = abs(state[:3]).max(), []
         begin, evaluations = mpf(0), 0
         most, length = _MOST_GROWTH * largest, mpf(drawn.times[-1]) / 4
         for stop, is_row in _stops(drawn):
@@ -74,7 +74,7 @@ def integrated(drawn: Drawn) -> Truth | None:
             while begin != stop:
                 last = abs(length) * mpf("1.0001") >= abs(stop - begin)
                 tried = stop - begin if last else length
-                found, columns = _step(slopes, begin, state, tried, most)
+                found, columns = step_of(slopes, begin, state, tried, most)
                 evaluations += columns * columns + 1
                 if columns <= 10 and not last:
                     length = tried * mpf("1.4")
@@ -82,7 +82,7 @@ def integrated(drawn: Drawn) -> Truth | None:
                     length = tried * (mpf("0.5") if found is None else mpf("0.8"))
                 if found is not None:
                     begin, state = stop if last else begin + tried, found
-                    largest = max(largest, *map(abs, state[:3]))
+                    largest = max(largest, abs(state[:3]).max())
                 if evaluations > _MOST_EVALUATIONS or largest > most:
                     return None
             if is_row:
@@ -98,7 +98,9 @@ def _stops(drawn: Drawn) -> Iterator[tuple[Any, bool]]:
         yield mpf(each), each in drawn.times
 
 
-def _step(slopes: Slopes, t: Any, state: State, length: Any, most: Any) -> tuple[State | None, int]:
+def step_of(
+    slopes: Slopes, t: Any, state: State, length: Any, most: Any, local: Any = _LOCAL
+) -> tuple[State | None, int]:
     """Return the state after a step, and the number of columns of the extrapolation.
 
     The state is None if the extrapolation does not converge, or if an omega exceeds `most` (rad/s).
@@ -107,38 +109,30 @@ def _step(slopes: Slopes, t: Any, state: State, length: Any, most: Any) -> tuple
     before: list[State] = []
     for k in range(1, _MOST_COLUMNS + 1):
         h = length / (2 * k)
-        old, new = state, [y + h * f for y, f in zip(state, first, strict=True)]
+        old, new = state, state + h * first
         for m in range(1, 2 * k):
-            rates = slopes(t + m * h, new)
-            old, new = new, [y + 2 * h * f for y, f in zip(old, rates, strict=True)]
+            old, new = new, old + 2 * h * slopes(t + m * h, new)
             # The sine of a number that grows without bound would take mpmath for ever.
-            if not all(abs(y) <= most for y in new[:3]):
+            if not all(abs(new[:3]) <= most):
                 return None, _MOST_COLUMNS
         row = [new]
         for j, each in enumerate(before, 1):
-            ratio = mpf(k * k) / ((k - j) * (k - j)) - 1
-            row.append([a + (a - b) / ratio for a, b in zip(row[-1], each, strict=True)])
-        if k >= _FEWEST_COLUMNS:
-            size = max(map(abs, row[-1]))
-            if max(abs(a - b) for a, b in zip(row[-1], row[-2], strict=True)) <= _LOCAL * size:
-                return row[-1], k
+            square = (k - j) * (k - j)
+            row.append(row[-1] + (row[-1] - each) * square / (k * k - square))
+        if k >= _FEWEST_COLUMNS and abs(row[-1] - row[-2]).max() <= local * abs(row[-1]).max():
+            return row[-1], k
         before = row
     return None, _MOST_COLUMNS
 
 
-def error_of(truth: Truth, omega: Rows, attitude: Rows | None) -> float:
+def error_of(truth: Truth, omega: State, attitude: State | None) -> float:
     """Return the largest error of omega over the largest |omega|, or of the attitude (rad)."""
     with mp.workdps(DIGITS):
-        worst = mpf(0)
-        for row, true in zip(omega, truth.rows, strict=True):
-            for x, y in zip(row, true[:3], strict=True):
-                worst = max(worst, abs(x - y) / truth.largest)
-        if attitude is not None:
-            for row, true in zip(attitude, truth.rows, strict=True):
-                pairs = list(zip(row, true[3:], strict=True))
-                apart = (mp.sqrt(sum((x - s * y) ** 2 for x, y in pairs)) for s in (1, -1))
-                worst = max(worst, 2 * min(apart))
-        return float(worst)
+        true = np.array(truth.rows)
+        errors = [*(abs(omega - true[:, :3]) / truth.largest).flat]
+        for row, q in zip([] if attitude is None else attitude, true[:, 3:], strict=False):
+            errors.append(2 * min(mp.sqrt(((row - sign * q) ** 2).sum()) for sign in (1, -1)))
+        return float(max(errors))
 
 
 def compared(drawn: Drawn) -> Result:
@@ -162,8 +156,7 @@ def compared(drawn: Drawn) -> Result:
         if len(found.time) < len(drawn.times) or result.growth > _CALM:
             result.note = f"{method}: {found.ended}, error amplification {result.growth:.2g}"
             continue
-        attitude = None if found.attitude is None else found.attitude.tolist()
-        error = error_of(truth, found.omega.tolist(), attitude)
+        error = error_of(truth, found.omega, found.attitude)
         result.errors[method] = error
         result.ratios[method] = error / (allowed + ALLOWED * max(1.0, result.growth))
     if drawn.is_exact and result.ratios:
@@ -176,11 +169,7 @@ def _error_of_all_digits(drawn: Drawn, truth: Truth) -> float:
     found = reference(drawn.scene, drawn.times, precise=True)
     assert found.remainder is not None
     with mp.workdps(DIGITS):
-        omega = [
-            [mpf(x) + mpf(y) for x, y in zip(row, rest, strict=True)]
-            for row, rest in zip(found.omega.tolist(), found.remainder.tolist(), strict=True)
-        ]
-    return error_of(truth, omega, None)
+        return error_of(truth, exact(found.omega) + exact(found.remainder), None)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

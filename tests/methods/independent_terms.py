@@ -4,7 +4,6 @@ Nothing here but the scenes themselves comes from pyharness: the formulas are wr
 in plain arithmetic of mpmath's numbers.
 """
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,8 +19,8 @@ from pyharness.torques import recorded
 
 # A torque (N m) in numbers of mpmath: a function of the time, omega, the attitude, and a time
 # within the piece of tables that holds.
-Formula = Callable[[Any, Any, Any, Any], list[Any]]
-Vector = list[Any]
+Formula = Callable[[Any, Any, Any, Any], Any]
+Vector = Any  # an array of mpmath's numbers
 Term = tuple[Any, Formula, list[float]]  # the torque for a scene, its formula, and its breaks
 
 KINDS = (
@@ -50,51 +49,20 @@ class Drawn:
     def slopes(self, t: Any, state: Vector, middle: Any) -> Vector:
         """Return the derivatives of omega and of the quaternion, in numbers of mpmath."""
         omega, q = state[:3], state[3:]
-        total = [mpf(0)] * 3
-        for formula in self.formulas:
-            total = plus(total, formula(t, omega, q, middle))
-        (a, b, c, d), (x, y, z) = q, omega
-        half = mpf(0.5)
-        return [
-            *self.rates(total, omega),
-            -half * (b * x + c * y + d * z),
-            half * (a * x + c * z - d * y),
-            half * (a * y + d * x - b * z),
-            half * (a * z + b * y - c * x),
-        ]
-
-
-def plus(a: Vector, b: Vector) -> Vector:
-    """Return the sum of two vectors."""
-    return [x + y for x, y in zip(a, b, strict=True)]
-
-
-def times(factor: Any, a: Vector) -> Vector:
-    """Return a vector times a number."""
-    return [factor * x for x in a]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Return the vector product."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def applied(matrix: Any, a: Vector) -> Vector:
-    """Return the product of a matrix, in rows, and a vector."""
-    return [sum((x * y for x, y in zip(row, a, strict=True)), mpf(0)) for row in matrix]
+        total = sum(formula(t, omega, q, middle) for formula in self.formulas)
+        turn = q[0] * omega + np.cross(q[1:], omega)
+        return np.array([*self.rates(total, omega), *(x / 2 for x in (-(q[1:] @ omega), *turn))])
 
 
 def to_body(q: Vector, v: Vector) -> Vector:
     """Return a vector of space about the body axes: q* v q, for the normalised q."""
-    norm = mp.sqrt(sum((x * x for x in q), mpf(0)))
-    w, u = q[0] / norm, [-x / norm for x in q[1:]]
-    once = cross(u, v)
-    return plus(v, plus(times(2 * w, once), times(2, cross(u, once))))
+    w, *u = q / mp.sqrt(q @ q)
+    once = np.cross(v, u)
+    return v + 2 * w * once + 2 * np.cross(once, u)
 
 
-def exact(value: Any) -> Any:
-    """Return numbers, or nested lists of them, as numbers of mpmath."""
-    return [exact(x) for x in value] if isinstance(value, (list, tuple)) else mpf(value)
+# Return numbers, or nested lists of them, as numbers of mpmath.
+exact: Any = np.frompyfunc(mpf, 1, 1)
 
 
 class _Source:
@@ -171,34 +139,28 @@ def _body(
 
     The equations are a function of the torque and omega that returns the derivative of omega.
     """
+
+    def products(w: Vector) -> Vector:
+        return w[[1, 2, 0]] * w[[2, 0, 1]]
+
     if kind == "coefficients":
         given = source.vector(0.9)
-        a, b, c = exact(given)
-        return given, lambda n, w: [
-            n[0] + a * w[1] * w[2], n[1] + b * w[2] * w[0], n[2] + c * w[0] * w[1]
-        ]  # fmt: skip
+        factors = exact(given)
+        return given, lambda n, w: n + factors * products(w)
     while True:
         moments = [size * source.number(0.3, 1.0) for _ in range(3)]
         if 2.0 * max(moments) < sum(moments):
             break
     if kind == "moments":
-        i, j, k = exact(moments)
-        return moments, lambda n, w: [
-            (n[0] + (j - k) * w[1] * w[2]) / i,
-            (n[1] + (k - i) * w[2] * w[0]) / j,
-            (n[2] + (i - j) * w[0] * w[1]) / k,
-        ]
+        m = exact(moments)
+        return moments, lambda n, w: (n + (m[[1, 2, 0]] - m[[2, 0, 1]]) * products(w)) / m
     turn, _ = np.linalg.qr(np.array([source.vector(1.0) for _ in range(3)]))
     full = turn @ np.diag(moments) @ turn.T
     rows = [[source.rounded(float(full[min(i, j), max(i, j)])) for j in range(3)] for i in range(3)]
     matrix = exact(rows)
     with mp.workdps(40):
-        inverse = (mp.matrix(matrix) ** -1).tolist()
-
-    def rates(n: Vector, w: Vector) -> Vector:
-        return applied(inverse, plus(n, times(-1, cross(w, applied(matrix, w)))))
-
-    return rows, rates
+        inverse = np.array((mp.matrix(rows) ** -1).tolist())
+    return rows, lambda n, w: inverse @ (n - np.cross(w, matrix @ w))
 
 
 def _law(source: _Source, size: float, speed: float, frame: str) -> tuple[TorqueLaw, list[Any]]:
@@ -207,11 +169,11 @@ def _law(source: _Source, size: float, speed: float, frame: str) -> tuple[Torque
     rate = [source.rounded(0.1 * speed * x) for x in rate]
     f, g = (source.rounded(speed * 10.0 ** source.random.uniform(-1.0, 0.4)) for _ in range(2))
     law = TorqueLaw(constant, rate, [(one, f)], [(two, g)], frame)
-    parts = [exact(each) for each in (constant, rate, one, two)]
+    parts = exact((constant, rate, one, two))
     f, g = mpf(f), mpf(g)
 
-    def combined(a: Any, b: Any, c: Any, d: Any) -> Vector:
-        return [a * p + b * q + c * r + d * s for p, q, r, s in zip(*parts, strict=True)]
+    def combined(*factors: Any) -> Vector:
+        return np.array(factors) @ parts
 
     functions: list[Any] = [
         lambda t: combined(1, t, mp.sin(f * t), mp.cos(g * t)),
@@ -243,71 +205,55 @@ def _ready(
     if name == "damping":
         d = source.matrix(0.3 * push)
         m = exact(d)
-        return torques.damping(d), lambda t, w, q, _: times(-1, applied(m, w))
+        return torques.damping(d), lambda t, w, q, _: -m @ w
     if name == "drag":
-        c0, c1, c2 = source.number(0, 0.2 * push), source.vector(0.2 * part / speed), 0.0
-        c1 = [abs(x) for x in c1]
+        c0, c1 = source.number(0, 0.2 * push), [abs(x) for x in source.vector(0.2 * part / speed)]
         c2 = source.number(0.0, 0.05 * part / speed**3)
-        e0, e1, e2 = mpf(c0), exact(c1), mpf(c2)
-
-        def drag(t: Any, w: Vector, q: Vector, _: Any) -> Vector:
-            square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-            return [-x * (e0 + e * square + e2 * square**2) for x, e in zip(w, e1, strict=True)]
-
-        return torques.drag([c0, c1, c2]), drag
+        e1 = exact(c1)
+        return torques.drag(
+            [c0, c1, c2]
+        ), lambda t, w, q, _: -w * (c0 + e1 * (w @ w) + c2 * (w @ w) ** 2)
     if name == "drag_per_axis":
         c0, d = source.number(0.0, 0.2 * push), source.matrix(0.1 * part / speed)
-        e0, m = mpf(c0), exact(d)
-        return torques.drag([c0, d], per_axis=True), lambda t, w, q, _: plus(
-            times(-e0, w), times(-1, applied(m, [x**3 for x in w]))
-        )
+        m = exact(d)
+        return torques.drag([c0, d], per_axis=True), lambda t, w, q, _: -c0 * w - m @ w**3
     if name == "rate_control":
         k, target = source.matrix(0.3 * push), source.vector(speed)
         m, aim = exact(k), exact(target)
-        return torques.rate_control(k, target), lambda t, w, q, _: times(
-            -1, applied(m, plus(w, times(-1, aim)))
-        )
+        return torques.rate_control(k, target), lambda t, w, q, _: -m @ (w - aim)
     if name == "attitude_control":
         spring, brake, target = (
             source.matrix(push * speed), source.matrix(0.2 * push), source.quaternion()
         )  # fmt: skip
-        s, b, (g, h, i, j) = exact(spring), exact(brake), exact(target)
+        s, b, g = exact(spring), exact(brake), exact(target)
         with mp.workdps(40):
-            norm = mp.sqrt(g * g + h * h + i * i + j * j)
-            g, h, i, j = g / norm, h / norm, i / norm, j / norm
+            g = g / mp.sqrt(g @ g)
 
         def control(t: Any, w: Vector, q: Vector, _: Any) -> Vector:
-            scalar = g * q[0] + h * q[1] + i * q[2] + j * q[3]
             # The vector part of target* q.
-            vector = plus(
-                plus(times(g, q[1:]), times(-q[0], [h, i, j])), times(-1, cross([h, i, j], q[1:]))
-            )
-            return plus(applied(s, times(-2 * scalar, vector)), times(-1, applied(b, w)))
+            vector = g[0] * q[1:] - q[0] * g[1:] - np.cross(g[1:], q[1:])
+            return s @ (-2 * (g @ q) * vector) - b @ w
 
         return torques.attitude_control(spring, brake, target), control
     if name == "wheels":
         stored = source.vector(push)
         h0 = exact(stored)
-        return torques.wheels(stored), lambda t, w, q, _: times(-1, cross(w, h0))
+        return torques.wheels(stored), lambda t, w, q, _: -np.cross(w, h0)
     if name == "motors":
         stored = source.vector(push)
         h1 = exact(stored)
         law, (value, integral, _) = _law(source, 0.3 * push * speed, speed, "body")
-        return torques.wheels(stored, law), lambda t, w, q, _: times(
-            -1, plus(cross(w, plus(h1, integral(t))), value(t))
-        )
+        return torques.wheels(
+            stored, law
+        ), lambda t, w, q, _: -np.cross(w, h1 + integral(t)) - value(t)
     if name == "gravity_gradient":
         rate = source.number(0.1 * speed, 0.8 * speed)
-        n = mpf(rate)
-        rows = exact(
-            inertia
-            if isinstance(inertia[0], list)
-            else [[inertia[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
-        )
+        n, rows = mpf(rate), exact(inertia)
+        rows = rows if rows.ndim == 2 else np.diag(rows)
 
         def gradient(t: Any, w: Vector, q: Vector, _: Any) -> Vector:
-            r = to_body(q, [mp.cos(n * t), mp.sin(n * t), mpf(0)])
-            return times(3 * n * n, cross(r, applied(rows, r)))
+            r = to_body(q, np.array([mp.cos(n * t), mp.sin(n * t), mpf(0)]))
+            return 3 * n * n * np.cross(r, rows @ r)
 
         return torques.gravity_gradient(inertia, rate), gradient
     if name == "law":
@@ -319,19 +265,17 @@ def _ready(
     if name == "magnetic_dipole":
         moment = source.vector(1.0)
         m = exact(moment)
-        return torques.magnetic_dipole(moment, law), lambda t, w, q, _: cross(
+        return torques.magnetic_dipole(moment, law), lambda t, w, q, _: np.cross(
             m, to_body(q, value(t))
         )
     assert name == "magnetic_damping"
     # The field is of the size 1.
     law, (value, _, change) = _law(source, 1.0, speed, "space")
     gain = source.number(0.0, push)
-    k = mpf(gain)
 
     def coils(t: Any, w: Vector, q: Vector, _: Any) -> Vector:
         b = to_body(q, value(t))
-        rate = plus(to_body(q, change(t)), times(-1, cross(w, b)))
-        return cross(times(-k, rate), b)
+        return np.cross(-gain * (to_body(q, change(t)) - np.cross(w, b)), b)
 
     return torques.magnetic_damping(gain, law), coils
 
@@ -352,7 +296,7 @@ def _tabulated(source: _Source, name: str, size: float, speed: float) -> Term:
 
         def pulse(t: Any, w: Vector, q: Vector, middle: Any) -> Vector:
             inside = any(a < middle < b for a, b in zip(starts, ends, strict=True))
-            return value if inside else [mpf(0)] * 3
+            return value if inside else 0 * value
 
         return torques.pulses(starts, durations, torque), pulse, [*starts, *ends]
     begins = [start]
@@ -360,8 +304,8 @@ def _tabulated(source: _Source, name: str, size: float, speed: float) -> Term:
         begins.append(begins[-1] + gap)
     rows = [source.vector(size) for _ in begins]
     at: Vector = exact(begins)
-    values: list[Vector] = exact(rows)
-    bends = [_second_derivatives(at, [row[i] for row in values]) for i in range(3)]
+    values: Vector = exact(rows)
+    bends = _second_derivatives(at, values)
 
     def tabulated(t: Any, w: Vector, q: Vector, middle: Any) -> Vector:
         if middle <= at[0]:
@@ -373,109 +317,90 @@ def _tabulated(source: _Source, name: str, size: float, speed: float) -> Term:
             return values[k]
         h, s = at[k + 1] - at[k], t - at[k]
         a, b = (h - s) / h, s / h
-        line = [a * x + b * y for x, y in zip(values[k], values[k + 1], strict=True)]
+        line = a * values[k] + b * values[k + 1]
         if name == "linear":
             return line
         # The cubic polynomial of a spline from its second derivatives at the two ends.
-        return [
-            x + ((a**3 - a) * m[k] + (b**3 - b) * m[k + 1]) * h * h / 6
-            for x, m in zip(line, bends, strict=True)
-        ]
+        bent = (a**3 - a) * bends[k] + (b**3 - b) * bends[k + 1]
+        return line + bent * h * h / 6
 
     return torques.table(begins, rows, name), tabulated, begins
 
 
 def _second_derivatives(at: Vector, values: Vector) -> Vector:
-    """Return the second derivatives of a cubic spline, whose third is continuous near its ends."""
+    """Return the second derivatives of cubic splines, whose third is continuous near their ends."""
     with mp.workdps(40):
-        n, h = len(at), [b - a for a, b in itertools.pairwise(at)]
-        matrix, right = mp.zeros(n), mp.zeros(n, 1)
+        n, h = len(at), np.diff(at)
+        matrix, right = mp.zeros(n), 0 * values
         for k in range(1, n - 1):
             matrix[k, k - 1], matrix[k, k + 1] = h[k - 1] / 6, h[k] / 6
             matrix[k, k] = (h[k - 1] + h[k]) / 3
             right[k] = (values[k + 1] - values[k]) / h[k] - (values[k] - values[k - 1]) / h[k - 1]
         for row, k in ((0, 1), (n - 1, n - 2)):
-            matrix[row, k - 1], matrix[row, k], matrix[row, k + 1] = (
-                1 / h[k - 1], -1 / h[k - 1] - 1 / h[k], 1 / h[k]
-            )  # fmt: skip
-        return list(mp.lu_solve(matrix, right))
+            matrix[row, k - 1], matrix[row, k + 1] = 1 / h[k - 1], 1 / h[k]
+            matrix[row, k] = -1 / h[k - 1] - 1 / h[k]
+        return np.array((matrix**-1).tolist()) @ right
 
 
-# The nodes of a random expression: the text, the operation on symbols with NumPy, and that of
-# mpmath, with a place for each operand. All are smooth everywhere.
-_NODES: list[tuple[str, Callable[..., Any], Callable[..., Any]]] = [
-    ("({} + {})", lambda x, y: x + y, lambda x, y: x + y),
-    ("({} - {})", lambda x, y: x - y, lambda x, y: x - y),
-    ("({} * {})", lambda x, y: x * y, lambda x, y: x * y),
-    ("({} / (2 + {}**2))", lambda x, y: x / (2.0 + y**2), lambda x, y: x / (2 + y * y)),
-    ("sin({})", lambda x: np.sin(x), lambda x: mp.sin(x)),
-    ("cos({})", lambda x: np.cos(x), lambda x: mp.cos(x)),
-    ("tanh({})", lambda x: np.tanh(x), lambda x: mp.tanh(x)),
-    ("exp(-{}**2)", lambda x: np.exp(-(x**2)), lambda x: mp.exp(-x * x)),
-    ("sqrt(1.25 + {}**2)", lambda x: np.sqrt(1.25 + x**2), lambda x: mp.sqrt(mpf(1.25) + x * x)),
-    ("({} / sqrt(1.5 + {}**2))", lambda x, y: x / np.sqrt(1.5 + y**2),
-     lambda x, y: x / mp.sqrt(mpf(1.5) + y * y)),
-    ("tan(0.5*sin({}))", lambda x: np.tan(0.5 * np.sin(x)), lambda x: mp.tan(mp.sin(x) / 2)),
-    ("cosh(sin({}))", lambda x: np.cosh(np.sin(x)), lambda x: mp.cosh(mp.sin(x))),
-    ("sinh(cos({}))", lambda x: np.sinh(np.cos(x)), lambda x: mp.sinh(mp.cos(x))),
-    ("(({})**3)", lambda x: x**3, lambda x: x * x * x),
-    ("((1.5 + {}**2)**-2)", lambda x: (1.5 + x**2) ** -2, lambda x: 1 / (mpf(1.5) + x * x) ** 2),
-]  # fmt: skip
+_FUNCTIONS = ("sin", "cos", "tan", "exp", "sqrt", "tanh", "cosh", "sinh")
+# The nodes of a random expression, with a place for each operand. All are smooth everywhere.
+_NODES = (
+    "({} + {})", "({} - {})", "({} * {})", "({} / (2 + {}**2))", "sin({})", "cos({})", "tanh({})",
+    "exp(-{}**2)", "sqrt(1.25 + {}**2)", "({} / sqrt(1.5 + {}**2))", "tan(0.5*sin({}))",
+    "cosh(sin({}))", "sinh(cos({}))", "(({})**3)", "((1.5 + {}**2)**-2)",
+)  # fmt: skip
+
+
+def _values(texts: list[str], functions: Any) -> Callable[[Any, Any, Any], Any]:
+    """Return the function of t, omega and the quaternion that expressions are."""
+    known = {n: getattr(functions, n) for n in _FUNCTIONS}
+    codes = [compile(f"tanh({text})", text, "eval") for text in texts]
+
+    def values(t: Any, w: Any, q: Any) -> Any:
+        names = {"t": t, "w1": w[0], "w2": w[1], "w3": w[2]}
+        names |= {f"q{n}": each for n, each in enumerate(q)}
+        return np.array([eval(code, known, names) for code in codes])
+
+    return values
 
 
 def _expressed(source: _Source, name: str, size: float, speed: float) -> Term:
     """Return a random expression of a scene file or a Python function, and its formula."""
     turning = source.random.random() < 0.5
-    axes = [_tree(source, source.random.choice((1, 2, 3)), speed, turning) for _ in range(3)]
+    texts = [_tree(source, source.random.choice((1, 2, 3)), speed, turning) for _ in range(3)]
     sizes = source.vector(size)
     brake = source.number(0.0, 0.3) * size / speed
     if source.short:
         brake = source.rounded(brake)
-    factors, b = exact(sizes), mpf(brake)
+    factors, exactly = exact(sizes), _values(texts, mp)
 
     def formula(t: Any, w: Vector, q: Vector, _: Any) -> Vector:
-        return [
-            f * mp.tanh(axis[2](t, w, q)) - b * x
-            for f, axis, x in zip(factors, axes, w, strict=True)
-        ]
+        return factors * exactly(t, w, q) - brake * w
 
     if name == "expression":
-        texts = [
-            f"{s!r}*tanh({axis[0]}) - brake*w{n}"
-            for n, (s, axis) in enumerate(zip(sizes, axes, strict=True), 1)
+        rows = [
+            f"{s!r}*tanh({text}) - brake*w{n}"
+            for n, (s, text) in enumerate(zip(sizes, texts, strict=True), 1)
         ]
-        return parsed(texts, {"brake": brake}), formula, []
-
-    def function(t: Any, w: Any, q: Any) -> Any:
-        return np.array([np.tanh(axis[1](t, w, q)) for axis in axes]) * sizes - brake * w
-
-    return recorded(function), formula, []
+        return parsed(rows, {"brake": brake}), formula, []
+    symbols = _values(texts, np)
+    return recorded(lambda t, w, q: symbols(t, w, q) * sizes - brake * w), formula, []
 
 
-def _tree(source: _Source, depth: int, speed: float, turning: bool) -> tuple[str, Any, Any]:
-    """Return a random expression as a text, as a function of symbols, and as one of mpmath."""
+def _tree(source: _Source, depth: int, speed: float, turning: bool) -> str:
+    """Return the text of a random expression."""
     if depth == 0:
         return _leaf(source, speed, turning)
-    text, symbols, numbers = source.random.choice(_NODES)
-    parts = [_tree(source, depth - 1, speed, turning) for _ in range(symbols.__code__.co_argcount)]
-    return (
-        text.format(*(part[0] for part in parts)),
-        lambda t, w, q: symbols(*(part[1](t, w, q) for part in parts)),
-        lambda t, w, q: numbers(*(part[2](t, w, q) for part in parts)),
-    )
+    node = source.random.choice(_NODES)
+    return node.format(*(_tree(source, depth - 1, speed, turning) for _ in range(node.count("{}"))))
 
 
-def _leaf(source: _Source, speed: float, turning: bool) -> tuple[str, Any, Any]:
+def _leaf(source: _Source, speed: float, turning: bool) -> str:
     n = source.random.randrange(4)
     c = source.rounded(source.random.choice((-1.0, 1.0)) * source.number(0.3, 1.5))
     kind = source.random.choice(("w", "w", "t", "q" if turning else "w"))
     if kind == "q":
-        k = mpf(c)
-        return f"({c!r}*q{n})", lambda t, w, q: c * q[n], lambda t, w, q: k * q[n]
+        return f"({c!r}*q{n})"
     if kind == "t":
-        f = source.rounded(c * speed)
-        k = mpf(f)
-        return f"sin({f!r}*t)", lambda t, w, q: np.sin(f * t), lambda t, w, q: mp.sin(k * t)
-    i, f = n % 3, source.rounded(c / speed)
-    k = mpf(f)
-    return f"({f!r}*w{i + 1})", lambda t, w, q: f * w[i], lambda t, w, q: k * w[i]
+        return f"sin({source.rounded(c * speed)!r}*t)"
+    return f"({source.rounded(c / speed)!r}*w{n % 3 + 1})"

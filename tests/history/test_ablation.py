@@ -1,20 +1,18 @@
 """The apparatus, the effect of each entry, and the lattice of defects."""
 
-import csv
 import json
 from dataclasses import replace
 
 import pytest
 
 from pyharness import Scene, case_scene
-from pyharness.cli.main import main
 from pyharness.history.ablation import CaseEffects, Effect, effects_of, entries, lattice
 from pyharness.history.apparatus_report import lattice_report
 from pyharness.model.listing import Listing, flagged, names_of
 from pyharness.truth.reference import Reference
 from pyharness.views.render import render
+from tests.conftest import Printed
 
-Capture = pytest.CaptureFixture[str]
 KINDS = {
     "defect", "reading", "conjecture", "misreading", "normalization", "dialect",
     "redundant", "unread", "unreachable", "missing text",
@@ -77,35 +75,28 @@ def test_lattice_is_whole_and_sorted() -> None:
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_defects_on_the_command_line(capsys: Capture) -> None:
-    def told(*arguments: str) -> str:
-        assert main(["defects", *arguments]) == 0
-        return capsys.readouterr().out
-
-    listed = told()
-    pages = {each["id"]: told(each["id"]) for each in entries()}
+def test_defects_on_the_command_line(printed: Printed) -> None:
+    listed = printed("defects")
+    pages = {each["id"]: printed(f"defects {each['id']}") for each in entries()}
     assert max(len(line) for page in (listed, *pages.values()) for line in page.splitlines()) <= 100
     for each in entries():
         assert f"\n{each['id']} " in listed
         assert ("Effect, measured now" in pages[each["id"]]) == ("flag" in each)
-    record = json.loads(told("--kind", "reading", "--format", "json"))
+    record = json.loads(printed("defects --kind reading --format json"))
     assert [each["id"] for each in record["entries"]] == list(names_of("reading"))
-    record = json.loads(told("dt-accumulates", "--format", "json"))
+    record = json.loads(printed("defects dt-accumulates --format json"))
     assert len(record["effects"]) == 2 * 7
     assert record["effects"][5]["original"]["ended"] == "overflow"
 
 
-def test_ablate_in_every_form(capsys: Capture) -> None:
-    arguments = ["compare", "--case", "4", "--ablate"]
-    assert main(arguments) == 0
-    assert "every subset" in capsys.readouterr().out
-    assert main([*arguments, "--format", "csv"]) == 0
-    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
-    assert len(rows) == 8 + 4 + 64
-    assert main([*arguments, "--format", "json", "--program", "two-term"]) == 0
-    record = json.loads(capsys.readouterr().out)
+def test_ablate_in_every_form(printed: Printed) -> None:
+    command = "compare --case 4 --ablate"
+    assert "every subset" in printed(command)
+    rows = printed(f"{command} --format csv").splitlines()
+    assert len(rows) == 1 + 8 + 4 + 64
+    record = json.loads(printed(f"{command} --format json --program two-term"))
     assert [len(each) for each in record["lattice"].values()] == [8]
-    assert main([*arguments, "--program", "runge-kutta", "--reading", "do-variable"]) == 0
+    assert printed(f"{command} --program runge-kutta --reading do-variable")
 
 
 def test_overflow_near_the_truth_is_worse_too(monkeypatch: pytest.MonkeyPatch) -> None:

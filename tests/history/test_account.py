@@ -14,7 +14,7 @@ from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, REPRODUCED
 from pyharness.history.limits import limit
-from pyharness.model.facts import facts, shipped
+from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switches
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
@@ -58,15 +58,9 @@ def test_every_statement_is_in_its_documents_word_for_word() -> None:
 
 def test_pages_take_their_sentences_from_the_data() -> None:
     folder = ROOT / "pyharness/edition/templates"
-    used = {
-        name: set(re.findall(r"account(?:\.|\[\")([a-z-]+)", (folder / name).read_text()))
-        for name in ("index.html", "about.html")
-    }
-    assert used == {
-        "index.html": {"work", "units"},
-        "about.html": {"conclusion", "work", "machine", "units"},
-    }
-    home = (folder / "index.html").read_text()
+    home, about = ((folder / f"{name}.html").read_text() for name in ("index", "about"))
+    used = [set(re.findall(r"account(?:\.|\[\")([a-z-]+)", each)) for each in (home, about)]
+    assert used == [{"work", "units"}, {"conclusion", "work", "machine", "units"}]
     for name in MECHANISM["alone"]:
         assert f"apparatus.html#{name}" in home
     assert "mechanism.limit" in home
@@ -78,7 +72,7 @@ def test_dates_are_those_of_the_title_page_and_the_foreword() -> None:
     text = STATEMENTS["work"]["text"]
     for name in ("began", "ended", "submitted", "published"):
         assert work[name] in text
-    printed = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
+    printed = ROOT.parent / "shared/thesis/thesis.txt"
     if printed.exists():
         thesis = _words(printed.read_text())
         assert f"during the period {work['began']} to {work['ended']}" in thesis
@@ -86,20 +80,12 @@ def test_dates_are_those_of_the_title_page_and_the_foreword() -> None:
         assert work["published"] in thesis
 
 
-def _run_and_truth(name: str, case: int) -> tuple[float | None, int]:
-    scene = case_scene(case)
-    program = PROGRAM_REGISTRY[MECHANISM["program"]]
-    found = measured_order(
-        scene, replace(program, order=1), Listing(program.name, [name]),
-        reference(scene, scene.times()),
-    )  # fmt: skip
-    return found.value, found.due
-
-
 @pytest.mark.parametrize("name", MECHANISM["alone"])
 @pytest.mark.parametrize("case", [2, 3, 5])
 def test_each_defect_alone_costs_the_order(name: str, case: int) -> None:
-    order, _ = _run_and_truth(name, case)
+    scene, program = case_scene(case), PROGRAM_REGISTRY[MECHANISM["program"]]
+    first, truth = replace(program, order=1), reference(scene, scene.times())
+    order = measured_order(scene, first, Listing(program.name, [name]), truth).value
     assert order == pytest.approx(MECHANISM["alone"][name], abs=0.1)
     assert name in PARTS[name]
     why = entry(name)["why"]
@@ -133,16 +119,16 @@ RESET = "            point[1] = result\n"
 
 
 @pytest.mark.parametrize(
-    ("reset", "step", "exceeds"),
+    ("reset", "told", "step", "exceeds"),
     [
-        ("[*result[:3], *point[1][3:]]", 25, False),
-        ("[*point[1][:3], *result[3:]]", 29, True),
-        ("result", 13, False),
+        ("[*result[:3], *point[1][3:]]", "step 25", 25, False),
+        ("[*point[1][:3], *result[3:]]", "step 29", 29, True),
+        ("result", "of both at step 13", 13, False),
     ],
     ids=["U alone", "V alone", "both"],
 )
 def test_only_growing_beyond_the_sine_tells_that_u_is_not_set_back(
-    reset: str, step: int, exceeds: bool
+    reset: str, told: str, step: int, exceeds: bool
 ) -> None:
     source = (ROOT / "pyharness/original/runge_kutta.py").read_text()
     assert source.count(RESET) == 1
@@ -152,8 +138,7 @@ def test_only_growing_beyond_the_sine_tells_that_u_is_not_set_back(
     run = altered.run(case_scene(2), listing)
     assert run.stop.step == step
     assert bool((run.omega[:, 0] > np.sin(5.0 * run.time) + 1e-3).any()) == exceeds
-    told = entry("base-not-restored")["evidence"]
-    assert {"result": "of both at step 13"}.get(reset, f"step {step}") in told
+    assert told in entry("base-not-restored")["evidence"]
     assert "Case 2 stops at step 25 too" in STATEMENTS["growing"]["text"]
 
 
@@ -227,6 +212,13 @@ def test_a_told_motive_is_found() -> None:
         assert re.search(_NOT_SAID["the author's thoughts"], text)
 
 
+def test_what_is_not_known_is_said_so() -> None:
+    lost = [each for each in claims() if each["id"].startswith("iv2-others")]
+    assert outcome(lost[0], Laboratory(True)).verdict == NOT_TESTABLE
+    assert "--word cdc48" in _document(ABOUT)
+    assert entry("dialect-cdc")["certainty"] == "probable"
+
+
 def test_article_has_the_distance_from_the_limit() -> None:
     run = run_program(case_scene(2), Listing.original("runge-kutta"))
     away = np.abs(run.omega[:, 0] - 2.0 * np.sin(2.5 * run.time)).max()
@@ -247,22 +239,10 @@ def test_page_about_the_text_names_the_entries_of_each_certainty() -> None:
     assert [each["id"] for each in flagged_ if each["certainty"] != "certain"] == ["x3-reads-acl2"]
 
 
-def test_of_the_lost_programs_nothing_is_said_to_be_known() -> None:
-    lost = [each for each in claims() if each["id"].startswith("iv2-others")]
-    assert outcome(lost[0], Laboratory(True)).verdict == NOT_TESTABLE
-
-
-def test_emulated_words_are_told_of_where_they_are_had() -> None:
-    assert "--word cdc48" in _document(ABOUT)
-    assert entry("dialect-cdc")["certainty"] == "probable"
-    assert (shipped("docs") / "explanation/words.md").exists()
-
-
 def test_numbers_of_readme_and_page_about_the_text_are_those_of_runs_and_cards() -> None:
     scene = case_scene(3)
-    printed, mended = (
-        run_program(scene, each("runge-kutta")) for each in (Listing.original, Listing.corrected)
-    )  # fmt: skip
+    listings = (Listing.original("runge-kutta"), Listing.corrected("runge-kutta"))
+    printed, mended = (run_program(scene, each) for each in listings)
     assert printed.stop is not None
     truth = reference(scene, scene.times()).omega
     errors = [np.abs(r.omega - truth[: r.steps]).max(axis=0) for r in (printed, mended)]

@@ -20,6 +20,7 @@ from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR, leqt1f
 from pyharness.theory.tableau import tableau
 from pyharness.truth.reference import reference
+from tests.conftest import Printed
 
 Capture = pytest.CaptureFixture[str]
 
@@ -91,13 +92,8 @@ def test_derived_orders() -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize(
     ("points", "order"),
-    [
-        ((1 / 3, 1.0), 3),  # Radau
-        ((0.0, 0.5, 1.0), 4),  # Lobatto
-        ((0.0, 0.4, 1.0), 3),
-        ((0.1, 0.35), 2),
-        ((0.4,), 1),
-    ],
+    # Radau, Lobatto, and others.
+    [((1 / 3, 1.0), 3), ((0.0, 0.5, 1.0), 4), ((0.0, 0.4, 1.0), 3), ((0.1, 0.35), 2), ((0.4,), 1)],
 )
 def test_points_of_ones_own(points: tuple[float, ...], order: int) -> None:
     member = Member("collocation", len(points), points, 6)
@@ -271,21 +267,17 @@ def test_solution_that_leaves_every_bound_is_refused() -> None:
         order_table(replace(GROWING, step_size=0.3, steps=4))
 
 
-def test_one_member_in_every_format(capsys: Capture) -> None:
-    one = ["family", "--case", "4", "--weighting", "collocation", "--terms", "3"]
-    one += ["--points", "0,0.5,1", "--corrections", "3", "--format"]
-    assert main([*one, "json"]) == 0
-    record = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+def test_one_member_in_every_format(printed: Printed) -> None:
+    one = "family --case 4 --weighting collocation --terms 3 --points 0,0.5,1 --corrections 3"
+    record = json.loads(printed(f"{one} --format json"), parse_constant=pytest.fail)
     (member,) = record["members"]
     assert (member["points"], member["predicted"]) == ([0.0, 0.5, 1.0], 4)
     assert abs(member["measured"] - 4) < SLACK
     assert (record["schema"], record["unexpected"]) == (1, [])
-    assert main([*one, "csv"]) == 0
-    head, row = capsys.readouterr().out.splitlines()
+    head, row = printed(f"{one} --format csv").splitlines()
     assert head.startswith("weighting,points,terms,corrections,predicted,measured")
     assert row.endswith(repr(member["error"]))
-    assert main([*one, "markdown"]) == 0
-    assert "| collocation | 0,0.5,1 | 3 | 4/" in capsys.readouterr().out
+    assert "| collocation | 0,0.5,1 | 3 | 4/" in printed(f"{one} --format markdown")
 
 
 def test_order_below_the_one_derived_is_exit_code_1(
@@ -293,6 +285,5 @@ def test_order_below_the_one_derived_is_exit_code_1(
 ) -> None:
     monkeypatch.setattr("pyharness.history.family.orders.predicted_order", lambda member: 3)
     assert main(["family", "--terms", "2"]) == 1
-    assert "UNEXPECTED: collocation at points thesis, 2 terms, 1 corrections: order 2.0" in (
-        capsys.readouterr().out
-    )
+    told = "UNEXPECTED: collocation at points thesis, 2 terms, 1 corrections: order 2.0"
+    assert told in capsys.readouterr().out

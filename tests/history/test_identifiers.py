@@ -9,14 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from pyharness.history import identifiers
 from pyharness.history.identifiers import (
     DATA,
-    card_identifier,
-    card_lines,
     content_identifier,
     data_identifier,
     directory_identifier,
-    identifier_of_lines,
     source_files,
 )
 from pyharness.model import facts as tables
@@ -37,8 +35,8 @@ def _git(folder: Path, *arguments: str, content: bytes = b"") -> str:
         "GIT_CONFIG_COUNT": "1", "GIT_CONFIG_KEY_0": "safe.directory", "GIT_CONFIG_VALUE_0": "*",
         "GIT_CEILING_DIRECTORIES": str(folder.parent),
     }  # fmt: skip
-    environment.pop("GIT_DIR", None)
-    environment.pop("GIT_INDEX_FILE", None)
+    for name in ("GIT_DIR", "GIT_INDEX_FILE"):
+        environment.pop(name, None)
     done = subprocess.run(
         ["git", *arguments],
         cwd=folder, env=environment, input=content, capture_output=True, check=False,
@@ -53,11 +51,9 @@ def test_known_identifiers() -> None:
     assert directory_identifier({}) == "swh:1:dir:4b825dc642cb6eb9a060e54bf8d69288fbee4904"
     # A folder with one empty file, from the documentation of git.
     assert directory_identifier({"a": b""}) == "swh:1:dir:496d6428b9cf92981dc9495211e6e1120fb6f2ba"
-
-
-def test_lines_qualify_a_file() -> None:
-    assert identifier_of_lines(f"swh:1:cnt:{EMPTY}", 7) == f"swh:1:cnt:{EMPTY};lines=7"
-    assert identifier_of_lines(f"swh:1:cnt:{EMPTY}", 7, 9) == f"swh:1:cnt:{EMPTY};lines=7-9"
+    of_lines = identifiers.identifier_of_lines
+    assert of_lines("swh:1:cnt:0", 7) == "swh:1:cnt:0;lines=7"
+    assert of_lines("swh:1:cnt:0", 7, 9) == "swh:1:cnt:0;lines=7-9"
 
 
 @pytest.mark.external
@@ -111,8 +107,7 @@ def test_an_installation_has_the_same_identifiers(
 ) -> None:
     """The folder of the data of an installed package has more files, and those of the port."""
     before = data_identifier(), [*source_files().items()]
-    folder = tmp_path / "data"
-    shutil.copytree(ROOT / DATA, folder)
+    folder = Path(shutil.copytree(ROOT / DATA, tmp_path / "data"))
     shutil.copytree(ROOT / "fortran/original", folder / "fortran/original")
     for name in SHIPPED:
         if (ROOT / name).is_file():
@@ -132,9 +127,9 @@ def test_identifier_of_a_card_leads_to_its_line(program: str) -> None:
     path = ROOT / DATA / f"cards/{program}.toml"
     lines = path.read_text().splitlines()
     found = deck(program)
-    assert list(card_lines(path.read_bytes())) == list(found.cards)
+    assert list(identifiers.card_lines(path.read_bytes())) == list(found.cards)
     for number, card in found.cards.items():
-        identifier, _, line = card_identifier(card).partition(";lines=")
+        identifier, _, line = identifiers.card_identifier(card).partition(";lines=")
         assert identifier == content_identifier(path.read_bytes())
         row = tomllib.loads(lines[int(line) - 1])
         assert row[str(number)]["text"] == card.text

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness.history import lost
 from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, integrate, ranked
 from pyharness.model.facts import facts
 from pyharness.model.scene_file import case_scene
@@ -20,7 +19,7 @@ def found() -> dict[str, Ranked]:
 @pytest.mark.campaign
 def test_without_a_mistake_they_work(found: dict[str, Ranked]) -> None:
     assert not found["none"].in_either
-    for weighting in lost.WEIGHTINGS:
+    for weighting in WEIGHTINGS:
         assert 3.5 < halved(case_scene(2), weighting) < 4.5
 
 
@@ -39,9 +38,8 @@ def test_ranking_is_by_both_cases_then_by_either(found: dict[str, Ranked]) -> No
 
 
 def test_symmetric_matrix_does_not_mind_being_transposed() -> None:
-    scene = case_scene(2)
-    same = integrate(scene, "least-squares", "transposed") == integrate(scene, "least-squares")
-    assert same.all()
+    one, other = (integrate(case_scene(2), "least-squares", *x) for x in ((), ("transposed",)))
+    assert (one == other).all()
 
 
 @pytest.mark.campaign
@@ -54,10 +52,10 @@ def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
         for case in CASES:
             scene = replace(case_scene(case), steps=50)
             floats = integrate(scene, weighting)
-            apart = {}
-            for word in ("binary64", "cdc48", "cdc48-rounded", "binary32"):
-                found = integrate(scene_in(scene, WORDS[word]), weighting)
-                apart[word] = np.abs(found - floats).max()
+            apart = {
+                word: np.abs(integrate(scene_in(scene, WORDS[word]), weighting) - floats).max()
+                for word in ("binary64", "cdc48", "cdc48-rounded", "binary32")
+            }
             assert apart["binary64"] < 1e-14
             assert 1e-15 < apart["cdc48-rounded"] < apart["cdc48"] < 1e-12
             assert 1e-8 < apart["binary32"] < 1e-5
@@ -65,12 +63,9 @@ def test_rounding_of_the_machine_makes_none_of_them_fail() -> None:
 
 def test_mistakes_fail_in_a_word_where_they_fail() -> None:
     """One case is enough, because the effect of a mistake does not depend on rounding."""
-    scene = scene_in(replace(case_scene(2), steps=20), WORDS["cdc48"])
     floats = replace(case_scene(2), steps=20)
+    scene = scene_in(floats, WORDS["cdc48"])
     for mistake in ("matrix-used-up", "base-left-out", "unscaled-solver", "unit-interval"):
         for weighting in WEIGHTINGS:
-            found, expected = (
-                integrate(scene, weighting, mistake),
-                integrate(floats, weighting, mistake),
-            )
-            assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
+            found, due = (integrate(each, weighting, mistake) for each in (scene, floats))
+            assert np.allclose(found, due, rtol=1e-9, atol=1e-9)

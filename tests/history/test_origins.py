@@ -4,6 +4,8 @@ import copy
 import csv
 import json
 import re
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -11,10 +13,8 @@ import pytest
 
 from docs.text.page import text_page
 from pyharness import run_program
-from pyharness.cli.main import main
 from pyharness.history import origins
 from pyharness.history.origins import (
-    CERTAINTIES,
     disagreements,
     mistakes,
     shared_statements,
@@ -25,74 +25,57 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cards import deck
+from tests.conftest import Printed
 
 
 def test_nothing_is_wrong() -> None:
     assert mistakes() == []
+    assert set(unexplained_defects()) == {"impossible-body", "case-7-torque"}
 
 
-def _with(monkeypatch: pytest.MonkeyPatch, change: Any) -> list[str]:
+_NEITHER = "must be in a disagreement or"
+# Changes of the table: an item of it, its new value, and mistakes that are found.
+_CHANGES: list[tuple[list[Any], Any, list[str]]] = [
+    (
+        ["disagreement", 0, "cards", "two-term", "1660"], "DT=DT+.02",
+        ["growing-dt: two-term:1660 is not 'DT=DT+.02'"],
+    ),
+    (
+        ["unexplained", "stage-base"], "no reason",
+        [f"stage-base: {_NEITHER} without an explanation, and not in both"],
+    ),
+    (
+        ["disagreement", 0, "entries"], ["dt-accumulates"],
+        [f"time-axis: {_NEITHER} without an explanation, and not in both"],
+    ),
+    (
+        ["as_required", "steps", 0], "DT grows",
+        [f"DT grows: {_NEITHER} as required, and not in both"],
+    ),
+    (["disagreement", 0, "steps"], ["DT shrinks"], ["no step 'DT shrinks'"]),
+    (["disagreement", 0, "equations"], ["99"], ["no formula '99'"]),
+    (
+        ["disagreement", 0, "entries"], ["time-axis", "no-entry", "stage-base"],
+        ["no entry 'no-entry'", "stage-base names none"],
+    ),
+    (["disagreement", 0, "origin"], "chance", ["no origin 'chance'"]),
+    (["disagreement", 0, "certainty"], "sure", ["no certainty 'sure'"]),
+    (["disagreement", 0, "id"], "end-of-the-interval", ["is 2 times in the table"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "value", "told"), _CHANGES, ids=range(len(_CHANGES)))
+def test_a_mistake_is_found(
+    place: list[Any], value: Any, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     content = copy.deepcopy(facts("disagreements"))
-    change(content)
+    reduce(getitem, place[:-1], content)[place[-1]] = value
     monkeypatch.setattr(
         origins, "facts", lambda name: content if name == "disagreements" else facts(name)
     )
-    return mistakes()
-
-
-def test_a_quotation_that_is_not_on_the_card_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def change(content: Any) -> None:
-        content["disagreement"][0]["cards"]["two-term"]["1660"] = "DT=DT+.02"
-
-    assert _with(monkeypatch, change) == ["growing-dt: two-term:1660 is not 'DT=DT+.02'"]
-
-
-def test_a_defect_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def change(content: Any) -> None:
-        content["disagreement"][0]["entries"].remove("time-axis")
-        content["unexplained"]["stage-base"] = "no reason"
-
-    told = _with(monkeypatch, change)
-    end = "must be in a disagreement or without an explanation, and not in both"
-    assert told == [f"stage-base: {end}", f"time-axis: {end}"]
-
-
-def test_a_step_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def change(content: Any) -> None:
-        content["as_required"]["steps"].remove("END")
-        content["as_required"]["steps"].append("DT grows")
-
-    told = _with(monkeypatch, change)
-    assert told == ["DT grows: must be in a disagreement or as required, and not in both"]
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "message"),
-    [
-        ("steps", ["DT shrinks"], "no step 'DT shrinks'"),
-        ("equations", ["99"], "no formula '99'"),
-        ("entries", ["dt-accumulates", "time-axis", "no-entry"], "no entry 'no-entry'"),
-        ("entries", ["dt-accumulates", "time-axis", "stage-base"], "stage-base names none"),
-        ("origin", "chance", "no origin 'chance'"),
-        ("certainty", "sure", "no certainty 'sure'"),
-        ("id", "end-of-the-interval", "is 2 times in the table"),
-    ],
-)
-def test_a_name_that_does_not_exist_is_found(
-    key: str, value: Any, message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def change(content: Any) -> None:
-        content["disagreement"][0][key] = value
-
-    assert any(message in each for each in _with(monkeypatch, change))
-
-
-def test_every_defect_is_explained_or_named() -> None:
-    explained = {name for each in disagreements() for name in each.entries}
-    defects = {e["id"] for e in facts("apparatus")["entry"] if e["kind"] == "defect"}
-    assert defects == (explained & defects) | set(unexplained_defects())
-    assert set(unexplained_defects()) == {"impossible-body", "case-7-torque"}
-    assert {each.certainty for each in disagreements()} <= set(CERTAINTIES)
+    found = mistakes()
+    for each in told:
+        assert any(each in mistake for mistake in found), found
 
 
 def test_decks_share_statements() -> None:
@@ -127,28 +110,20 @@ def test_faults_have_no_effect_on_omega_in_case_1(program: str) -> None:
     np.testing.assert_allclose(original.omega, truth, rtol=0, atol=1e-12)
 
 
-def test_page_has_every_disagreement_once() -> None:
+def test_page_and_verb_have_every_disagreement_once(
+    printed: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = text_page()
     for each in disagreements():
         assert page.count(f"\n| {each.title} | {each.suggests} |") == 1
     for name in unexplained_defects():
         assert f"- `{name}`: " in page
-
-
-def test_the_verb_shows_the_list_in_every_form(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setenv("COLUMNS", "100")
-
-    def told(*options: str) -> str:
-        assert main(["cards", "--origins", *options]) == 0
-        return capsys.readouterr().out
-
-    text = told()
+    text = printed("cards --origins")
     assert max(map(len, text.splitlines())) <= 100
     assert text.rstrip().endswith(f"{len(disagreements())} disagreements")
-    record = json.loads(told("--format", "json"))
+    record = json.loads(printed("cards --origins --format json"))
     assert [each["id"] for each in record["disagreements"]] == [e.id for e in disagreements()]
     assert record["unexplained"] == [*unexplained_defects()]
-    table = list(csv.DictReader(told("--format", "csv").splitlines()))
+    table = list(csv.DictReader(printed("cards --origins --format csv").splitlines()))
     assert [each["disagreement"] for each in table] == [each.id for each in disagreements()]

@@ -4,9 +4,9 @@ import csv
 import json
 from itertools import product
 
+import numpy as np
 import pytest
 
-from pyharness.cli.main import main
 from pyharness.history.second_reading import (
     chapman,
     disagreeing,
@@ -17,6 +17,7 @@ from pyharness.history.second_reading import (
     sample,
 )
 from pyharness.original.cards import tight
+from tests.conftest import Printed
 
 
 def test_sample_is_the_one_that_the_seed_draws() -> None:
@@ -35,14 +36,9 @@ def test_chapman_corrects_lincoln_and_petersen() -> None:
 def test_interval_contains_the_size_as_often_as_promised() -> None:
     """All samples of a small population: the interval has the size in 95 % or more of them."""
     size, first = 12, 7
-    held = every = 0
-    for marks in product((0, 1), repeat=size):
-        both = sum(marks[:first])
-        if both:
-            lower, upper = recapture_interval(first, sum(marks), both)
-            held += lower <= size <= upper
-            every += 1
-    assert held >= 0.95 * every
+    samples = [(sum(each[:first]), sum(each)) for each in product((0, 1), repeat=size)]
+    intervals = [recapture_interval(first, second, both) for both, second in samples if both]
+    assert np.mean([lower <= size <= upper for lower, upper in intervals]) >= 0.95
 
 
 def test_interval_contains_the_estimate() -> None:
@@ -82,19 +78,13 @@ def test_few_misreadings_remain_if_the_readings_are_independent() -> None:
         assert each.uncorrected == each.upper - each.first <= 2
 
 
-def test_the_verb_shows_it_in_every_form(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_verb_shows_it_in_every_form(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
-
-    def told(*options: str) -> str:
-        assert main(["cards", "--second-reading", *options]) == 0
-        return capsys.readouterr().out
-
-    assert max(map(len, told().splitlines())) <= 100
-    assert "at most" not in told()  # the two readings are not independent: nothing is bounded
-    record = json.loads(told("--format", "json"))
+    text = printed("cards --second-reading")
+    assert max(map(len, text.splitlines())) <= 100
+    assert "at most" not in text  # the two readings are not independent: nothing is bounded
+    record = json.loads(printed("cards --second-reading --format json"))
     assert record["sample"] == {"seed": 1982, "size": 120, "cards": 521}
     assert [each["first"] for each in record["recaptures"]] == [e.first for e in recaptures()]
-    table = list(csv.DictReader(told("--format", "csv").splitlines()))
+    table = list(csv.DictReader(printed("cards --second-reading --format csv").splitlines()))
     assert [each["unit"] for each in table] == ["places", "cards"]

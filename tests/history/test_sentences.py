@@ -11,6 +11,7 @@ from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.history.claims.ledger import claims
 from pyharness.history.claims.sentences import Sentence, sentences
+from tests.conftest import Printed
 
 SENTENCES = sentences()
 STATES = sorted({each.laboratory for each in SENTENCES if each.laboratory})
@@ -24,10 +25,7 @@ KEYS = {
 
 def _lies_in(sentence: Sentence, place: str) -> bool:
     """Whether a sentence is in a place of claims.toml, such as `V.3 and VI`."""
-    return any(
-        sentence.where == each or sentence.where.startswith(f"{each},")
-        for each in place.split(" and ")
-    )
+    return any(f"{sentence.where},".startswith(f"{each},") for each in place.split(" and "))
 
 
 def _command_of(state: str) -> str:
@@ -41,27 +39,26 @@ def _command_of(state: str) -> str:
     return shlex.join(words)
 
 
-def test_every_claim_of_these_sections_judges_a_sentence_at_its_place() -> None:
+def test_every_claim_of_these_sections_judges_a_sentence_at_its_place_and_no_other_does() -> None:
     named = {(name, each) for each in SENTENCES for name in each.claims}
     wanted = [each for each in claims() if re.match(r"VI?\b", each["where"])]
     assert len(wanted) >= 29
     for claim in wanted:
         assert any(n == claim["id"] and _lies_in(s, claim["where"]) for n, s in named), claim["id"]
-
-
-def test_every_claim_that_is_named_exists_and_is_of_these_sections() -> None:
-    known = {each["id"]: each["where"] for each in claims()}
-    for each in SENTENCES:
-        assert len(set(each.claims)) == len(each.claims)
-        for name in each.claims:
-            assert re.match(r"VI?\b", known[name]), name
+    assert {name for name, _ in named} == {each["id"] for each in wanted}
+    assert all(len(set(each.claims)) == len(each.claims) for each in SENTENCES)
 
 
 @pytest.mark.parametrize("sentence", SENTENCES, ids=lambda each: each.quote)
 def test_sentence_is_quoted_briefly_and_judged_or_not(sentence: Sentence) -> None:
     assert 3 <= len(sentence.quote.split()) <= 8
+    assert sentence.quote in " ".join(sentence.text.split())
+    assert sentence.text == sentence.text.strip()
+    assert sentence.text.count("$") % 2 == 0
     assert bool(sentence.claims) != bool(sentence.why)
     assert re.match(r"(V, introduction|V\.[123], |VI, )", sentence.where)
+    if sentence.laboratory and (found := re.fullmatch(r"V\.2, Case (\d)", sentence.where)):
+        assert parse_qs(sentence.laboratory)["case"] == [found[1]]
 
 
 def test_sentences_stand_once_in_the_order_of_the_sections() -> None:
@@ -77,9 +74,8 @@ def test_sentences_stand_once_in_the_order_of_the_sections() -> None:
 
 
 @pytest.mark.parametrize("state", STATES)
-def test_state_of_the_laboratory_runs(state: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(shlex.split(_command_of(state))) == 0
-    assert capsys.readouterr().out
+def test_state_of_the_laboratory_runs(state: str, printed: Printed) -> None:
+    assert printed(_command_of(state))
 
 
 @pytest.mark.parametrize(
@@ -101,26 +97,13 @@ def test_state_with_a_strange_key_or_one_twice_is_found(state: str) -> None:
         _command_of(state)
 
 
-def test_state_is_of_the_case_that_the_sentence_is_about() -> None:
-    for each in SENTENCES:
-        if each.laboratory and (found := re.fullmatch(r"V\.2, Case (\d)", each.where)):
-            assert parse_qs(each.laboratory)["case"] == [found[1]]
-
-
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command_is_one(command: str) -> None:
+def test_command_is_one_and_ends_well(command: str, printed: Printed) -> None:
     verb, *rest = shlex.split(command)
     assert verb in VERBS
     Parser(verb).read(verb, rest)
-
-
-@pytest.mark.parametrize(
-    "command",
-    [each for each in COMMANDS if each.split()[0] in ("run", "plan", "cards", "deck", "rotations")],
-)
-def test_command_ends_well(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(shlex.split(command)) == 0
-    assert capsys.readouterr().out
+    if verb in ("run", "plan", "cards", "deck", "rotations"):
+        assert printed(command)
 
 
 @pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
@@ -129,13 +112,6 @@ def test_every_sentence_of_the_thesis_has_its_quote() -> None:
     assert len(found) == len(SENTENCES)
     for text, sentence in zip(found, SENTENCES, strict=True):
         assert sentence.quote in text
-
-
-def test_quote_is_a_part_of_the_sentence() -> None:
-    for each in SENTENCES:
-        assert each.quote in " ".join(each.text.split()), each.quote
-        assert each.text == each.text.strip()
-        assert each.text.count("$") % 2 == 0
 
 
 @pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")

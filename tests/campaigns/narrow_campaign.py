@@ -5,14 +5,12 @@ rotates about its axis under a torque about it: a pulse, a switch, a kink, or a 
 band of omega, of relative widths from 1e-7 to .03, or a torque with a pole or a root that ends. Its
 true omega is known in closed form, and is evaluated with many digits. A scene is solved by auto in
 every way, and by one of the other methods. A result that is `complete` exceeds the limit if its
-error is larger than the tolerance plus 4e-15 K; no result is right beyond a pole. The command
-prints each such result and a summary, and returns exit status 1 if there is one.
+error is larger than the tolerance plus 4e-15 K; no result is right beyond a pole.
 """
 
 import math
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from random import Random
 from typing import Any, NamedTuple
 
@@ -24,6 +22,7 @@ from pyharness import InputError, Scene, Stepper, Taylor, prepare, solve, solve_
 from pyharness.methods.registry import METHODS
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.state_torque import StateTorque, torque_of
+from tests.campaigns import driver
 
 TIME, MOMENT = 20.0, 3.0
 _EFFORT = 0.2
@@ -40,49 +39,31 @@ class Drawn(NamedTuple):
     omega: float | None
 
 
-def _pulses(x: Any, size: Any, on: Any) -> dict[str, tuple[Any, Any]]:
-    """Return torques over the moment, and their integrals over time in units of the width."""
-    return {
-        "bell": (on.exp(-x * x), on.sqrt(mpmath.pi) / 2 * mpmath.erf(x) if on is mpmath else 0),
-        "sech": (1 / on.cosh(x), 2 * mpmath.atan(mpmath.tanh(x / 2)) if on is mpmath else 0),
-        "sech2": (1 / on.cosh(x) ** 2, mpmath.tanh(x) if on is mpmath else 0),
-        "bump": (1 / (1 + x * x), mpmath.atan(x) if on is mpmath else 0),
-    }
+def _softplus(x: Any) -> Any:
+    return max(x, 0) + mpmath.log1p(mpmath.exp(-abs(x)))
+
+
+# Torques over the moment, and their integrals over time in units of the width.
+_FORMS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "bell": (lambda x: np.exp(-x * x), lambda x: mpmath.sqrt(mpmath.pi) / 2 * mpmath.erf(x)),
+    "sech": (lambda x: 1 / np.cosh(x), lambda x: 2 * mpmath.atan(mpmath.tanh(x / 2))),
+    "sech2": (lambda x: 1 / np.cosh(x) ** 2, mpmath.tanh),
+    "bump": (lambda x: 1 / (1 + x * x), mpmath.atan),
+    "logistic": (lambda x: 1.0 / (1.0 + np.exp(-x)), _softplus),
+    "Fermi": (lambda x: 1.0 - 1.0 / (np.exp(x) + 1.0), _softplus),
+    "tanh": (lambda x: 0.5 + 0.5 * np.tanh(0.5 * x), _softplus),
+    "kink": (lambda x: np.sqrt(x * x), lambda x: x * abs(x) / 2),
+}
 
 
 def _timed(source: Random, kind: str, width: float) -> Drawn:
     """Return a scene whose torque depends on time alone."""
     centre, added = source.uniform(0.1, 0.9) * TIME, source.uniform(0.1, 0.5)
     start = source.choice((0.0, 1.0))
-    if kind in ("logistic", "Fermi", "tanh"):
-        size = added / TIME
-        forms: dict[str, Callable[[Any], Any]] = {
-            "logistic": lambda x: 1.0 / (1.0 + np.exp(-x)),
-            "Fermi": lambda x: 1.0 - 1.0 / (np.exp(x) + 1.0),
-            "tanh": lambda x: 0.5 + 0.5 * np.tanh(0.5 * x),
-        }
-        form = forms[kind]
-
-        def primitive(x: Any) -> Any:  # softplus
-            return max(x, 0) + mpmath.log1p(mpmath.exp(-abs(x)))
-
-    elif kind == "kink":
+    form, primitive = _FORMS[kind]
+    size = added / (TIME if primitive is _softplus else width)
+    if kind == "kink":
         size, width = added / TIME**2, 1.0
-
-        def form(x: Any) -> Any:
-            return np.sqrt(x * x)
-
-        def primitive(x: Any) -> Any:
-            return x * abs(x) / 2
-
-    else:
-        size = added / width
-
-        def form(x: Any) -> Any:
-            return _pulses(x, size, np)[kind][0]
-
-        def primitive(x: Any) -> Any:
-            return _pulses(x, size, mpmath)[kind][1]
 
     def torque(t: Any, w: Any) -> Any:
         return [0.0, 0.0, MOMENT * size * form((t - centre) / width)]
@@ -130,9 +111,7 @@ def _ending(source: Random, kind: str) -> Drawn:
     return Drawn(kind, scene, None)
 
 
-KINDS = (
-    *("bell", "sech", "sech2", "bump", "logistic", "Fermi", "tanh"), "kink", "band", "pole", "root",
-)  # fmt: skip
+KINDS = (*_FORMS, "band", "pole", "root")
 
 
 def drawn(seed: str, number: int) -> Drawn:
@@ -200,35 +179,27 @@ def results(one: Drawn, seed: str, number: int) -> Iterator[tuple[str, float, Ca
         yield other, own, lambda: solved(other, own)
 
 
-def main(arguments: list[str]) -> int:
-    """Print the results beyond their limits and a summary; return 1 if there is one."""
-    count, seed = int(arguments[0]), arguments[1]
-    first = int(arguments[2]) if len(arguments) > 2 else 0
-    tally: Counter[str] = Counter()
-    bad = 0
-    worst = 0.0
-    for number in range(first, first + count):
-        one = drawn(seed, number)
-        for name, tolerance, call in results(one, seed, number):
-            try:
-                omega, ended, growth = call()
-            except InputError as refusal:
-                tally[f"{name}: refused" + (" (work)" if "work" in str(refusal) else "")] += 1
-                continue
-            tally[f"{name}: {ended}"] += 1
-            if ended != "complete":
-                continue
-            size = max(abs(one.scene.omega[2]), abs(one.omega or 0.0))
-            error = math.inf if one.omega is None else abs(omega - one.omega) / size
-            ratio = error / (tolerance + 4e-15 * max(1.0, growth or 1.0))
-            worst = max(worst, ratio)
-            if not ratio <= 1.0:
-                bad += 1
-                print(f"{number} {one.kind} {name} {tolerance:.1e}: error {error:.2g}, K {growth}")
-    for line in sorted(tally):
-        print(f"{tally[line]:6d}  {line}")
-    print(f"{count} scenes: {bad} results beyond the limit, worst {worst:.3g} of it")
-    return int(bad > 0)
+def try_scene(tally: driver.Tally) -> None:
+    """Solve one scene in every way."""
+    one = drawn(tally.seed, tally.number)
+    for name, tolerance, call in results(one, tally.seed, tally.number):
+        try:
+            omega, ended, growth = call()
+        except InputError as refusal:
+            tally.counts[f"{name}: refused" + (" (work)" if "work" in str(refusal) else "")] += 1
+            continue
+        tally.counts[f"{name}: {ended}"] += 1
+        if ended != "complete":
+            continue
+        size = max(abs(one.scene.omega[2]), abs(one.omega or 0.0))
+        error = math.inf if one.omega is None else abs(omega - one.omega) / size
+        limit = tolerance + 4e-15 * max(1.0, growth or 1.0)
+        tally.judge(name, error, limit, f", {one.kind}, tolerance {tolerance:.1e}, K {growth}")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the campaign of the command line."""
+    return driver.run("tests.campaigns.narrow_campaign", try_scene, arguments)
 
 
 if __name__ == "__main__":

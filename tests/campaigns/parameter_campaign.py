@@ -1,8 +1,7 @@
 """Random scenes, whose sensitivities are compared with differences of solutions of 40 digits.
 
-The command is ``python -m tests.campaigns.parameter_campaign COUNT SEED [FIRST]``. It prints a line
-for each scene, and then quantiles of the relative errors at a tolerance of 1e-12. The exit status
-is 1 if an error exceeds 1e-9, and exceeds 4e-14 times the error amplification of the scene too.
+The command is ``python -m tests.campaigns.parameter_campaign COUNT SEED [FIRST]``. The limit of a
+relative error, at a tolerance of 1e-12, is 1e-9 or 4e-14 times the error amplification if larger.
 """
 
 import decimal
@@ -22,6 +21,7 @@ from pyharness.model.trajectory import Array
 from pyharness.scenes.state_scenes import STEADY, TURNING, draw, draw_ready
 from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.reference import exact_coefficients
+from tests.campaigns import driver
 
 TOLERANCE, LIMIT, LIMIT_OF_GROWTH = 1e-12, 1e-9, 4e-14
 KINDS = ("free", "law", "space", "function", "terms", "ready")
@@ -83,29 +83,24 @@ def differences(scene: Scene, names: list[str], times: list[float]) -> dict[str,
     for name in names:
         columns = []
         for steps in _variants(scene, name):
-            rows: list[list[Decimal]] | None = None
+            total: Any = 0
             for (factor, weight), (size, variant) in zip(_STENCIL, steps, strict=True):
                 solution = _solution(variant, times)
                 if solution is None:
                     return None
-                scaled = [[weight / (Decimal(size) / factor) * x for x in row] for row in solution]
-                rows = scaled if rows is None else _sum(rows, scaled)
-            columns.append(rows)
+                total = total + weight / (Decimal(size) / factor) * solution
+            columns.append(total)
         found[name] = np.moveaxis(np.array(columns, dtype=float), 0, 2)
     return found
 
 
-def _sum(first: list[list[Decimal]], second: list[list[Decimal]]) -> list[list[Decimal]]:
-    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(first, second, strict=True)]
-
-
-def _solution(scene: Scene, times: list[float]) -> list[list[Decimal]] | None:
+def _solution(scene: Scene, times: list[float]) -> Any:
     if scene.torque.in_space:
         scene = replace(scene, torque=of_law(scene.law))
     coefficients = exact_coefficients(scene)
     exact = [Decimal(t) for t in times]
     rows = taylor_series(scene, coefficients, exact, False, _ORDER, _LOCAL, _EFFORT)
-    return [list(row) for row in rows] if len(rows) == len(times) else None
+    return np.array([list(row) for row in rows]) if len(rows) == len(times) else None
 
 
 def _variants(scene: Scene, name: str) -> Iterator[list[tuple[float, Scene]]]:
@@ -185,29 +180,16 @@ def _three(source: Random, size: float) -> tuple[float, float, float]:
     return x, y, z
 
 
-def main() -> int:
-    """Run the campaign of the command line."""
-    count, seed, *first = map(int, sys.argv[1:])
-    start = first[0] if first else 0
-    errors, too_large = [], 0
-    for number in range(start, start + count):
-        source = Random(f"sensitivities {seed} {number}")
-        kind = KINDS[number % len(KINDS)]
-        scene, time, names = random_scene(source, kind)
-        found = error_of(scene, time, names)
-        if found is None:
-            print(f"{number:6} {kind:9} not solved", flush=True)
-            continue
-        error, growth = found
-        exceeds = error > max(LIMIT, LIMIT_OF_GROWTH * growth)
-        too_large += exceeds
-        errors.append(error)
-        mark = " EXCEEDS" if exceeds else ""
-        print(f"{number:6} {kind:9} error {error:8.1e}  growth {growth:8.1e}{mark}", flush=True)
-    shares = ", ".join(f"{q:g}: {np.quantile(errors, q):.1e}" for q in (0.5, 0.9, 0.99, 1.0))
-    print(f"{len(errors)} scenes, quantiles of the error {shares}; {too_large} exceed the limit")
-    return int(too_large > 0)
+def try_scene(tally: driver.Tally) -> None:
+    """Compare the sensitivities of a random scene."""
+    source = Random(f"sensitivities {tally.seed} {tally.number}")
+    kind = KINDS[tally.number % len(KINDS)]
+    found = error_of(*random_scene(source, kind))
+    if found is None:
+        tally.counts["not solved"] += 1
+    else:
+        tally.judge(kind, found[0], max(LIMIT, LIMIT_OF_GROWTH * found[1]))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(driver.run("tests.campaigns.parameter_campaign", try_scene, sys.argv[1:]))

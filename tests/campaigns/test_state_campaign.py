@@ -9,19 +9,23 @@ from pyharness import Scene
 from pyharness.model.trajectory import Array
 from pyharness.scenes.state_scenes import draw, draw_ready
 from pyharness.truth.reference import reference
-from tests.campaigns import state_campaign
-from tests.campaigns.state_campaign import TOLERANCES, Result, Tally, campaign, main, truth_of
+from tests.campaigns import driver, entries
+from tests.campaigns.driver import Tally
+from tests.campaigns.entries import Result, truth_of
+from tests.campaigns.state_campaign import MODULE, TOLERANCES, judge, main, try_scene
+
+BLIND = "estimates below a hundredth of the error"
 
 
 @pytest.mark.campaign
 def test_no_result_exceeds_the_limit() -> None:
-    tally = campaign(12, "test")
-    assert tally.violations == []
+    tally = driver.campaign(MODULE, try_scene, 12, "test")
+    assert tally.faults == []
     assert tally.counts["scenes"] == 12
     # Every scene has at least six entry points and eleven tolerances, unless it is singular.
     assert tally.counts["results"] >= 10 * 6 * len(TOLERANCES)
-    assert tally.counts["hundredth"] == 0
-    assert 0.0 < tally.largest <= 1.0
+    assert tally.counts[BLIND] == 0
+    assert 0.0 < max(map(max, tally.ratios.values())) <= 1.0
 
 
 def test_the_reference_is_that_of_two_series_in_more_digits() -> None:
@@ -36,16 +40,15 @@ def test_the_reference_is_that_of_two_series_in_more_digits() -> None:
 def test_a_wrong_result_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    right = state_campaign._row
+    right = entries._row
 
     def wrong(entry: str, omega: Array, *others: Any) -> Result:
         return right(entry, omega * (1.0 + 2e-4), *others)
 
-    monkeypatch.setattr(state_campaign, "_row", wrong)
+    monkeypatch.setattr(entries, "_row", wrong)
     assert main(["1", "test", "3"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("python -m tests.campaigns.state_campaign 1 test 3: ")
-    assert "prepare: error" in lines[0]
+    assert lines[0].startswith("python -m tests.campaigns.state_campaign 1 test 3: prepare auto: ")
     assert any("tolerance 0.0001" in line for line in lines)
     assert not any("tolerance 0.001," in line for line in lines)
 
@@ -61,9 +64,10 @@ def test_missing_rows_are_reported() -> None:
     scene, time = draw_ready(Random("rows"))
     truth = truth_of(scene, [0.1 * time])
     result = Result("solve", truth.omega[:0], None, "overflow", None, 1.0, False)
-    tally = Tally()
-    tally.judge("here", truth, result, 1e-6)
-    assert tally.violations == ["here: 0 rows instead of 1, tolerance 1e-06, ended overflow"]
+    tally = Tally("module", "seed", 7)
+    judge(tally, truth, result, 1e-6, scene)
+    (fault,) = tally.faults
+    assert fault.startswith("python -m module 1 seed 7: solve: 0 rows instead of 1, tolerance 1e-0")
 
 
 @pytest.mark.campaign
@@ -81,6 +85,6 @@ def test_missing_rows_are_reported() -> None:
     ],
 )
 def test_scenes_that_were_solved_wrongly(seed: str, number: int) -> None:
-    tally = campaign(1, seed, number)
-    assert tally.violations == []
-    assert tally.counts["hundredth"] == 0
+    tally = driver.campaign(MODULE, try_scene, 1, seed, number)
+    assert tally.faults == []
+    assert tally.counts[BLIND] == 0

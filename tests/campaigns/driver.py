@@ -1,0 +1,65 @@
+"""The loop of a random campaign: scenes by seed and number, counts, faults, exit status.
+
+A command ``python -m MODULE COUNT SEED [FIRST]`` tries the scenes FIRST to FIRST + COUNT - 1, by
+default from 0. It prints a line for each fault, which begins with the command that repeats the
+scene, and then a table. It returns exit status 1 if there is a fault.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass
+class Tally:
+    """The counts of a campaign, the ratios of errors to their limits by name, and the faults."""
+
+    module: str = ""
+    seed: str = ""
+    number: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    ratios: dict[str, list[float]] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def judge(self, name: str, error: float, limit: float, more: str = "") -> None:
+        """Record an error, which is a fault if it is not within the limit."""
+        ratio = error / limit
+        self.ratios.setdefault(name, []).append(ratio)
+        if not ratio <= 1.0:
+            self.fault(f"{name}: error {error:.3g}, {ratio:.3g} times the limit{more}")
+
+    def fault(self, text: str) -> None:
+        """Record and print a fault."""
+        self.faults.append(f"python -m {self.module} 1 {self.seed} {self.number}: {text}")
+        print(self.faults[-1], flush=True)
+
+    def __str__(self) -> str:
+        """Return the table."""
+        lines = [f"{n:8}  {name}" for name, n in sorted(self.counts.items())]
+        if self.ratios:
+            lines.append(f"{'errors over their limits':32}{'n':>8}  median    99 %   largest")
+        for name, ratios in sorted(self.ratios.items()):
+            middle, most = np.quantile(ratios, [0.5, 0.99], method="lower")
+            lines.append(f"{name:32}{len(ratios):8}{middle:8.2g}{most:8.2g}{max(ratios):10.3g}")
+        return "\n".join([*lines, f"{len(self.faults)} faults"])
+
+
+Try = Callable[[Tally], None]
+
+
+def campaign(module: str, try_scene: Try, count: int, seed: str, first: int = 0) -> Tally:
+    """Return the tally of `count` scenes from number `first` on."""
+    tally = Tally(module, seed)
+    for tally.number in range(first, first + count):
+        try_scene(tally)
+    return tally
+
+
+def run(module: str, try_scene: Try, arguments: Sequence[str]) -> int:
+    """Run the campaign of a command line, print its table, and return the exit status."""
+    count, seed, first = [*arguments, "0"][:3]
+    tally = campaign(module, try_scene, int(count), seed, int(first))
+    print(tally)
+    return int(bool(tally.faults))

@@ -1,7 +1,6 @@
 """Ready terms that Python made, and their sums, are written to scene files and read again."""
 
 import itertools
-from collections.abc import Callable
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -33,13 +32,6 @@ def check_restored(scene: Scene, folder: Path) -> None:
     assert again.torque.tape == scene.torque.tape
     assert again == scene
     assert is_documented(scene_record(scene))
-
-
-@pytest.mark.parametrize("torque", [x for _, x in TERMS], ids=[x["kind"] for x, _ in TERMS])
-def test_term_of_python_is_restored_from_its_text(
-    torque: Callable[[], StateTorque], tmp_path: Path
-) -> None:
-    check_restored(scene_with(torque()), tmp_path)
 
 
 @pytest.mark.parametrize("number", range(40))

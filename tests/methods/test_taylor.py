@@ -107,14 +107,6 @@ def _held_to_fine_rows(
             assert error <= share * tolerance * scale
 
 
-def test_many_rows_within_one_step() -> None:
-    times = np.linspace(0.0, 3.0, 301)
-    rows = solve(case_scene(5), times.tolist(), "taylor", 1e-12)
-    truth = reference(case_scene(5), times.tolist()).omega
-    assert rows.steps < 60
-    assert _error(rows.omega, truth) <= 1e-12
-
-
 def test_blow_up_ends_the_rows(level: int) -> None:
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     found = solve(scene, [0.5, 0.9, 0.999, 1.001, 2.0], "taylor", 1e-12)

@@ -134,8 +134,10 @@ def equations(scene: Scene) -> Callable[[Any, Any], Any]:
     def rates(t: Any, y: Any) -> Any:
         omega, q = y[:3], list(y[3:])
         push = np.array(torque_of(tape, t, omega, q))
-        if scene.inertia is not None:
-            inertia = np.array(scene.inertia)
+        if scene.inertia is not None or scene.changing is not None:
+            inertia: Any = np.array(scene.inertia or scene.changing.matrix(t))  # type: ignore[union-attr]
+            if scene.changing is not None:
+                push = push - scene.changing.matrix_rate(t) @ omega
             turned: Any = np.linalg.inv(inertia) @ (push - np.cross(omega, inertia @ omega))
         else:
             products = np.array([omega[1] * omega[2], omega[2] * omega[0], omega[0] * omega[1]])

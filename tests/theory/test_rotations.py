@@ -366,11 +366,8 @@ def test_json_and_csv_tell_what_was_found(printed: Printed) -> None:
     assert [tuple(each["omega"]) for each in record["rotations"]] == [e.omega for e in found]
     for told, each in zip(record["rotations"], found, strict=True):
         assert [complex(*rate) for rate in told["rates"]] == list(each.rates)
-        assert told["stable"] is False
-        assert told["doubling_time"] == each.doubling_time
-        assert told["period"] == each.period
-        assert told["linear_until"] == each.linear_until
-        assert told["flip_interval"] is None
+        for name in ("stable", "doubling_time", "period", "linear_until", "flip_interval"):
+            assert told[name] == getattr(each, name)
     rows = list(csv.DictReader(printed("rotations --case 5 --format csv").splitlines()))
     for row, each in zip(rows, found, strict=True):
         assert float(row["omega2"]) == each.omega[1]

@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, solve, torques
-from pyharness.model.state_torque import replayed
+from pyharness.model.state_torque import of_law
 from pyharness.scenes.random_scenes import draw as draw_law
 from pyharness.scenes.state_scenes import draw, draw_ready
 from pyharness.theory.conditioning import conditioning
@@ -50,14 +49,9 @@ def test_a_law_as_a_tape_has_the_conditioning_of_the_law(number: int) -> None:
     drawn = draw_law("conditioning", number)
     law, scene = drawn.scene.law, replace(drawn.scene, attitude=None)
 
-    def torque(t: Any, omega: Any, attitude: Any) -> Any:
-        return np.array(law.constant) + t * np.array(law.rate) + sum(
-            np.array(a) * np.sin(f * t) for a, f in law.sines
-        ) + sum(np.array(a) * np.cos(f * t) for a, f in law.cosines)  # fmt: skip
-
     time = 0.1 * drawn.time
     one = conditioning(scene, time)
-    other = conditioning_at(replace(scene, torque=replayed(torque)), [time])
+    other = conditioning_at(replace(scene, torque=of_law(law)), [time])
     assert other.amplification == pytest.approx(one.amplification, rel=0.05)
     assert other.largest == pytest.approx(one.largest, rel=0.01)
     # The two count the roundings of the torque and of the products in different ways.

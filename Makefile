@@ -80,7 +80,7 @@ format: .venv/ready-to-test
 clean:
 	rm -rf .venv build dist
 
-# The environment is made anew when its ingredients change, or other tools are asked for.
+# The environment is made anew when its ingredients change, or other tools are requested.
 .venv/ready: pyproject.toml meson.build .ci/setup .venv/tools
 	@.ci/setup "$(PYTHON)" "$(FC)"
 	@echo "$(PYTHON) $(FC)" > .venv/tools

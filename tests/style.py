@@ -20,6 +20,7 @@ _FOLDERS = (
     "pyharness", "fortran", "docs", "tests",
     "web/programs", "web/laboratory", "web/body", "web/story",
 )  # fmt: skip
+_SINGLE = ("README.md", "CONTRIBUTING.md", "Makefile", "meson.build", "pyproject.toml")
 _SHARED = ("_build", "_kernels", "_many", "_solver")
 _NOT = ("_build.py",)  # written by the build
 _CODE = re.compile(
@@ -37,9 +38,14 @@ PATTERNS = [
 def files() -> list[Path]:
     """Return the files whose prose is checked."""
     found = [path for folder in _FOLDERS for path in (ROOT / folder).rglob("*")]
-    found += [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
-    kept = (".py", ".f90", ".fypp", ".c", ".js", ".md")
-    return sorted(path for path in found if path.suffix in kept and path.name not in _NOT)
+    found += [ROOT / name for name in _SINGLE]
+    found += [*(ROOT / ".github").rglob("*.yml"), *(ROOT / ".ci").glob("*")]
+    return sorted(path for path in found if _is_read(path) and path.name not in _NOT)
+
+
+def _is_read(path: Path) -> bool:
+    kept = (".py", ".f90", ".fypp", ".c", ".js", ".md", ".toml", ".yml", ".build", "")
+    return path.suffix in kept and path.is_file() and path.name != "style.toml"
 
 
 def prose(path: Path) -> Iterator[tuple[int, str]]:
@@ -55,11 +61,15 @@ def prose(path: Path) -> Iterator[tuple[int, str]]:
     elif path.suffix in (".c", ".js"):
         for found in re.finditer(r"/\*((?:.|\n)*?)\*/|(?<!:)//(.*)$", text, re.MULTILINE):
             yield text.count("\n", 0, found.start()) + 1, found[1] or found[2]
-    else:
+    elif path.suffix in (".f90", ".fypp"):
         for number, line in enumerate(text.split("\n"), 1):
             comment = re.search(r"!+(?!\$)([^!]*)$", line)
             if comment and not re.search(r"['\"]", line):
                 yield number, comment[1]
+
+    else:
+        for found in re.finditer(r"(?:^|[ \t])#+ (.*)$", text, re.MULTILINE):
+            yield text.count("\n", 0, found.start(1)) + 1, found[1]
 
 
 def _docstrings(text: str) -> Iterator[tuple[int, str]]:

@@ -62,7 +62,8 @@ def test_each_expression_has_its_replacement() -> None:
 
 
 def test_sources_and_documents_of_every_language_are_read() -> None:
-    assert {path.suffix for path in files()} == {".py", ".f90", ".fypp", ".c", ".js", ".md"}
+    suffixes = {".py", ".f90", ".fypp", ".c", ".js", ".md", ".toml", ".yml", ".build", ""}
+    assert {path.suffix for path in files()} == suffixes
 
 
 def test_kernels_have_at_most_eight_arguments() -> None:

@@ -1,9 +1,10 @@
 """`python -m tests.original.rates`: the time of a body's step, in a batch and by itself."""
 
 import sys
-import time
+import timeit
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original.compiled import program_arguments
-from pyharness.original.many import ProgramEnsemble, run_many
+from pyharness.original.many import run_many
 from tests.instruction_sets import LEVELS, level_here
 
 BODY_STEPS = 2_000_000  # of one measurement of a batch
@@ -20,12 +21,7 @@ AT_REST = 1e9  # 1/s: the stop test is made, and stops no run
 
 def best(task: Callable[[], object], repeats: int = 9) -> float:
     """Return the least time of a task (s)."""
-    found = float("inf")
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        task()
-        found = min(found, time.perf_counter() - begin)
-    return found
+    return min(timeit.repeat(task, number=1, repeat=repeats))
 
 
 def single(listing: Listing, steps: int) -> float:
@@ -41,12 +37,8 @@ def single(listing: Listing, steps: int) -> float:
 def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BODY_STEPS) -> float:
     """Return the time of one step (ns) of one body in a batch."""
     scene = replace(case_scene(3), steps=steps)
-    n = max(256, work // steps)
-    omega = np.array(scene.omega) * np.linspace(0.5, 1.0, n)[:, None]
-
-    def task() -> ProgramEnsemble:
-        return run_many(scene, listing, omega0=omega, lipschitz=AT_REST, threads=threads)
-
+    omega = np.array(scene.omega) * np.linspace(0.5, 1.0, max(256, work // steps))[:, None]
+    task = partial(run_many, scene, listing, omega0=omega, lipschitz=AT_REST, threads=threads)
     return best(task) / int(task().n_rows.sum()) * 1e9
 
 
@@ -57,15 +49,16 @@ def main(arguments: Sequence[str]) -> int:
             continue
         extension().choose_instructions(level)
         print(f"{LEVELS[level]}: ns a step of one body, by itself / side by side = ratio")
-        for program in PROGRAMS:
-            for listing in (Listing.original(program), Listing.corrected(program)):
-                cells = []
-                for steps in (100, 300, 10_000):
-                    alone, among = single(listing, steps), side_by_side(listing, steps)
-                    cells.append(f"{steps:6d}: {alone:6.1f} /{among:6.2f} = {alone / among:5.1f}")
-                one, two = (side_by_side(listing, 300, k, 10 * BODY_STEPS) for k in (1, 2))
-                cells.append(f"two threads {one / two:.2f}")
-                print(f"  {program:11} {listing.label:9}", "   ".join(cells), flush=True)
+        for listing in (
+            make(p) for p in PROGRAMS for make in (Listing.original, Listing.corrected)
+        ):
+            cells = []
+            for steps in (100, 300, 10_000):
+                alone, among = single(listing, steps), side_by_side(listing, steps)
+                cells.append(f"{steps:6d}: {alone:6.1f} /{among:6.2f} = {alone / among:5.1f}")
+            one, two = (side_by_side(listing, 300, k, 10 * BODY_STEPS) for k in (1, 2))
+            cells.append(f"two threads {one / two:.2f}")
+            print(f"  {listing.program:11} {listing.label:9}", "   ".join(cells), flush=True)
     extension().choose_instructions(len(LEVELS) - 1)
     return 0
 

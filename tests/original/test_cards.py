@@ -12,13 +12,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.original import collation
 from pyharness.original.cards import Difference, chosen, deck, numbers, passages
-from pyharness.original.collation import (
-    HEADING,
-    expected_lines,
-    undeclared,
-    unexplained,
-    witness_lines,
-)
+from pyharness.original.collation import HEADING, expected_lines, undeclared, unexplained
+from tests.conftest import Printed
 
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 # Forms that the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
@@ -63,15 +58,9 @@ def test_what_is_not_declared_is_found(change: str, monkeypatch: pytest.MonkeyPa
             entry["pairs"] = pairs
         if entry["id"] == "noise-numbers" and change == "printed":
             entry["printed"] = [[p, c, first + 10, step] for p, c, first, step in entry["printed"]]
-    real = facts
-    monkeypatch.setattr(
-        collation, "facts", lambda name: {"entry": entries} if name == "apparatus" else real(name)
-    )
+    tables = {"apparatus": {"entry": entries}}
+    monkeypatch.setattr(collation, "facts", lambda name: tables.get(name) or facts(name))
     assert undeclared()
-
-
-def test_scan_of_the_tables_is_explained(scan: str) -> None:
-    assert unexplained(scan) == []
 
 
 @pytest.mark.campaign
@@ -100,24 +89,16 @@ def test_a_character_changed_anywhere_is_found(scan: str, change: str) -> None:
             assert len(unexplained(head + heading + "\n".join(changed))) == 1
 
 
-def test_line_that_differs_is_named(scan: str) -> None:
-    (told,) = unexplained(scan.replace("300-U1(1)=0.", "300-U1(1)=8.", 1))
-    line = scan.split("\n").index("300-U1(1)=0.") + 1
-    assert told == f"line {line}, two-term:300: '300-U1(1)=8.', where the table has '300-U1(1)=0.'"
-
-
 @pytest.mark.parametrize("change", ["lost", "twice", "swapped", "joined"])
 def test_a_line_out_of_place_is_found(scan: str, change: str) -> None:
     lines = scan.split("\n")
     at = lines.index("300-U1(1)=0.")
-    new = {
-        "lost": [],
-        "twice": [lines[at]] * 2,
-        "swapped": [lines[at + 1], lines[at]],
-        "joined": [lines[at] + lines[at + 1]],
-    }[change]
-    rest = at + (2 if change in ("swapped", "joined") else 1)
-    assert unexplained("\n".join([*lines[:at], *new, *lines[rest:]]))
+    one, next_ = lines[at : at + 2]
+    lines[at : at + 2] = {
+        "lost": [next_], "twice": [one, one, next_], "swapped": [next_, one],
+        "joined": [one + next_],
+    }[change]  # fmt: skip
+    assert unexplained("\n".join(lines))
 
 
 @pytest.mark.skipif(not SCAN.exists(), reason="the text of the thesis is not beside the project")
@@ -127,7 +108,7 @@ def test_scan_of_the_thesis_is_explained() -> None:
     lines = [line.rstrip() for line in text.rpartition(HEADING)[2].splitlines()]
     kept = [line for line in lines if line.strip() not in ("", "```")]
     cards = [line for line, (_, name) in zip(kept, expected_lines(), strict=True) if ":" in name]
-    assert list(witness_lines().values()) == cards
+    assert list(collation.witness_lines().values()) == cards
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -141,34 +122,26 @@ def test_every_executable_card_has_its_place(program: str) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_statements_of_the_port_are_those_of_their_cards(program: str) -> None:
-    """A statement has its card's words, or a reason; a defect's card is beside its correction."""
+    def as_on_card(statement: str) -> str:
+        for pattern, new in FORMS:
+            statement = re.sub(pattern, new, statement)
+        return {"endif": "", "enddo": ""}.get(statement, statement).upper().rstrip("+")
+
     found = deck(program)
     for number, places in found.port.items():
         card = "".join(found.cards[number].text[6:].split()).rstrip("+").replace("T5**", "T(L)**")
-        said = [_as_on_card(place.text) for place in places]
+        said = [as_on_card(place.text) for place in places]
         assert (card in said) != (number in found.otherwise), (number, card, said)
 
 
-def _as_on_card(statement: str) -> str:
-    for pattern, new in FORMS:
-        statement = re.sub(pattern, new, statement)
-    return {"endif": "", "enddo": ""}.get(statement, statement).upper().rstrip("+")
-
-
 def test_cards_are_found() -> None:
-    assert [card.name for card in chosen(["1660"])] == [
-        "two-term:1660",
-        "four-term:1660",
-    ]
+    assert [card.name for card in chosen(["1660"])] == ["two-term:1660", "four-term:1660"]
     assert len(chosen(["two-term"])) == 159
     assert [card.number for card in chosen(["runge-kutta:1010-1030"])] == [1010, 1020, 1030]
     card = chosen(["two-term:1260"])[0]
     assert card.statement == "X3=ACL2+V2(3)*U3(3)-V3(3)*U2(3)"
     assert card.scan == "1260-X3=ACL2+U2(3)*U3(3)-U3(3)*U2(3)"
     assert set(card.entries) >= {"x3-reads-acl2", "noise-u-for-v"}
-
-
-def test_ranges() -> None:
     assert numbers("750-770, 800") == [750, 760, 770, 800]
     assert numbers("") == []
 
@@ -179,41 +152,36 @@ def test_a_scan_that_is_none_is_refused(text: str) -> None:
         unexplained(text)
 
 
-def test_scan_is_told_in_a_line_each(
-    scan: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_scan_is_told(scan: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "scan.txt"
     path.write_text(scan)
     assert main(["cards", "--scan", str(path)]) == 0
     told = capsys.readouterr().out
     assert "nothing is unexplained" in told
     assert "it is another text" in told
-    path.write_text(scan.replace("300-U1(1)=0.", "300-U1(1)=8."))
+    path.write_text(scan.replace("300-U1(1)=0.", "300-U1(1)=8.", 1))
     assert main(["cards", "--scan", str(path), "--format", "json"]) == 1
     (fault,) = json.loads(capsys.readouterr().out)["unexplained"]
-    assert "two-term:300" in fault
+    line = scan.split("\n").index("300-U1(1)=0.") + 1
+    assert fault == f"line {line}, two-term:300: '300-U1(1)=8.', where the table has '300-U1(1)=0.'"
 
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("asked", ["1260", "two-term:330-380", "runge-kutta:1010-1040", ""])
-def test_cards_are_told_in_100_columns(asked: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["cards", *([asked] if asked else [])]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 100
+def test_cards_are_told_in_100_columns(asked: str, printed: Printed) -> None:
+    assert max(map(len, printed(f"cards {asked}").splitlines())) <= 100
 
 
 @pytest.mark.campaign
-def test_record_of_a_card(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["cards", "two-term:1650-1660", "--format", "json"]) == 0
-    first, second = json.loads(capsys.readouterr().out)["cards"]
+def test_record_of_a_card(printed: Printed) -> None:
+    first, second = json.loads(printed("cards two-term:1650-1660 --format json"))["cards"]
     assert (first["card"], first["scan"]) == (1650, "1650-U3(1)=U3(4)")
     assert first["statement"] == "V3(1)=V3(4)"
     assert (second["scan"], second["entries"]) == (None, ["dt-accumulates", "step-literals"])
     for places in (second["fortran"], second["twin"]):
         assert places[0]["text"].upper().startswith("DT = DT +")
     assert second["parallels"] == ["four-term:2250"]
-    assert main(["defects", "two-term:1660"]) == 0
-    assert "dt-accumulates: DT grows" in capsys.readouterr().out
+    assert "dt-accumulates: DT grows" in printed("defects two-term:1660")
 
 
 def test_pieces_of_a_text_hold_their_blanks() -> None:

@@ -13,12 +13,13 @@ from pyharness.checks.port_protocol import read_answer, request
 from pyharness.cli.main import main
 from pyharness.compare.agreement import differences
 from pyharness.compare.orders import Order, measured_order
+from pyharness.edition.laboratory import data
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.original.cells import subsets
 from pyharness.original.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import Reference, reference
-from tests.ports import WEB, engine
+from tests.ports import WEB, engine, run_javascript
 
 ASSUMED = [
     (program, tuple(sorted(readings)), tuple(sorted(conjectures)))
@@ -35,11 +36,9 @@ def _listing(assumed: tuple[str, tuple[str, ...], tuple[str, ...]]) -> Listing:
 
 @cache
 def _truth(case: int) -> Reference:
-    scene = case_scene(case)
-    return reference(scene, scene.times())
+    return reference(case_scene(case), case_scene(case).times())
 
 
-@cache
 def _order(case: int, listing: Listing) -> Order:
     program = PROGRAM_REGISTRY[listing.program]
     return measured_order(case_scene(case), program, listing, _truth(case))
@@ -77,9 +76,8 @@ def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
     """Compare Fortran, twin and JavaScript, whose sines may differ in Case 7."""
     cells = list(itertools.product(ASSUMED, case_numbers()))
     given = b"".join(request(case_scene(case), _listing(each)) + b"\n" for each, case in cells)
-    done = subprocess.run(
-        [engine(), str(WEB / "port.js")], input=given, capture_output=True, check=True
-    )
+    port = [engine(), str(WEB / "port.js")]
+    done = subprocess.run(port, input=given, capture_output=True, check=True)
     answers = done.stdout.splitlines()
     assert len(answers) == len(cells)
     for (assumed, case), line in zip(cells, answers, strict=True):
@@ -97,7 +95,6 @@ def test_languages_agree_bit_for_bit_on_all_of_them() -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_laboratory_has_the_same_listing(program: str) -> None:
-    """The laboratory uses the words of the command line, with the same meaning."""
     words = [
         f"program={program}&listing=corrected"
         + (f"&reading={','.join(readings)}" if readings else "")
@@ -105,29 +102,16 @@ def test_laboratory_has_the_same_listing(program: str) -> None:
         for name, readings, conjectures in ASSUMED
         if name == program
     ]
-    from pyharness.edition.laboratory import data
-
-    script = (
-        f"import {{ stateFrom }} from {json.dumps(str(WEB / 'laboratory/state.js'))};"
-        "import { readFileSync } from 'node:fs';"
-        "const { data, words } = JSON.parse(readFileSync(0));"
-        "console.log(JSON.stringify(words.map((each) => stateFrom(data, each))));"
-    )
-    done = subprocess.run(
-        [engine(), "--input-type=module", "--eval", script],
-        input=json.dumps({"data": data(), "words": words}), capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    for found in json.loads(done.stdout):
+    modules = {"S": WEB / "laboratory/state.js"}
+    body = "return given.map((each) => S.stateFrom(data, each));"
+    for found in run_javascript(modules, body, data=data(), given=words):
         assert found["problems"] == []
         assert Listing(program, found["state"]["active"]) == Listing.corrected(program)
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("case", case_numbers())
-def test_compare_judges_them_and_says_what_was_asked_for_in_vain(
-    case: int, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_compare_tells_what_is_in_vain(case: int, capsys: pytest.CaptureFixture[str]) -> None:
     words = "--listing corrected --reading do-variable,c1-for-c --conjecture initial-torque"
     assert main(["compare", "--case", str(case), *words.split(), "--format", "json"]) == 0
     told = capsys.readouterr()

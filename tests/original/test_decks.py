@@ -35,9 +35,8 @@ def test_text_of_1982_is_that_of_the_cards(program: str) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
-    before, after = (
-        _cards(deck_text(listing(program))) for listing in (Listing.original, Listing.corrected)
-    )
+    listings = (Listing.original(program), Listing.corrected(program))
+    before, after = (_cards(deck_text(listing)) for listing in listings)
     altered = [
         each for each in facts("cards/alterations")["alteration"]
         if each["program"] == program and "dialect" not in each
@@ -53,14 +52,12 @@ def test_corrected_deck_differs_by_the_alterations_alone(program: str) -> None:
         assert n % 10 != 0  # numbered between its neighbours
 
 
-@pytest.mark.parametrize("case", [1, 5, 7])
+@pytest.mark.parametrize("case", [1, 2, 5, 7])
 def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
-    cards = _cards(deck_text(Listing.original("two-term"), case_scene(case)))
     scene = case_scene(case)
-    assert scene.moments is not None
-    shown = [float(cards[n].partition("=")[2]) for n in (200, 210, 220)]
-    assert shown == list(scene.moments)
-    assert [float(cards[n].partition("=")[2]) for n in (300, 310, 320)] == list(scene.omega)
+    cards = _cards(deck_text(Listing.original("two-term"), scene))
+    shown = [float(cards[n].partition("=")[2]) for n in (200, 210, 220, 300, 310, 320)]
+    assert shown == [*(scene.moments or ()), *scene.omega]
     assert cards[690].split() == ["DO", "100", "I=1,100,1"]
     # Table 1 gives initial torques in Case 7.
     assert cards[250].strip() == ("N1=0." if case == 2 else "N1=100.")
@@ -76,25 +73,20 @@ def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, syste
     assert rest.startswith(deck_text(listing))
     after = rest.removeprefix(deck_text(listing))
     assert ("SUBROUTINE LEQT1F" in after) == (program != "runge-kutta") == bool(after)
-    compiles = [line for line in control.splitlines() if line.startswith("FTN")]
-    assert len(compiles) == 1
-    assert ("ROUND=+-*/" in compiles[0]) == rounds
+    (compiles,) = (line for line in control.splitlines() if line.startswith("FTN"))
+    assert ("ROUND=+-*/" in compiles) == rounds
     assert [line[:3] for line in control.splitlines()][-3:] == ["LGO", "REW", "COP"]
     # A card has 80 columns, and the machine has no lower-case letters.
-    assert all(
-        len(line) <= 80 and line == line.upper() for line in job.splitlines()[6:] if line[0] != "~"
-    )
-
-
-def test_job_for_ftn_has_the_torque_of_case_7() -> None:
-    deck = deck_text(Listing.original("two-term"), case_scene(7), "ftn")
-    assert "SIN(100.*TIME)" in deck
-    assert "OPEN(" not in deck
-    assert "I=2 " not in deck_text(Listing.original("runge-kutta"), None, "ftn")
+    cards = [line for line in job.splitlines()[6:] if line[0] != "~"]
+    assert all(len(line) <= 80 and line == line.upper() for line in cards)
 
 
 def test_dialect_of_today_adds_marked_lines_alone() -> None:
+    seven = deck_text(Listing.original("two-term"), case_scene(7), "ftn")
+    assert "SIN(100.*TIME)" in seven
+    assert "OPEN(" not in seven
     listing = Listing.original("runge-kutta")
+    assert "I=2 " not in deck_text(listing, None, "ftn")
     old, new = (deck_text(listing, None, dialect).splitlines() for dialect in ("1982", "gfortran"))
     marked = [line for line in new if line[72] == "+"]
     assert [line for line in new if line[72] == " "] == old[1:]
@@ -129,17 +121,11 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")
 @pytest.mark.parametrize(
     ("old", "new", "told"),
-    [
-        ("1HI", "1HJ", "the page differs"),
-        ("GO TO 8 ", "J=3     ", "75 records more"),
-    ],
+    [("1HI", "1HJ", "the page differs"), ("GO TO 8 ", "J=3     ", "75 records more")],
 )
-def test_page_and_records_after_the_stop_are_looked_at(
-    old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        "pyharness.checks.decks.deck_text", lambda *given: deck_text(*given).replace(old, new)
-    )
+def test_page_and_records(old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    changed = "pyharness.checks.decks.deck_text"
+    monkeypatch.setattr(changed, lambda *given: deck_text(*given).replace(old, new))
     (check,) = decks(Selection(only=["decks/runge-kutta/case-2/original"]))
     assert not check.passed
     assert told in check.note

@@ -1,6 +1,5 @@
 """Arguments of `run_many`: the accepted forms."""
 
-import functools
 from fractions import Fraction
 from typing import Any
 
@@ -31,26 +30,16 @@ def test_numbers_of_any_type() -> None:
         assert_same(found, wanted)
 
 
-SPACE = TorqueLaw(frame="space")
-
-
 def test_arrays_stand_in_for_what_a_scene_lacks() -> None:
     """With arrays the scene may have a full inertia matrix (not read) and a zero space torque."""
-    scene = Scene("", (1.0, 2.0, 3.0), inertia=np.eye(3), torque=SPACE)
-    found = run_many(scene, Listing.corrected("two-term"), moments=(3.0, 2.0, 1.0))
+    listing, space = Listing.corrected("two-term"), TorqueLaw(frame="space")
+    scene = Scene("", (1.0, 2.0, 3.0), inertia=np.eye(3), torque=space)
+    found = run_many(scene, listing, moments=(3.0, 2.0, 1.0))
     plain = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.0))
-    assert same_bits(
-        found.omega[0, 0], compiled.run(plain, Listing.corrected("two-term")).omega[-1]
-    )
-
-
-def test_at_is_a_list() -> None:
+    assert same_bits(found.omega[0, 0], compiled.run(plain, listing).omega[-1])
+    # An effort lets more bodies run; `at` is a list.
+    starts = np.ones((200, 3))
+    found = run_many(case_scene(3), Listing.corrected("two-term"), omega0=starts, effort=1e-4)
+    assert found.n_rows.tolist() == [100] * 200
     with pytest.raises(InputError, match="at"):
         run_many(case_scene(3), Listing.corrected("two-term"), at=5)  # type: ignore[arg-type]
-
-
-def test_an_effort_lets_more_bodies_run() -> None:
-    run = functools.partial(
-        run_many, case_scene(3), Listing.corrected("two-term"), omega0=np.ones((200, 3))
-    )
-    assert run(effort=1e-4).n_rows.tolist() == [100] * 200

@@ -7,7 +7,7 @@ crash or an endless loop is found, counted and named like any other fault. To re
 
 import argparse
 import os
-import select
+import signal
 import subprocess
 import sys
 import tempfile
@@ -60,6 +60,8 @@ def _work(kind: str, seed: int, begin: int, end: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for number in range(begin, end):
             pipe.write(f"at {number}\n")
+            # The signal ends a worker that hangs.
+            signal.setitimer(signal.ITIMER_REAL, PATIENCE)
             try:
                 tried(kind, made(kind, seed, number), Path(folder))
             except AssertionError as error:
@@ -100,37 +102,28 @@ def _campaign(seed: int, inputs: int, only: str | None) -> int:
 
 
 def _watched(kind: str, seed: int, begin: int, end: int) -> tuple[int, list[str]]:
-    """Run a worker until it ends, dies or hangs; return the next number, and the faults."""
+    """Run a worker until it ends or dies; return the next number, and the faults."""
     command = [sys.executable, "-m", "tests.campaigns.fuzz", "--kind", kind, "--seed", str(seed)]
-    worker = subprocess.Popen(
-        [*command, "--number", str(begin), "--until", str(end)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0,
-    )  # fmt: skip
-    number, rest = begin, b""
+    done = subprocess.run(
+        [*command, "--number", str(begin), "--until", str(end)], capture_output=True, check=False
+    )
+    number = begin
     faults: list[str] = []
 
-    def fault(what: str) -> str:
-        return f"FAULT --seed {seed} --kind {kind} --number {number}: {what}"
+    def fault(what: str) -> None:
+        faults.append(f"FAULT --seed {seed} --kind {kind} --number {number}: {what}")
 
-    with worker:
-        assert worker.stdout is not None
-        assert worker.stderr is not None
-        while True:
-            if not select.select([worker.stdout], [], [], PATIENCE)[0]:
-                worker.kill()
-                return number + 1, [*faults, fault(f"no end within {PATIENCE:g} s")]
-            piece = os.read(worker.stdout.fileno(), 65536)
-            if not piece:
-                break
-            *lines, rest = (rest + piece).split(b"\n")
-            for line in lines:
-                word, _, text = line.decode().partition(" ")
-                if word == "done":
-                    return end, faults
-                if word == "at":
-                    number = int(text)
-                elif word == "fault":
-                    faults.append(fault(text.partition(" ")[2]))
-        said = worker.stderr.read().decode(errors="replace")[-600:]
-    code = worker.returncode
-    return number + 1, [*faults, fault(f"the worker ended with {code}: {said}")]
+    for line in done.stdout.decode().splitlines():
+        word, _, text = line.partition(" ")
+        if word == "done":
+            return end, faults
+        if word == "at":
+            number = int(text)
+        elif word == "fault":
+            fault(text.partition(" ")[2])
+    if done.returncode == -signal.SIGALRM:
+        fault(f"no end within {PATIENCE:g} s")
+    else:
+        said = done.stderr.decode(errors="replace")[-600:]
+        fault(f"the worker ended with {done.returncode}: {said}")
+    return number + 1, faults

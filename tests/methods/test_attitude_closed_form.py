@@ -36,8 +36,7 @@ def closed_form_attitude(
 ) -> tuple[Array, Array]:
     """Return omega and attitude at times in any order."""
     scene = Scene("", omega0, moments=moments, attitude=attitude0)
-    found = known_solution(scene, times, 1.0)
-    assert found.attitude is not None
+    found: Any = known_solution(scene, times, 1.0)
     return found.omega, found.attitude
 
 
@@ -243,8 +242,7 @@ def test_flips_beside_the_separatrix_are_where_they_are(power: int, flips: float
     omega = (10.0**-power, 1.0, 0.0)
     scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=(0.5, -0.1, 0.7, 0.5))
     time = flips * quarter(10.0**-power)
-    found = known_solution(scene, [time], 1.0)
-    assert found.attitude is not None
+    found: Any = known_solution(scene, [time], 1.0)
     wanted = [float(x) for x in free_attitude(scene, time)]
     assert found.attitude[0] == pytest.approx(wanted, abs=8e-16)
     wanted = [float(x) for x in torque_free(scene, time)]

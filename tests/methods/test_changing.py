@@ -217,8 +217,7 @@ def test_every_entry_point_has_the_result_of_solve(kind: str) -> None:
     many = solve_many(scene, [7.0, 7.0], omega0=[scene.omega, (1.0, 1.0, 1.0)])
     assert many.omega[0].tobytes() == end.tobytes()
     omega, attitude = prepare(scene, attitude=True)(scene.omega, 7.0)
-    found = solve(scene, 7.0, attitude=True)
-    assert found.attitude is not None
+    found: Any = solve(scene, 7.0, attitude=True)
     assert omega.tobytes() == found.omega[-1].tobytes()
     assert attitude.tobytes() == found.attitude[-1].tobytes()
 

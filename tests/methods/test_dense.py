@@ -183,8 +183,7 @@ def test_a_fast_small_wave_is_no_roughness_of_the_method() -> None:
     times = np.linspace(-18.45, 0.0, 400)
     truth = solve(scene, times).omega
     for method in ("rk45", "dop853", "auto"):
-        found = solve(scene, -18.45, method, 1e-6, dense_output=True)
-        assert found.sol is not None
+        found: Any = solve(scene, -18.45, method, 1e-6, dense_output=True)
         assert np.abs(found.sol(times).T - truth).max() <= 0.7e-6, method
 
 
@@ -192,10 +191,8 @@ def test_a_fast_small_wave_is_no_roughness_of_the_method() -> None:
 def test_rounding_errors_above_the_tolerance_are_not_resolved() -> None:
     """They grow with the error amplification, and no polynomial is as accurate as the tolerance."""
     scene = Scene("wing nut", (0.01, 5.0, 0.0), moments=(1.0, 2.0, 3.0))
-    found = solve(scene, 2000.0, "taylor", 1e-14, dense_output=True)
+    found: Any = solve(scene, 2000.0, "taylor", 1e-14, dense_output=True)
     assert found.ended == "sensitive"
-    assert found.sol is not None
-    assert found.growth is not None
     assert isinstance(found.sol.states, Pieces)
     assert len(found.sol.states.edges) < 20_000
     times = np.linspace(0.0, 2000.0, 501)
@@ -235,9 +232,9 @@ def test_short_excursion_shows_in_polynomials_and_events(width: float, side: flo
         return [0.0 * t, 0.0 * t, -2.0 / width * x * np.exp(-x * x)]
 
     scene = Scene("ball", (0.0, 0.0, 0.5), moments=(1.0, 1.0, 1.0), torque=torque)
-    found = solve(scene, [10.0 * side], tolerance=1e-9, dense_output=True, events=crosses(3, 1.0))
-    assert found.sol is not None
-    assert found.t_events is not None
+    found: Any = solve(
+        scene, [10.0 * side], tolerance=1e-9, dense_output=True, events=crosses(3, 1.0)
+    )
     times = middle + width * np.linspace(-3.0, 3.0, 101)
     wanted = 0.5 + np.exp(-(((times - middle) / width) ** 2))
     assert np.abs(found.sol(times)[2] - wanted).max() < 1e-8
@@ -254,6 +251,5 @@ def test_changing_inertia_has_steps_too() -> None:
         return [0.0 * t, 0.0 * t, -1e3 * x * np.exp(-x * x)]
 
     scene = Scene("", (0.1, 0.2, 0.5), moments=moments, torque=torque)
-    found = solve(scene, [10.0], tolerance=1e-9, dense_output=True)
-    assert found.sol is not None
+    found: Any = solve(scene, [10.0], tolerance=1e-9, dense_output=True)
     assert found.sol(5.0)[2] == pytest.approx(solve(scene, [5.0]).omega[0, 2], abs=1e-8)

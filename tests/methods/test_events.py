@@ -68,8 +68,7 @@ def test_events_of_random_bodies_are_the_sign_changes_of_many_rows(seed: int) ->
         return sum(weights[:3] * [*omega]) + attitude[0] * attitude[1] * weights[3] + shift
 
     times = np.linspace(0.0, 40.0, 40001)
-    rows = solve(body, times, attitude=True)
-    assert rows.attitude is not None
+    rows: Any = solve(body, times, attitude=True)
     q = rows.attitude
     values = rows.omega @ weights[:3] + q[:, 0] * q[:, 1] * weights[3] + shift
     expected = times[1:][np.diff(values > 0.0)]
@@ -101,9 +100,8 @@ def test_events_of_a_body_are_those_of_scipy(method: str) -> None:
 
 def test_fixed_step_has_the_events_of_its_dense_output() -> None:
     scene = replace(BODY, step_size=0.01)
-    found = solve(scene, 30.0, "rk4", events=second, dense_output=True)
+    found: Any = solve(scene, 30.0, "rk4", events=second, dense_output=True)
     (times,), (states,) = events_of(found)
-    assert found.sol is not None
     assert len(times) == 4
     np.testing.assert_allclose(times, times_of(BODY, 30.0, second), atol=1e-5)
     np.testing.assert_array_equal(states, found.sol(times).T)
@@ -352,8 +350,7 @@ def test_a_function_may_return_an_array_of_one_number(shape: tuple[int, ...]) ->
 @pytest.mark.parametrize("end", [0.005, -0.005])
 def test_events_are_in_the_order_of_integration(end: float) -> None:
     fast = Scene("fast", (1.0, 4e4, 1.0), moments=(1.0, 2.0, 3.0))
-    found = solve(fast, end, events=flip(1))
-    assert found.t_events is not None
+    found: Any = solve(fast, end, events=flip(1))
     assert len(found.t_events[0]) > 3
     assert (np.diff(np.abs(found.t_events[0])) > 0.0).all()
 
@@ -427,9 +424,8 @@ def test_jump_where_omega_is_slow_is_one_event(rate: float) -> None:
     jump.terminal = 2  # type: ignore[attr-defined]
     torque = TorqueLaw((rate, 0.0, 0.0))
     scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found = solve(scene, [5.0, 10.0], events=jump)
+    found: Any = solve(scene, [5.0, 10.0], events=jump)
     assert found.ended == "complete"
-    assert found.t_events is not None
     assert found.t_events[0] == pytest.approx([3.3], abs=1e-8)
 
 

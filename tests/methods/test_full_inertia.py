@@ -7,6 +7,7 @@ entry of the matrix is a float, and so is every component of omega about the pri
 import itertools
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,16 +65,14 @@ def _scenes(body: str, torque: Triple = (0.0, 0.0, 0.0)) -> tuple[Scene, Scene]:
 
 
 def _check_error(tilted: Scene, bare: Scene, time: float, method: str, tolerance: float) -> None:
-    found = solve(tilted, [time], method, tolerance)
-    truth = reference(bare, [time], precise=True)
-    assert truth.remainder is not None
+    found: Any = solve(tilted, [time], method, tolerance)
+    truth: Any = reference(bare, [time], precise=True)
     axes = np.array(_AXES) / 25.0
     expected = axes @ truth.omega[0] + axes @ truth.remainder[0]
     largest = float(np.abs(truth.omega).max())
     error = float(np.abs(found.omega[0] - expected).max()) / largest
     assert found.ended == "complete"
     assert error <= tolerance + 4e-15 * (found.growth or 1.0)
-    assert found.error is not None
     assert error <= 10.0 * found.error
 
 
@@ -98,9 +97,8 @@ def test_attitude_of_a_nearly_round_body() -> None:
     about_principal, axes = principal(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)))
     found = solve(replace(tilted, attitude=(0.5, 0.5, -0.5, 0.5)), [40.0], attitude=True)
     # `principal` may order the axes in any way: the truth uses this order.
-    exact = reference(about_principal, [40.0])
+    exact: Any = reference(about_principal, [40.0])
     assert found.attitude is not None
-    assert exact.attitude is not None
     back = found.rotation().as_matrix()[0] @ axes
     from scipy.spatial.transform import Rotation
 

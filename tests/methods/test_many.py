@@ -220,11 +220,11 @@ def test_results_may_overlap_the_starts(law: TorqueLaw) -> None:
     place = starts.copy()
     whole = solve_many(scene, times, omega0=starts)
     assert same(solve_many(scene, times, omega0=place, out=place), whole)
-    wanted = solve_many(scene, times, omega0=starts, attitude0=turns)
+    wanted: Any = solve_many(scene, times, omega0=starts, attitude0=turns)
     both = Ensemble(starts.copy(), np.empty(20, np.int8), turns)
     assert solve_many(scene, times, omega0=both.omega, attitude0=turns, out=both) is both
     assert same(both, wanted)
-    assert np.array_equal(turns, wanted.attitude)  # type: ignore[arg-type]
+    assert np.array_equal(turns, wanted.attitude)
     read_only = np.zeros((20, 3))
     read_only.flags.writeable = False
     wrongs = np.empty((19, 3)), np.empty((20, 4)), np.empty((20, 3), "f4"), place[0], read_only
@@ -339,12 +339,10 @@ def test_the_arrays_of_few_scenes_are_kept() -> None:
 def test_one_attitude_for_all_and_arrays_of_the_caller() -> None:
     starts = np.random.default_rng(1).standard_normal((30, 3))
     turned = [0.5, -0.5, 0.5, 0.5]
-    each = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
+    each: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
     out = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
-    shared = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
+    shared: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
     assert shared is out
-    assert shared.attitude is not None
-    assert each.attitude is not None
     assert np.array_equal(shared.attitude, each.attitude)
     scene = replace(TOP, attitude=(0.5, -0.5, 0.5, 0.5))
     assert np.array_equal(solve_many(scene, 3.0, omega0=starts).omega, each.omega)
@@ -358,15 +356,13 @@ def test_a_prepared_solver_takes_many_starts() -> None:
     for body, law in ((TOP, laws[0]), (TOP, laws[1]), (TOP, laws[2]), (full, laws[1])):
         scene = replace(body, torque=law, attitude=(0.5, 0.5, 0.5, -0.5))
         many = prepare(scene, tolerance=1e-9, attitude=True).many
-        found = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
-        assert found.attitude is not None
+        found: Any = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
         omega, attitude, status = many(starts, 2.0, attitudes, threads=2)
         assert np.allclose(omega, found.omega, rtol=0.0, atol=1e-8)
         assert np.allclose(attitude, found.attitude, rtol=0.0, atol=1e-9)
         assert np.array_equal(omega, found.omega) or body is full
         assert not status.any()
-        usual = solve_many(scene, 2.0, omega0=starts, tolerance=1e-9)
-        assert usual.attitude is not None
+        usual: Any = solve_many(scene, 2.0, omega0=starts, tolerance=1e-9)
         assert np.allclose(many(starts, 2.0)[1], usual.attitude, rtol=0.0, atol=1e-9)
 
 

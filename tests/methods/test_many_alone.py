@@ -51,7 +51,7 @@ def test_threads_change_no_bit(attitude: bool) -> None:
 @pytest.mark.parametrize("attitude", [False, True])
 def test_a_bad_body_spoils_no_other(bad: str, attitude: bool, level: int) -> None:
     rng = np.random.default_rng(8)
-    drawn = {
+    drawn: dict[str, Any] = {
         "moments": rng.uniform(2.0, 3.0, (40, 3)), "omega0": rng.standard_normal((40, 3)),
         "torque_constant": rng.standard_normal((40, 3)), "t_end": np.full(40, 2.0),
     }  # fmt: skip
@@ -80,13 +80,11 @@ def test_a_bad_body_spoils_no_other(bad: str, attitude: bool, level: int) -> Non
 
 def test_the_norm_of_an_attitude_may_be_any() -> None:
     turns = np.random.default_rng(8).standard_normal((40, 4))
-    good = solve_many(TOP, 2.0, tolerance=1e-9, attitude0=turns)
-    found = solve_many(
+    good: Any = solve_many(TOP, 2.0, tolerance=1e-9, attitude0=turns)
+    found: Any = solve_many(
         TOP, 2.0, tolerance=1e-9, attitude0=turns * np.logspace(-200, 200, 40)[:, None]
     )
     assert found.has_result.all()
-    assert good.attitude is not None
-    assert found.attitude is not None
     assert angle_between(found.attitude, good.attitude).max() <= 1e-9
 
 

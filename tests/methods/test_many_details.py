@@ -67,13 +67,10 @@ def test_details_are_those_of_single_calls(name: str) -> None:
     some = 0
     for i in range(N):
         one = scene_of_row(base, {**rows, "omega0": STARTS}, i)
-        alone = solve(
+        alone: Any = solve(
             one, float(TIMES[i]), tolerance=1e-10, attitude=attitude, events=[flip(1), small],
             sensitivities=names,
         )  # fmt: skip
-        assert alone.t_events is not None
-        assert alone.y_events is not None
-        assert alone.sensitivities is not None
         assert np.allclose(alone.omega[0], found.omega[i], rtol=0.0, atol=1e-9)
         for k in range(2):
             assert np.array_equal(found.t_events[k][i], alone.t_events[k])
@@ -104,9 +101,7 @@ def test_sequences_of_scenes() -> None:
     ]
     found = MANY(scenes, [1.0, 2.0, 9.0], events=flip(2), sensitivities=["omega0"])
     for i, (scene, time) in enumerate(zip(scenes, (1.0, 2.0, 9.0), strict=True)):
-        alone = solve(scene, time, events=flip(2), sensitivities=["omega0"])
-        assert alone.t_events is not None
-        assert alone.sensitivities is not None
+        alone: Any = solve(scene, time, events=flip(2), sensitivities=["omega0"])
         assert np.array_equal(found.t_events[0][i], alone.t_events[0])
         assert np.array_equal(found.sensitivities["omega0"][i], alone.sensitivities["omega0"][0])
 

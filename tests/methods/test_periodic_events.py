@@ -60,11 +60,9 @@ def test_the_events_are_those_of_the_polynomials(name: str) -> None:
 
 @pytest.mark.campaign
 def test_events_of_a_million_seconds() -> None:
-    found = solve(
+    found: Any = solve(
         WING_NUT, 1e6, events=[events.flip(2), events.extremum(3), events.crosses(1, 2.0)]
     )
-    assert found.t_events is not None
-    assert found.y_events is not None
     for times, states, k in zip(found.t_events, found.y_events, (1, None, 0), strict=True):
         assert len(times) > 180_000
         assert np.diff(times).min() > 0.1

@@ -423,10 +423,11 @@ def test_auto_solves_what_the_closed_form_refuses(attitude: bool) -> None:
     scene = Scene("", (1e-130, 1.0, 0.0), moments=(3.0, 2.0, 1.0))
     with pytest.raises(InputError):
         solve(scene, [5.0], "closed-form")
-    solver: Any = prepare(scene, "closed-form", attitude=attitude)
+    make: Any = prepare
+    solver = make(scene, "closed-form", attitude=attitude)
     assert np.isnan(np.hstack(solver(scene.omega, 5.0))).all()
     assert (solver.status, solver.error) == ("refused", None)
-    solver = prepare(scene, attitude=attitude)
+    solver = make(scene, attitude=attitude)
     found = np.hstack(solver(scene.omega, 5.0))
     assert (solver.status, solver.steps > 0) == ("complete", True)
     wanted = reference(scene, [5.0]).omega[0]

@@ -1,6 +1,7 @@
 """Tests of motions that are computed step by step."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,17 +47,15 @@ def test_a_step_ends_where_a_table_changes(kind: str) -> None:
 
 
 def test_the_state_within_the_last_step() -> None:
-    stepper = Stepper(BRICK, 1e-12, attitude=True)
+    stepper: Any = Stepper(BRICK, 1e-12, attitude=True)
     begin = 0.0
     for _ in range(5):
         end = stepper.step()
         times = np.linspace(begin, end, 7)
-        truth = solve(BRICK, times[1:], tolerance=1e-12, attitude=True)
+        truth: Any = solve(BRICK, times[1:], tolerance=1e-12, attitude=True)
         found = stepper.at(times)
         assert found.shape == (7, 7)
         np.testing.assert_allclose(found[:3, 1:], truth.omega.T, atol=1e-10)
-        assert truth.attitude is not None
-        assert stepper.attitude is not None
         np.testing.assert_allclose(found[3:, 1:], truth.attitude.T, atol=1e-10)
         now = np.concatenate([stepper.omega, stepper.attitude])
         np.testing.assert_allclose(stepper.at(end), now, rtol=0.0, atol=1e-15)
@@ -71,18 +70,16 @@ def test_before_the_first_step_the_state_is_that_of_time_0() -> None:
 
 
 def test_the_state_and_the_scene_may_be_changed() -> None:
-    stepper = Stepper(BRICK, 1e-12, attitude=True)
+    stepper: Any = Stepper(BRICK, 1e-12, attitude=True)
     stepper.until(1.0)
     before = stepper.at(1.0)
     # An impact turns the spin around, and the body returns.
     stepper.omega = -stepper.omega
     assert stepper.at(1.0).tolist() == before.tolist()
     mirrored = Scene("", tuple(stepper.omega), BRICK.moments, attitude=stepper.attitude)
-    truth = solve(mirrored, 0.7, tolerance=1e-12, attitude=True)
+    truth: Any = solve(mirrored, 0.7, tolerance=1e-12, attitude=True)
     stepper.until(1.7)
     np.testing.assert_allclose(stepper.omega, truth.omega[-1], atol=1e-10)
-    assert stepper.attitude is not None
-    assert truth.attitude is not None
     np.testing.assert_allclose(stepper.attitude, truth.attitude[-1], atol=1e-10)
     # Another body.
     sphere = Scene("sphere", (9.0, 9.0, 9.0), moments=(1.0, 1.0, 1.0))
@@ -92,7 +89,6 @@ def test_the_state_and_the_scene_may_be_changed() -> None:
     np.testing.assert_allclose(stepper.omega, omega, atol=1e-12)
     assert stepper.scene is sphere
     stepper.attitude = (0.0, 0.0, 0.0, 2.0)
-    assert stepper.attitude is not None
     assert stepper.attitude.tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

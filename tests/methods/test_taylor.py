@@ -6,6 +6,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -284,8 +285,7 @@ def test_variations_are_as_accurate_as_the_motion() -> None:
     time = [16849.658046512755]
     truth = solve(scene, time, "taylor", 1e-12).omega
     for tolerance in (1e-3, 1e-4):
-        found = solve(scene, time, "taylor", tolerance)
-        assert found.error is not None
+        found: Any = solve(scene, time, "taylor", tolerance)
         assert np.abs(found.omega - truth).max() <= found.error * np.abs(truth).max()
 
 
@@ -313,8 +313,7 @@ def test_error_of_a_row_near_the_separatrix_does_not_depend_on_later_rows() -> N
     times = [0.3 * end, end]
     truth = solve(scene, times, "closed-form", 1e-13).omega
     for chosen in (times[:1], times, np.linspace(0.0, end, 2001)[1:].tolist()):
-        found = solve(scene, chosen, "taylor", 7e-7)
-        assert found.error is not None
+        found: Any = solve(scene, chosen, "taylor", 7e-7)
         error = np.abs(found.omega[np.argmin(np.abs(found.time - times[0]))] - truth[0]).max()
         assert 1e-5 < error <= 2.0 * found.error
         assert found.ended == "sensitive"

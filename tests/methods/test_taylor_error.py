@@ -1,6 +1,7 @@
 """Error and error amplification that the Taylor kernel reports, compared with the truth."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,7 +140,7 @@ def test_rows_within_steps_have_their_error_taken_off(
     scene = SCENES[name]
     times = np.linspace(0.0, 3.0, 301)[1:].tolist()
     known = reference(scene, times).omega
-    found = solve(scene, times, "taylor", tolerance)
+    found: Any = solve(scene, times, "taylor", tolerance)
     before = untaken(scene, times, tolerance)
     scale = np.abs(known).max()
     errors, worse = (
@@ -147,7 +148,6 @@ def test_rows_within_steps_have_their_error_taken_off(
     )
     assert found.steps < 60
     assert max(errors) <= max(worse) / factor <= tolerance
-    assert found.error is not None
     assert max(errors) <= max(errors[-1] * 4.0, 0.1 * found.error)
     assert 0.65 * max(worse) < found.error < 2.0 * max(worse)
 
@@ -174,7 +174,7 @@ def _beside(small: float) -> Scene:
 )
 def test_growth_over_thousands_of_steps(small: float, time: float, tolerance: float) -> None:
     """Blocks of steps are merged, also if the growth exceeds the precision of binary64."""
-    known = truth.truth_of(_beside(small), time).growth
+    known = truth.truth_of(_beside(small), [time]).growth
     found = solve(_beside(small), [time], "taylor", tolerance)
     assert found.growth == pytest.approx(known, rel=0.4)
 

@@ -9,23 +9,18 @@ import operator
 from collections.abc import Callable
 from fractions import Fraction
 from random import Random
+from typing import Any
 
-from pyharness.original.word import Number, Word
+from pyharness.original.word import Word
 
-OPERATIONS: dict[str, Callable[[Fraction, Fraction], Fraction]] = {
-    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
-}  # fmt: skip
-ON_NUMBERS: dict[str, Callable[[Number, Number], Number]] = {
+OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
 }  # fmt: skip
 
 
 def exact(p: int, rule: str, name: str, x: Fraction, y: Fraction) -> Fraction:
-    """Return the result of an operation of a word of p bits on two non-zero numbers.
-
-    No exponent may leave the range.
-    """
-    value = OPERATIONS[name](x, y)
+    """Return the result in p bits for two non-zero numbers; no exponent may leave the range."""
+    value: Fraction = OPERATIONS[name](x, y)
     if rule == "chop":
         return _towards_zero(value, unit(value, p))
     if rule == "nearest-even":
@@ -89,10 +84,7 @@ def _cdc_quotient(p: int, rounds: bool, x: Fraction, y: Fraction) -> Fraction:
 
 
 def drawn(random: Random, p: int) -> tuple[int, int, int, int]:
-    """Return coefficients of p bits and exponents of two numbers.
-
-    Most are near a power of two, close in exponent, or nearly the negative of each other.
-    """
+    """Return coefficients of p bits and exponents of two numbers, most of them critical."""
     low, high = 1 << p - 1, (1 << p) - 1
 
     def coefficient() -> int:
@@ -106,9 +98,8 @@ def drawn(random: Random, p: int) -> tuple[int, int, int, int]:
     if random.random() < 0.3:
         y = min(max(x + random.randint(-3, 3), low), high)
     e = random.randint(-60, 60)
-    apart = random.choice(
-        (0, 1, 1, 2, 3, p - 1, p, p + 1, 2 * p - 1, 2 * p, random.randint(0, 2 * p + 3))
-    )
+    any_ = random.randint(0, 2 * p + 3)
+    apart = random.choice((0, 1, 1, 2, 3, p - 1, p, p + 1, 2 * p - 1, 2 * p, any_))
     signs = random.choice((1, -1)), random.choice((1, -1))
     return signs[0] * x, e, signs[1] * y, e + random.choice((1, -1)) * apart
 
@@ -121,7 +112,7 @@ def disagreements(p: int, rule: str, count: int, seed: str) -> list[str]:
         xm, xe, ym, ye = drawn(random, p)
         name = random.choice("++--*/")
         x, y = word.number(xm, xe), word.number(ym, ye)
-        ours = ON_NUMBERS[name](x, y).fraction()
+        ours: Fraction = OPERATIONS[name](x, y).fraction()
         due = exact(p, rule, name, x.fraction(), y.fraction())
         if ours != due:
             found.append(f"{x!r} {name} {y!r}: {ours}, due {due}")

@@ -25,7 +25,7 @@ from pyharness.original import compiled_in_word, in_word
 from pyharness.original.cells import all_listings
 from pyharness.original.compiled_in_word import compiled_words
 from pyharness.original.interchange import from_bytes, to_bytes
-from pyharness.original.programs import BINARY64, COMPILED_WORDS
+from pyharness.original.programs import BINARY64, COMPILED_WORDS, IMPLEMENTATIONS
 from pyharness.original.word import WORDS, Number, Word
 
 pytestmark = pytest.mark.bitwise
@@ -77,6 +77,7 @@ def test_extremes_agree(name: str, word: str) -> None:
 
 def test_runs_end_as_their_word_has_it() -> None:
     """The wider the range, the later a run overflows; a stop's quotient is returned as a float."""
+    assert {"binary32", "binary64"} <= set(HERE) <= set(COMPILED_WORDS)
     scene, listing = EXTREMES["overflow"], Listing.original("two-term")
     names = sorted(HERE, key=lambda name: WORDS[name].p)
     runs = [compiled_in_word.run(scene, listing, WORDS[name]) for name in names]
@@ -100,11 +101,9 @@ def test_binary64_by_bytes_is_the_run_in_floats() -> None:
 def test_public_call_runs_both_languages() -> None:
     scene, listing = case_scene(5), Listing.corrected("four-term")
     for word in HERE:
-        runs: list[Trajectory] = [
-            run_program(scene, listing, each, word=word) for each in ("fortran", "python")
-        ]
-        assert differences(*runs) == []
-        assert (runs[0].exact is None) == (word == "binary64")
+        run, twin = (run_program(scene, listing, each, word=word) for each in IMPLEMENTATIONS)
+        assert differences(run, twin) == []
+        assert (run.exact is None) == (word == "binary64")
 
 
 def test_word_that_the_compiler_lacks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,6 +118,8 @@ def test_word_that_the_compiler_lacks_is_refused(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(extension(), "run_program_in_word", without)
     with pytest.raises(InputError, match="--word binary128: "):
         run_program(scene, listing, word="binary128")
+    _, status = extension().functions_of_word(np.zeros((2, 3), np.int8, order="F"))
+    assert status == REFUSED
 
 
 def functions(name: str, numbers: list[Number]) -> list[list[Number]]:
@@ -129,13 +130,7 @@ def functions(name: str, numbers: list[Number]) -> list[list[Number]]:
     return found
 
 
-def test_unknown_numbers_are_refused() -> None:
-    _, status = extension().functions_of_word(np.zeros((2, 3), np.int8, order="F"))
-    assert status == REFUSED
-
-
 def drawn(word: Word, random: Random, least: int, most: int) -> Number:
-    """Return a random number between two powers of two, with few or many bits."""
     bits = random.choice((1, 2, 20, word.p))
     m = random.getrandbits(bits) | 1 << bits - 1
     return word(Fraction(m) * Fraction(2) ** (random.randint(least, most) - bits))
@@ -179,9 +174,8 @@ def test_sine_and_cosine_of_binary128_are_the_nearest() -> None:
                 assert (found.m, found.e) == (_nearest(due).m, _nearest(due).e), x
     plain = [WIDE(x) for x in (0.0, -0.0, 1e-300, math.inf, math.nan)]
     rows = functions("binary128", plain)
-    assert [(sine.m, str(sine.e)) for _, sine, _ in rows[:3]] == [
-        (each.m, str(each.e)) for each in plain[:3]
-    ]
+    sines = [(sine.m, str(sine.e)) for _, sine, _ in rows[:3]]
+    assert sines == [(each.m, str(each.e)) for each in plain[:3]]
     assert [float(cosine) for _, _, cosine in rows[:3]] == [1.0, 1.0, 1.0]
     assert [str(each.e) for row in rows[3:] for each in row[1:]] == ["nan"] * 4
 
@@ -210,24 +204,17 @@ def test_bytes_are_those_of_the_processor(name: str, form: str) -> None:
     values = [each for each in values if not math.isnan(each)] + [0.0, -0.0, math.inf, -math.inf]
     written = np.frombuffer(struct.pack(f"{len(values)}{form}", *values), np.int8)
     numbers = from_bytes(written.reshape((bits // 8, -1), order="F"), word)
-    assert [math.copysign(1.0, float(each)) for each in numbers] == [
-        math.copysign(1.0, each) for each in values
-    ]
-    assert [float(each) for each in numbers] == values
+    assert [*map(repr, map(float, numbers))] == [*map(repr, values)]
     assert to_bytes(numbers, word, len(values)).tobytes("F") == written.tobytes()
 
 
 def test_bytes_of_binary128() -> None:
     """The format is a sign, 15 bits of exponent from -16383, and 112 bits of fraction."""
     patterns = {
-        0x3FFF << 112: 1.0,
-        0xBFFF8 << 108: -1.5,
-        0x7FFF << 112: math.inf,
-        1: Fraction(1, 2**16494),
-        (1 << 112) - 1: Fraction(2**112 - 1, 2**16494),
-        1 << 112: Fraction(1, 2**16382),
-        (0x7FFF << 112) - 1: Fraction(2**113 - 1) * 2**16271,
-    }
+        0x3FFF << 112: 1.0, 0xBFFF8 << 108: -1.5, 0x7FFF << 112: math.inf,
+        1: Fraction(1, 2**16494), (1 << 112) - 1: Fraction(2**112 - 1, 2**16494),
+        1 << 112: Fraction(1, 2**16382), (0x7FFF << 112) - 1: Fraction(2**113 - 1) * 2**16271,
+    }  # fmt: skip
     numbers = [WIDE(each) for each in patterns.values()]
     written = to_bytes(numbers, WIDE, len(numbers))
     found = [int.from_bytes(each.tobytes(), sys.byteorder) for each in written.T]
@@ -236,11 +223,6 @@ def test_bytes_of_binary128() -> None:
     assert [(each.m, each.e) for each in back] == [(each.m, each.e) for each in numbers]
     (nan,) = from_bytes(to_bytes([WIDE(math.nan)], WIDE, 1), WIDE)
     assert (nan.m, str(nan.e)) == (0, "nan")
-
-
-def test_names_of_words() -> None:
-    assert set(HERE) <= set(COMPILED_WORDS)
-    assert {"binary32", "binary64"} <= set(HERE)
 
 
 @pytest.mark.campaign

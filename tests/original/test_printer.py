@@ -39,9 +39,7 @@ def _page(program: str, case: int, capsys: Capture, *options: str) -> list[str]:
         ("runge-kutta", [0, 20, 40, 60, 71, 91, 111], [0, 20, 40, 60, 71, 91, 111]),
     ],
 )
-def test_page_of_a_program(
-    program: str, heads: list[int], columns: list[int], capsys: Capture
-) -> None:
+def test_page(program: str, heads: list[int], columns: list[int], capsys: Capture) -> None:
     """Each program has its own formats; in one, four places for six values leave an empty line."""
     lines = _page(program, 5, capsys)
     collocation = program != "runge-kutta"
@@ -58,26 +56,16 @@ def test_page_of_a_program(
         assert row[column : column + len(text)] == text
 
 
-def test_header_shows_the_torques_that_the_cards_set(capsys: Capture) -> None:
-    """A case shows the deck's torques, and a user's scene the torques of its law."""
-    assert _page("two-term", 6, capsys)[0] == " 200.00     100.00"
-    mine = Scene("mine", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), steps=1)
-    run = compiled.run(mine, Listing.original("four-term"))
-    assert page(mine, "four-term", run).splitlines()[0] == "   3.00       0.00"
-
-
 def test_what_does_not_fit_is_asterisks() -> None:
     scene = replace(case_scene(5), moments=(1234.5, 0.004, 999.996))
-    stars, nothing = "*" * 10, np.zeros(1)
+    stars, nothing, ier = "*" * 10, np.zeros(1), np.array([129], np.int32)
     omega = np.array([[99999.99994, 99999.99996, -9999.99994]])
     velocity = np.array([[-9999.99996, math.nan, -math.inf]])
-    run = Trajectory(nothing, nothing, omega, velocity, 1, 0, ier=np.array([129], np.int32))
+    run = Trajectory(nothing, nothing, omega, velocity, 1, 0, ier=ier)
     lines = page(scene, "two-term", run).splitlines()
     assert lines[:3] == [" ******     100.00", "   0.00     200.00", " ******     150.00"]
-    assert lines[4] == (
-        f" 99999.9999          {stars}          -9999.9999       1   **         "
-        f"{stars}          {stars}          {stars}"
-    )
+    row = f" 99999.9999          {stars}          -9999.9999       1   **         "
+    assert lines[4] == row + "          ".join([stars] * 3)
 
 
 def test_long_runs_and_overflow_end_in_asterisks(capsys: Capture) -> None:
@@ -86,6 +74,11 @@ def test_long_runs_and_overflow_end_in_asterisks(capsys: Capture) -> None:
     lines = _page("two-term", 6, capsys)
     assert len(lines) == 4 + 56
     assert lines[-1].count("*") == 60
+    # A case shows the torques of its cards, and a scene of the user those of its law.
+    assert _page("two-term", 6, capsys)[0] == " 200.00     100.00"
+    mine = Scene("mine", (1.0, 2.0, 3.0), moments=(3.0, 2.0, 1.5), steps=1)
+    run = compiled.run(mine, Listing.original("four-term"))
+    assert page(mine, "four-term", run).splitlines()[0] == "   3.00       0.00"
 
 
 @pytest.mark.parametrize(
@@ -168,9 +161,7 @@ def test_page_is_what_a_fortran_compiler_writes(program: str, tmp_path: Path) ->
     assert sum("*" in line for line in written) > 100
 
 
-def test_page_goes_to_a_file_and_both_implementations_print_the_same(
-    capsys: Capture, tmp_path: Path
-) -> None:
+def test_page_goes_to_a_file_and_both_languages_print_it(capsys: Capture, tmp_path: Path) -> None:
     fortran = "\n".join(_page("four-term", 2, capsys))
     out = tmp_path / "page"
     assert not _page("four-term", 2, capsys, "--implementation", "python", "--out", str(out))

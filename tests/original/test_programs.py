@@ -3,7 +3,10 @@
 import inspect
 import itertools
 import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switcha
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled, runge_kutta
 from pyharness.original.cells import all_cells, all_listings, cell_name
 from pyharness.original.programs import IMPLEMENTATIONS, PROGRAM_REGISTRY, run_program
@@ -25,10 +29,9 @@ def is_chosen(listing: Listing) -> bool:
     """Return whether the tests of this file run a listing.
 
     They run the original and the corrected program, each with all its defects but one, with a
-    single defect, and with a single reading (an interpretation of a doubtful card). They run all
-    listings if the environment variable PYHARNESS_ALL_LISTINGS is set, as in the commands with
-    which `make cross-check` repeats a failed comparison. `verify --only cells` and `make
-    cross-check` compare all listings anyway.
+    single defect, and with a single reading. All listings are run by `verify --only cells`, and
+    here if PYHARNESS_ALL_LISTINGS is set, as in the commands by which `make cross-check` repeats a
+    failed comparison.
     """
     if os.environ.get("PYHARNESS_ALL_LISTINGS"):
         return True
@@ -37,20 +40,21 @@ def is_chosen(listing: Listing) -> bool:
     return min(len(active), len(every - active)) + len(listing.readings) <= 1
 
 
+def both(scene: Scene, listing: Listing, **options: Any) -> Iterator[Trajectory]:
+    program = PROGRAM_REGISTRY[listing.program]
+    return (program.run(scene, listing, language, **options) for language in IMPLEMENTATIONS)
+
+
 @pytest.mark.campaign
 @pytest.mark.bitwise
 def test_every_cell_agrees_to_the_last_bit_or_is_in_the_table() -> None:
-    """Compare every program, case, defect and reading; unnecessary exemptions fail."""
     known = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in known if entry["kind"] == "cross-language"}
     cells = {cell_name(*each): each for each in all_cells()}
     assert listed <= cells.keys()
     for name, (listing, case) in cells.items():
         if is_chosen(listing) or name in listed:
-            program = PROGRAM_REGISTRY[listing.program]
-            compiled, twin = (
-                program.run(case_scene(case), listing, language) for language in IMPLEMENTATIONS
-            )
+            compiled, twin = both(case_scene(case), listing)
             differs = bool(differences(compiled, twin) or distance(compiled, twin))
             assert differs == (name in listed), name
 
@@ -67,15 +71,13 @@ def test_choice_of_listings_has_every_defect_and_every_reading() -> None:
 
 BODY = (3.0, 2.0, 1.0)
 WAVE, OTHER = ((1.0, 2.0, 3.0), 17.3), ((7.0, -8.0, 9.0), 11.0)
-ALL_TORQUES = TorqueLaw(
-    (1.0, 0.0, -1.0), (0.0, 3.0, 0.5), (WAVE, ((-4.0, 5.0, 6.0), 1e4)), ((OTHER[0], 0.0),)
-)
+FAST, CONSTANT = ((-4.0, 5.0, 6.0), 1e4), ((7.0, -8.0, 9.0), 0.0)
+ALL_TORQUES = TorqueLaw((1.0, 0.0, -1.0), (0.0, 3.0, 0.5), (WAVE, FAST), (CONSTANT,))
 MORE_COSINES = TorqueLaw(sines=(WAVE,), cosines=(OTHER, ((-4.0, 5.0, 6.0), 3.0)))
+STEADY = TorqueLaw((0.1, 0.2, -0.3))
 ENDLESS = TorqueLaw(sines=(((1.0, 1.0, 1.0), 1e306),))
 NASTY = {
-    "coefficients": Scene(
-        "", (1.0, -2.0, 3.0), coefficients=(0.3, -1.7, 0.9), torque=TorqueLaw((0.1, 0.2, -0.3))
-    ),
+    "coefficients": Scene("", (1.0, -2.0, 3.0), coefficients=(0.3, -1.7, 0.9), torque=STEADY),
     "explodes": Scene("", (1.0, 1.0, 1.0), coefficients=(50.0, 60.0, 70.0)),
     "huge": Scene("", (1e150, 1e160, 1.0), BODY),
     "tiny": Scene("", (1e-300, 1e-310, 5e-324), BODY),
@@ -84,9 +86,7 @@ NASTY = {
     "waves": Scene("", (0.1, 0.2, 0.3), (41.0, 39.0, 20.0), torque=ALL_TORQUES),
     "more cosines than sines": Scene("", (0.1, 0.2, 0.3), (41.0, 39.0, 20.0), torque=MORE_COSINES),
     "singular matrix": Scene("", (0.0, 1.0, 10.0), (40.0, 30.0, 20.0), step_size=1e-8),
-    "infinite angle": Scene(
-        "", (0.0, 1.0, 1.0), (4.0, 3.0, 2.0), torque=ENDLESS, step_size=1.0, steps=150
-    ),
+    "infinite angle": Scene("", (0, 1, 1), (4, 3, 2), torque=ENDLESS, step_size=1.0, steps=150),
     "long steps": Scene("", (0.0, 1.0, 10.0), (4.0, 3.0, 2.0), step_size=10.0),
 }
 
@@ -99,11 +99,7 @@ def test_nasty_scenes_agree_to_the_last_bit(program: str, name: str) -> None:
     """Overflow, underflow, IER = 129, signed zeros, infinite angles: the same in both languages."""
     for listing in filter(is_chosen, all_listings(program)):
         for may_stop in (True, False):
-            compiled, twin = (
-                PROGRAM_REGISTRY[program].run(NASTY[name], listing, language, may_stop=may_stop)
-                for language in IMPLEMENTATIONS
-            )
-            assert differences(compiled, twin) == [], listing
+            assert differences(*both(NASTY[name], listing, may_stop=may_stop)) == [], listing
 
 
 def test_overflow_ends_with_the_rows_until_then() -> None:
@@ -134,16 +130,14 @@ def test_every_defect_alone_changes_something() -> None:
 @pytest.mark.parametrize("reading", names_of("reading"))
 def test_readings_not_adopted_lose_an_order(reading: str) -> None:
     """Either reading is a guess, but a working program can't have the one that is not adopted."""
-    program = next(p for p in PROGRAMS if reading in names_of("reading", p))
+    program = next(PROGRAM_REGISTRY[p] for p in PROGRAMS if reading in names_of("reading", p))
     scene = case_scene(5)
     truth = reference(scene, scene.times())
-    listing = Listing(program, [reading])
-    order = measured_order(scene, PROGRAM_REGISTRY[program], listing, truth)
+    order = measured_order(scene, program, Listing(program.name, [reading]), truth)
     assert order.state == "misses", order
 
 
 def test_recorded_time_is_what_tape5_got() -> None:
-    """TIME grows quadratically in the original; corrected, it is a sum of equal steps."""
     scene = case_scene(3)
     before = compiled.run(scene, Listing.original("four-term"))
     n = np.arange(1, 101)
@@ -168,24 +162,16 @@ def test_lipschitz_constant_and_no_stop(velocity: bool) -> None:
     assert compiled.run(scene, listing, lipschitz=1.0).steps < 25
     run = compiled.run(scene, listing, may_stop=False)
     assert (run.ended, run.steps, run.stop) == ("complete", 100, None)
+    together = subset("runge-kutta", "corrected", keep=["lipschitz-tests-velocity"])
+    for listing, variable in ((together, "UV"), (Listing.corrected("runge-kutta"), "U")):
+        stop = compiled.run(case_scene(5), listing, lipschitz=1e-3).stop
+        assert stop is not None
+        assert stop.variable == variable
 
 
-def test_norms_name_their_variable() -> None:
-    scene = case_scene(5)
-    keep = ["lipschitz-tests-velocity"]
-    together = compiled.run(scene, subset("runge-kutta", "corrected", keep=keep), lipschitz=1e-3)
-    alone = compiled.run(scene, Listing.corrected("runge-kutta"), lipschitz=1e-3)
-    assert together.stop is not None
-    assert alone.stop is not None
-    assert (together.stop.variable, alone.stop.variable) == ("UV", "U")
-
-
-def test_evaluations_count_right_hand_sides() -> None:
-    counts = {
-        program: compiled.run(case_scene(3), Listing.corrected(program)).evaluations
-        for program in PROGRAMS
-    }
-    assert counts == {"two-term": 300, "four-term": 500, "runge-kutta": 400}
+@pytest.mark.parametrize(("program", "count"), [*zip(PROGRAMS, (300, 500, 400), strict=True)])
+def test_evaluations_count_right_hand_sides(program: str, count: int) -> None:
+    assert compiled.run(case_scene(3), Listing.corrected(program)).evaluations == count
 
 
 @pytest.mark.campaign
@@ -203,8 +189,6 @@ def test_velocity_that_no_one_asked_for_changes_no_bit_of_the_rest() -> None:
 
 
 def test_calls_release_the_gil_and_give_the_same_bits_from_many_threads() -> None:
-    from concurrent.futures import ThreadPoolExecutor
-
     scene = case_scene(7)
     listing = Listing.original("four-term")
     wanted = compiled.run(scene, listing)
@@ -218,17 +202,12 @@ AXES: list[tuple[float, float, float]] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_overflow_of_any_one_component_ends_the_run(
-    program: str, axis: tuple[float, float, float]
-) -> None:
+def test_overflow_of_one_component_ends_it(program: str, axis: tuple[float, float, float]) -> None:
     """The other two components are constant and finite, until they are combined with a NaN."""
     omega = [1e160 * (1.0 - each) for each in axis]
     scene = Scene("", omega, coefficients=axis, step_size=1.0, steps=3)
     for listing in (Listing.original(program), Listing.corrected(program)):
-        fortran, twin = (
-            PROGRAM_REGISTRY[program].run(scene, listing, language, may_stop=False)
-            for language in IMPLEMENTATIONS
-        )
+        fortran, twin = both(scene, listing, may_stop=False)
         assert differences(fortran, twin) == []
         alone = compiled.run(scene, listing, may_stop=False, velocity=False)
         for run in (fortran, alone):
@@ -238,10 +217,7 @@ def test_overflow_of_any_one_component_ends_the_run(
 @pytest.mark.parametrize("program", ["two-term", "four-term"])
 def test_ier_is_printed_where_the_matrix_is_singular(program: str) -> None:
     scene = replace(case_scene(5), step_size=1e-17, steps=3)
-    fortran, twin = (
-        PROGRAM_REGISTRY[program].run(scene, Listing.corrected(program), language)
-        for language in IMPLEMENTATIONS
-    )
+    fortran, twin = both(scene, Listing.corrected(program))
     assert differences(fortran, twin) == []
     np.testing.assert_array_equal(fortran.ier, [129] * 3)
 
@@ -270,10 +246,6 @@ def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: s
 
 def test_the_stop_test_has_the_constant_of_the_deck_everywhere() -> None:
     wanted = facts("cases")["deck"]["lipschitz"]
-    for function in (
-        run_program,
-        PROGRAM_REGISTRY["runge-kutta"].run,
-        compiled.run,
-        runge_kutta.run,
-    ):
+    program = PROGRAM_REGISTRY["runge-kutta"]
+    for function in (run_program, program.run, compiled.run, runge_kutta.run):
         assert inspect.signature(function).parameters["lipschitz"].default == wanted

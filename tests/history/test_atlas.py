@@ -36,7 +36,6 @@ COARSE = {
 
 @pytest.fixture(scope="module")
 def coarse(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the options that name a coarse atlas and its sweep file."""
     pytest.importorskip("zarr")
     folder = tmp_path_factory.mktemp("atlas")
     text = (ATLAS / "history.toml").read_text()
@@ -61,7 +60,6 @@ def test_a_coarse_atlas_has_the_shares_that_were_seen(coarse: str, printed: Prin
 
 
 def _stored() -> dict[str, dict[float, float]]:
-    """Return the mean points stored beside the picture, by claim and magnitude."""
     found: dict[str, dict[float, float]] = {}
     for row in csv.DictReader((ATLAS / "history.csv").read_text().splitlines()):
         of_claim = found.setdefault(row["claim"], {})
@@ -81,7 +79,6 @@ def test_numbers_beside_the_page_are_those_beside_its_picture() -> None:
 
 @pytest.mark.campaign
 def test_a_chunk_of_the_atlas_has_the_stored_means() -> None:
-    """Compute the directions of one magnitude, with the adopted assumptions, over 100 steps."""
     sweep = read_sweep(ATLAS / "history.toml", FUNCTIONS)
     magnitude = 10
     chunks = [solve_chunk(sweep, 2 * magnitude + half) for half in (0, 1)]

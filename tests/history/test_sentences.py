@@ -78,23 +78,17 @@ def test_state_of_the_laboratory_runs(state: str, printed: Printed) -> None:
     assert printed(_command_of(state))
 
 
-@pytest.mark.parametrize(
-    "state",
-    [
+def test_state_that_no_run_has_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+    for state in (
         "case=8&program=two-term", "case=2&program=three-term", "case=2&program=two-term&no-stop",
         "case=2&program=two-term&fix=stage-base", "case=2&program=two-term&listing=modern",
         "case=2&program=runge-kutta&reading=c1-for-c", "program=two-term",
-    ],
-)  # fmt: skip
-def test_state_that_no_run_has_is_refused(state: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(shlex.split(_command_of(state))) == 2
-    capsys.readouterr()
-
-
-@pytest.mark.parametrize("state", ["case=2&sigma=3", "case=2&case=3"])
-def test_state_with_a_strange_key_or_one_twice_is_found(state: str) -> None:
-    with pytest.raises((KeyError, ValueError)):
-        _command_of(state)
+    ):  # fmt: skip
+        assert main(shlex.split(_command_of(state))) == 2
+    assert capsys.readouterr().out == ""
+    for state in ("case=2&sigma=3", "case=2&case=3"):
+        with pytest.raises((KeyError, ValueError)):
+            _command_of(state)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -130,7 +124,6 @@ def test_every_sentence_has_the_letters_of_the_thesis_in_its_order() -> None:
 
 
 def _letters(text: str) -> str:
-    """Return the letters and digits of a text alone."""
     return re.sub(r"[^A-Za-z0-9]", "", text)
 
 

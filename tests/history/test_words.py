@@ -56,9 +56,8 @@ def test_double_is_the_run_in_53_bits(found: Found) -> None:
             assert run.different == 0
     cell = found[2, "runge-kutta", "corrected"]
     assert cell.of(54, "chop") is None
-    assert [(run.p, run.rule) for run in cell.runs] == [
-        (p, rule) for rule in RULES for p in LENGTHS
-    ]
+    words = [(p, rule) for rule in RULES for p in LENGTHS]
+    assert [(run.p, run.rule) for run in cell.runs] == words
 
 
 def test_rounding_takes_over_where_words_are_short(found: Found) -> None:

@@ -63,9 +63,7 @@ def test_numbers_are_given_in_full() -> None:
     found = render(REPORT._replace(data=array), "csv").splitlines()
     assert found == ["a,b", "0.1,1e+22", "5e-324,-0.0"]
     assert [exact(x) for x in (None, True, 3, "x")] == ["", "true", "3", "x"]
-
-
-def test_page_is_written_as_for_people() -> None:
+    # A page is written for people.
     page: list[Section] = [["title", TABLE], [Line("- " + "note " * 30)]]
     found = render(REPORT._replace(page=page), "markdown").split("\n\n")
     assert found[0] == "title"

@@ -55,25 +55,18 @@ def scene_with(torque: StateTorque, **body: Any) -> Scene:
 # The values.
 
 
-@pytest.mark.parametrize("t", [*WITHIN[:50], *TIMES, *OUTSIDE])
-def test_linear_table_equals_that_of_numpy(t: float) -> None:
-    wanted = [np.interp(t, TIMES, column) for column in VALUES.T]
-    assert at(CASES["linear"], t) == pytest.approx(wanted, rel=1e-14, abs=1e-14)
-
-
-@pytest.mark.parametrize("t", [*WITHIN[:50], *TIMES, *OUTSIDE])
-def test_held_table_has_the_last_value_before(t: float) -> None:
-    place = max(0, sum(time <= t for time in TIMES) - 1)
-    assert at(CASES["held"], t).tolist() == VALUES[place].tolist()
-
-
-def test_cubic_table_equals_the_spline_of_scipy() -> None:
+def test_tables_equal_those_of_numpy_and_scipy() -> None:
     spline = CubicSpline(TIMES, VALUES)
-    for t in [*WITHIN, *TIMES]:
-        assert at(CASES["cubic"], t) == pytest.approx(spline(t), rel=1e-13, abs=1e-13)
-    for t in OUTSIDE:
-        end = VALUES[0] if t < TIMES[0] else VALUES[-1]
-        assert at(CASES["cubic"], t).tolist() == end.tolist()
+    for t in [*WITHIN, *TIMES, *OUTSIDE]:
+        wanted = [np.interp(t, TIMES, column) for column in VALUES.T]
+        assert at(CASES["linear"], t) == pytest.approx(wanted, rel=1e-14, abs=1e-14)
+        place = max(0, sum(time <= t for time in TIMES) - 1)
+        assert at(CASES["held"], t).tolist() == VALUES[place].tolist()
+        if TIMES[0] <= t <= TIMES[-1]:
+            assert at(CASES["cubic"], t) == pytest.approx(spline(t), rel=1e-13, abs=1e-13)
+        else:
+            end = VALUES[0] if t < TIMES[0] else VALUES[-1]
+            assert at(CASES["cubic"], t).tolist() == end.tolist()
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -213,14 +206,14 @@ def test_reference_accepts_a_short_pulse_in_a_long_motion() -> None:
 
 
 def test_reference_accepts_many_pulses_before_a_long_motion() -> None:
-    starts = [1e-6 * n for n in range(200)]
-    torque = pulses(starts, [5e-7] * 200, (2e4, 0, 0))
+    starts = [1e-6 * n for n in range(50)]
+    torque = pulses(starts, [5e-7] * 50, (8e4, 0, 0))
     scene = Scene("many", (0.0, 0.0, 0.0), torque=torque, **SPHERE)
     found = reference(scene, [1e6], effort=1.0)
     assert found.omega[0] == pytest.approx([1.0, 0.0, 0.0], rel=1e-9)
     # Each pulse takes two steps, which count in the work limit.
-    with pytest.raises(InputError, match="200"):
-        reference(scene, [1e6], effort=0.01)
+    with pytest.raises(InputError, match="50"):
+        reference(scene, [1e6], effort=0.0025)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -260,9 +253,9 @@ def test_short_pulse_on_a_body_at_rest_sets_its_scale(duration: float, side: flo
     start = 1.0 if side > 0.0 else -1.0 - duration
     torque = pulses([start], [duration], push) + wheels((30.0, 20.0, 10.0))
     scene = Scene("", (0.0, 0.0, 0.0), moments=(4.0, 3.0, 2.0), torque=torque)
-    truth = reference(scene, [side * 10.0]).omega
+    truth = reference(scene, [side * 3.0]).omega
     for tolerance in (1e-3, 1e-6, 1e-12):
-        found: Any = solve(scene, [side * 10.0], tolerance=tolerance)
+        found: Any = solve(scene, [side * 3.0], tolerance=tolerance)
         error = np.abs(found.omega - truth).max() / np.abs(truth).max()
         # Near rounding errors the estimate is one by order of magnitude.
         assert error <= found.error + 4e-15 * found.growth

@@ -4,16 +4,15 @@ The axes are rational, of rotations by 3/5 and 4/5, and the moments are multiple
 entry of the matrix is a float, and so is every component of omega about the principal axes.
 """
 
-import itertools
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pyharness import Scene, TorqueLaw, principal, solve
-from pyharness.model.inertia import Matrix
 from pyharness.model.scene import Triple
 from pyharness.truth.reference import reference
 
@@ -30,27 +29,21 @@ _TIMES = {"plain": 20.0, "nearly round": 1e6}
 _SPIN: Triple = (25.0 / 32.0, -50.0 / 32.0, 75.0 / 64.0)  # about the principal axes
 
 
-def _turned(vector: Triple) -> Triple:
+def _exact(found: np.ndarray) -> list[Any]:
+    """Return the numbers of an array of fractions, which all are floats."""
+    floats = found.astype(float)
+    assert (floats == found).all()
+    return floats.tolist()  # type: ignore[no-any-return]
+
+
+def _turned(vector: Triple) -> Any:
     """Return the components about the body's axes of a vector about the principal axes."""
-    exact = [
-        sum(Fraction(a, 25) * Fraction(x) for a, x in zip(row, vector, strict=True))
-        for row in _AXES
-    ]
-    first, second, third = map(float, exact)
-    assert [first, second, third] == exact
-    return first, second, third
+    return _exact(np.array(_AXES) @ [Fraction(x) / 25 for x in vector])
 
 
-def _matrix(moments: Triple) -> Matrix:
-    columns = list(zip(*_AXES, strict=True))
-    exact = np.zeros((3, 3), dtype=object)
-    for moment, axis in zip(moments, columns, strict=True):
-        for i, j in itertools.product(range(3), repeat=2):
-            exact[i, j] += Fraction(moment) * axis[i] * axis[j]
-    found = [[float(x) for x in row] for row in exact]
-    assert found == exact.tolist()
-    (a, b, c), (d, e, f), (g, h, k) = found
-    return (a, b, c), (d, e, f), (g, h, k)
+def _matrix(moments: Triple) -> Any:
+    axes = np.array(_AXES, dtype=object)
+    return _exact(axes @ np.diag([Fraction(x) for x in moments]) @ axes.T)
 
 
 def _scenes(body: str, torque: Triple = (0.0, 0.0, 0.0)) -> tuple[Scene, Scene]:
@@ -58,9 +51,8 @@ def _scenes(body: str, torque: Triple = (0.0, 0.0, 0.0)) -> tuple[Scene, Scene]:
     moments = _BODIES[body]
     law = TorqueLaw(torque)
     bare = Scene(body, _SPIN, moments=[625.0 * each for each in moments], torque=law)
-    tilted = Scene(
-        body, _turned(_SPIN), inertia=_matrix(moments), torque=TorqueLaw(_turned(torque))
-    )
+    turned = TorqueLaw(_turned(torque))
+    tilted = Scene(body, _turned(_SPIN), inertia=_matrix(moments), torque=turned)
     return tilted, bare
 
 
@@ -100,8 +92,6 @@ def test_attitude_of_a_nearly_round_body() -> None:
     exact: Any = reference(about_principal, [40.0])
     assert found.attitude is not None
     back = found.rotation().as_matrix()[0] @ axes
-    from scipy.spatial.transform import Rotation
-
     other = Rotation.from_quat(exact.attitude[:, [1, 2, 3, 0]]).as_matrix()[0]
     assert back == pytest.approx(other, abs=1e-12)
     assert sorted(about_principal.moments or ()) == sorted(bare.moments or ())

@@ -56,6 +56,11 @@ def differences(
     return np.stack(columns, axis=2)
 
 
+def check(found: Any, expected: Any, limit: float = 1e-9) -> None:
+    """Check an error relative to the largest derivative."""
+    assert np.abs(found - expected).max() <= limit * np.abs(expected).max()
+
+
 @pytest.mark.sampled
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_are_within_the_limit(kind: str) -> None:
@@ -98,7 +103,7 @@ def test_every_parameter_of_a_law_on_both_sides_of_0(times: list[float]) -> None
     }  # fmt: skip
     for name, (scene_of, values) in made.items():
         expected = differences(scene_of, values, times, attitude=True)
-        assert np.abs(found[name] - expected).max() <= 2e-8 * np.abs(expected).max()
+        check(found[name], expected, 2e-8)
 
 
 def test_rows_at_time_0_are_the_derivatives_of_the_initial_state() -> None:
@@ -125,51 +130,43 @@ def test_more_columns_than_lanes() -> None:
     together = slopes(scene, [2.0, 5.0], *names)
     for name in names:
         alone = slopes(scene, [2.0, 5.0], name)
-        assert np.abs(together[name] - alone).max() <= 1e-12 * np.abs(alone).max()
+        check(together[name], alone, 1e-12)
 
 
-def test_a_full_inertia_has_six_elements() -> None:
-    scene = Scene("full", (0.3, 1.1, -0.7), inertia=MATRIX, torque=LAW)
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-    def made(values: Any) -> Scene:
-        matrix: Any = np.zeros((3, 3))
-        for (i, j), value in zip(places, values, strict=True):
-            matrix[i, j] = matrix[j, i] = value
-        return replace(scene, inertia=matrix)
-
-    found = slopes(scene, [1.0, 3.0], "inertia", attitude=True)
-    expected = differences(made, [MATRIX[i][j] for i, j in places], [1.0, 3.0], attitude=True)
-    assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+def _full(values: Any) -> Scene:
+    a, b, c, d, e, f = values
+    matrix = ((a, d, e), (d, b, f), (e, f, c))
+    return Scene("full", BRICK.omega, inertia=matrix, torque=LAW)
 
 
-def test_coefficients_and_an_inertia_that_changes() -> None:
-    body = Scene("body", (0.3, 1.1, -0.7), coefficients=(0.3, -0.6, 0.4), torque=LAW)
-    found = slopes(body, [1.0, 3.0], "coefficients")
-    expected = differences(
-        lambda x: replace(body, coefficients=x), [0.3, -0.6, 0.4], [1.0, 3.0]
-    )  # fmt: skip
-    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
-    changing = Scene(
-        "booms", (0.3, 1.1, -0.7), ChangingMoments([(3.0, 0.1), (2.0, 0.2), (1.2,)]), torque=LAW
-    )
-    assert "moments" not in parameters_of(changing)
-    found = slopes(changing, [1.0, 3.0], "torque.constant")
-    expected = differences(
-        lambda x: replace(changing, torque=replace(LAW, constant=x)), [0.1, -0.2, 0.05], [1.0, 3.0]
-    )
-    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+_ABC = Scene("body", BRICK.omega, coefficients=(0.3, -0.6, 0.4), torque=LAW)
+_BOOMS = Scene("booms", BRICK.omega, ChangingMoments([(3.0, 0.1), (2.0, 0.2), (1.2,)]), torque=LAW)
+# A table ends steps, and a body starts from rest.
+_HELD = table([0.0, 1.0, 2.0], [(0.1, 0.0, 0.2), (-0.3, 0.2, 0.0), (0.0, 0.0, 0.1)], "held")
+_THRUSTER = replace(BRICK, omega=(0.0, 0.0, 0.0), torque=_HELD)
+# By a parameter: its values, the scene for other values, times, and whether there is an attitude.
+MADE: dict[str, tuple[list[float], Callable[[Any], Scene], list[float], bool]] = {
+    "inertia": ([3.0, 2.0, 1.2, 0.2, -0.1, 0.3], _full, [1.0, 3.0], True),
+    "coefficients": (
+        [0.3, -0.6, 0.4], lambda x: replace(_ABC, coefficients=x), [1.0, 3.0], False
+    ),
+    "torque.constant": (
+        [0.1, -0.2, 0.05], lambda x: replace(_BOOMS, torque=replace(LAW, constant=x)), [1.0, 3.0],
+        False,
+    ),
+    "omega0": ([0.0] * 3, lambda x: replace(_THRUSTER, omega=x), [0.5, 1.0, 1.5, 2.5], False),
+    "moments": (
+        [3.0, 2.0, 1.2], lambda x: replace(_THRUSTER, moments=x), [0.5, 1.0, 1.5, 2.5], False
+    ),
+}  # fmt: skip
 
 
-def test_a_table_ends_steps_and_a_body_starts_from_rest() -> None:
-    held = table([0.0, 1.0, 2.0], [(0.1, 0.0, 0.2), (-0.3, 0.2, 0.0), (0.0, 0.0, 0.1)], "held")
-    scene = Scene("thruster", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.2), torque=held)
-    times = [0.5, 1.0, 1.5, 2.5]
-    found = slopes(scene, times, "omega0", "moments")
-    expected = differences(lambda x: replace(scene, omega=x), [0.0, 0.0, 0.0], times)
-    assert np.abs(found["omega0"] - expected).max() <= 1e-9 * np.abs(expected).max()
-    expected = differences(lambda x: replace(scene, moments=x), [3.0, 2.0, 1.2], times)
-    assert np.abs(found["moments"] - expected).max() <= 1e-9 * np.abs(expected).max()
+@pytest.mark.parametrize("name", MADE)
+def test_parameters_of_bodies_and_starts(name: str) -> None:
+    values, made, times, attitude = MADE[name]
+    found = slopes(made(values), times, name, attitude=attitude)
+    check(found, differences(made, values, times, attitude), 1e-8 if attitude else 1e-9)
+    assert "moments" not in parameters_of(_BOOMS)
 
 
 def test_parameters_of_functions_expressions_and_sums() -> None:
@@ -182,7 +179,7 @@ def test_parameters_of_functions_expressions_and_sums() -> None:
         lambda x: replace(BRICK, torque=partial(_decay, rate=x[0])), [0.1], [2.0]  # type: ignore[arg-type]
     )  # fmt: skip
     found = slopes(single, [2.0], "torque.rate")
-    assert np.abs(found - expected).max() <= 1e-9 * np.abs(expected).max()
+    check(found, expected)
     # The name of two parameters is the name of none.
     twice = replace(BRICK, torque=recorded(brake) + recorded(other) + LAW + damping(0.1))
     known = parameters_of(twice)
@@ -277,7 +274,7 @@ def test_a_torque_that_is_0_need_not_have_periodic_derivatives(law: TorqueLaw) -
     found = slopes(scene, [10.0, 200.0], *names)
     series = slopes(scene, [10.0, 200.0], *names, method="taylor")
     for name in names:
-        assert np.abs(found[name] - series[name]).max() <= 1e-9 * np.abs(series[name]).max()
+        check(found[name], series[name])
 
 
 def test_a_parameter_of_a_function_may_have_the_name_of_a_term() -> None:
@@ -290,7 +287,7 @@ def test_a_parameter_of_a_function_may_have_the_name_of_a_term() -> None:
     found = slopes(scene, [10.0, 200.0], "torque.constant")
     series = slopes(scene, [10.0, 200.0], "torque.constant", method="taylor")
     assert found.shape == (2, 3, 1)
-    assert np.abs(found - series).max() <= 1e-9 * np.abs(series).max()
+    check(found, series)
 
 
 @pytest.mark.parametrize("factor", [1e-12, 1e-16, 1e6])
@@ -407,7 +404,7 @@ def test_a_million_periods_take_as_long_as_one() -> None:
     scaled = found["omega0"] @ np.array(BRICK.omega)
     state = solve(BRICK, [1e7, -1e7]).omega
     expected = state + np.array([[1e7], [-1e7]]) * rates(BRICK, np.zeros(2), state)
-    assert np.abs(scaled - expected).max() <= 1e-8 * np.abs(expected).max()
+    check(scaled, expected, 1e-8)
 
 
 def test_the_truth_of_this_file_is_known_for_a_sphere() -> None:

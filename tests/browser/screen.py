@@ -76,6 +76,26 @@ def fragment(browser: Chrome) -> str:
 
 
 @contextmanager
+def without_scripts(browser: Chrome) -> Iterator[None]:
+    """Switch scripts off."""
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+@contextmanager
+def on_paper(browser: Chrome) -> Iterator[None]:
+    """Show the page as it is printed."""
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        yield
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+@contextmanager
 def opening(browser: Chrome, page: Path) -> Iterator[Callable[[str], None]]:
     """Yield a function that loads a page with a fragment; its console must stay empty."""
 
@@ -87,13 +107,3 @@ def opening(browser: Chrome, page: Path) -> Iterator[Callable[[str], None]]:
     errors(browser)
     yield opened
     assert errors(browser) == []
-
-
-def unnamed(browser: Chrome) -> list[str]:
-    """Return the ids of the controls that have no label."""
-    script = (
-        "return [...document.querySelectorAll('.controls :is(input, select)')]"
-        ".filter((x) => x.labels.length === 0).map((x) => x.id)"
-    )
-    found: list[str] = browser.execute_script(script)
-    return found

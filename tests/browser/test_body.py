@@ -1,6 +1,5 @@
 """The tumbling body in a browser: drawings, controls, addresses, and when it moves."""
 
-import math
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +13,15 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import Scene, case_scene, solve
 from pyharness.theory.flips import flip_times
-from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide, unnamed
+from tests.browser.screen import (
+    WIDTHS,
+    fragment,
+    opening,
+    screen,
+    text_of,
+    too_wide,
+    without_scripts,
+)
 
 Open = Callable[[str], None]
 CANVASES = ("space", "polhode", "herpolhode")
@@ -22,7 +29,6 @@ CANVASES = ("space", "polhode", "herpolhode")
 
 @pytest.fixture
 def body(browser: Chrome, site: Path) -> Iterator[Open]:
-    """Yield a function that loads the page with a fragment; its console must stay empty."""
     with opening(browser, site / "body.html") as opened:
         yield opened
 
@@ -39,6 +45,10 @@ def _drawn(browser: Chrome, id: str) -> int:
     return found
 
 
+def _numbers(browser: Chrome, id: str) -> list[float]:
+    return [float(x) for x in text_of(browser, id).removesuffix(" rad/s").split(", ")]
+
+
 def _picture(browser: Chrome, id: str) -> str:
     script = "return document.getElementById(arguments[0]).toDataURL()"
     return str(browser.execute_script(script, id))
@@ -51,7 +61,6 @@ def _enter(browser: Chrome, id: str, keys: str) -> None:
 
 
 def _slide(browser: Chrome, id: str, value: int) -> None:
-    """Move a slider, as dragging does."""
     script = """const slider = document.getElementById(arguments[0]);
       slider.value = arguments[1];
       slider.dispatchEvent(new Event("input", { bubbles: true }));"""
@@ -63,10 +72,8 @@ def test_the_drawings_show_the_state_of_the_address(browser: Chrome, body: Open)
     body("#body=case-4&time=1000000")
     found = solve(case_scene(4), [1e6], "closed-form", attitude=True)
     assert found.attitude is not None
-    shown = [float(x) for x in text_of(browser, "at-omega").removesuffix(" rad/s").split(", ")]
-    assert shown == pytest.approx(found.omega[0].tolist(), abs=1e-6)
-    shown = [float(x) for x in text_of(browser, "at-attitude").split(", ")]
-    assert shown == pytest.approx(found.attitude[0].tolist(), abs=1e-6)
+    assert _numbers(browser, "at-omega") == pytest.approx(found.omega[0].tolist(), abs=1e-6)
+    assert _numbers(browser, "at-attitude") == pytest.approx(found.attitude[0].tolist(), abs=1e-6)
     flip = float(flip_times((40, 30, 20), (0, 1, 10))[0])
     assert f"changes its sign every {flip:.3f} s: this is the flip" in text_of(browser, "told")
     assert "Time: 1000000 s; omega" in text_of(browser, "status")
@@ -113,11 +120,7 @@ def test_dragging_the_time_draws_at_once(browser: Chrome, body: Open) -> None:
     slider.send_keys(Keys.ARROW_RIGHT)
     assert text_of(browser, "at-time") != old
     body(f"#{fragment(browser)}")
-    assert slider_position(browser) == "301"
-
-
-def slider_position(browser: Chrome) -> str:
-    return str(browser.find_element(By.ID, "slider").get_property("value"))
+    assert browser.find_element(By.ID, "slider").get_property("value") == "301"
 
 
 @pytest.mark.campaign
@@ -127,8 +130,7 @@ def test_the_next_flip_is_a_flip(browser: Chrome, body: Open) -> None:
     times = []
     for _ in range(3):
         browser.find_element(By.ID, "flip").click()
-        middle = float(text_of(browser, "at-omega").split(", ")[1])
-        assert abs(middle) < 1e-6
+        assert abs(_numbers(browser, "at-omega")[1]) < 1e-6
         times.append(float(text_of(browser, "at-time").removesuffix(" s")))
     assert np.diff(times) == pytest.approx([flip, flip], rel=1e-9)
 
@@ -153,14 +155,10 @@ def test_fields_take_any_body_and_say_what_is_wrong(browser: Chrome, body: Open)
     assert fragment(browser) == "moments=5,4,3&omega0=-1,2,3&time=100000"
     assert browser.find_element(By.ID, "body").get_property("value") == ""
     found = solve(Scene("", (-1, 2, 3), moments=(5, 4, 3)), [1e5], "closed-form")
-    shown = [float(x) for x in text_of(browser, "at-omega").removesuffix(" rad/s").split(", ")]
-    assert shown == pytest.approx(found.omega[0].tolist(), abs=1e-6)
+    assert _numbers(browser, "at-omega") == pytest.approx(found.omega[0].tolist(), abs=1e-6)
     assert "moments = [5, 4, 3]" in text_of(browser, "scene")
     assert browser.find_element(By.ID, "scene-file").is_displayed()
-
-
-@pytest.mark.campaign
-def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
+    # Mistakes in the address.
     body("#body=brick&time=x&spin=1")
     told = text_of(browser, "problems")
     assert told.startswith("unknown word 'spin'; allowed: ")
@@ -174,9 +172,8 @@ def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
+def test_special_motions_are_drawn_and_told(browser: Chrome, body: Open) -> None:
+    for words, told in (
         ("moments=4,6.5,9&omega0=3,1,-2", "on the separatrix: it approaches a spin about axis 2"),
         ("moments=40,30,20&omega0=0,0,0", "This rotation is steady"),
         ("moments=40,30,20&omega0=0,7,0", "This rotation is steady"),
@@ -184,16 +181,12 @@ def test_mistakes_in_the_address_are_told(browser: Chrome, body: Open) -> None:
         ("body=case-2", "Two moments are equal"),
         ("moments=3,2,1&omega0=2,1,0.1", "Omega circles axis 1, which has the largest moment."),
         ("moments=2,1,1&omega0=1,0.5,0.1&time=1e5", "Two moments are equal"),
-    ],
-)
-def test_special_motions_are_drawn_and_told(
-    browser: Chrome, body: Open, words: str, told: str
-) -> None:
-    body(f"#{words}")
-    assert told in text_of(browser, "told")
-    assert "NaN" not in browser.find_element(By.TAG_NAME, "main").text
-    for id in CANVASES:
-        assert _drawn(browser, id) > 20, id
+    ):
+        body(f"#{words}")
+        assert told in text_of(browser, "told")
+        assert "NaN" not in browser.find_element(By.TAG_NAME, "main").text
+        for id in CANVASES:
+            assert _drawn(browser, id) > 20, (id, words)
 
 
 @pytest.mark.campaign
@@ -235,9 +228,8 @@ def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> 
         assert text_of(browser, "play") == "Pause"
         WebDriverWait(browser, 5).until(lambda _: text_of(browser, "at-time") != "0 s")
         # A drawing that is out of sight does not move.
-        browser.execute_script(
-            "window.scrollTo({ top: document.body.scrollHeight, behavior: 'instant' })"
-        )
+        down = "window.scrollTo({ top: document.body.scrollHeight, behavior: 'instant' })"
+        browser.execute_script(down)
         time.sleep(0.7)
         before = text_of(browser, "at-time")
         time.sleep(0.5)
@@ -249,17 +241,24 @@ def test_it_starts_only_where_motion_is_welcome(browser: Chrome, body: Open) -> 
 
 
 @pytest.mark.campaign
-def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
-    browser: Chrome, body: Open
-) -> None:
-    body("")
-    assert unnamed(browser) == []
+def test_nothing_is_wider_than_the_page(browser: Chrome, body: Open) -> None:
     for width in WIDTHS:
         with screen(browser, width):
             body("#moments=40,30,20&omega0=0.123456789,-1,10&time=123456.789")
             assert too_wide(browser) <= 0, width
             for id in CANVASES:
                 assert _drawn(browser, id) > 500, (id, width)
+
+
+@pytest.mark.campaign
+def test_without_scripts_there_is_a_picture(browser: Chrome, site: Path) -> None:
+    with without_scripts(browser):
+        browser.get((site / "body.html").as_uri())
+        image = browser.find_element(By.CSS_SELECTOR, "main img")
+        assert image.is_displayed()
+        assert "polhode" in str(image.get_dom_attribute("alt"))
+        assert "changes its sign every" in browser.find_element(By.TAG_NAME, "figcaption").text
+        assert not browser.find_element(By.ID, "tumbling").is_displayed()
 
 
 @pytest.mark.campaign
@@ -273,36 +272,3 @@ def test_colours_change_with_the_theme_and_the_viewpoint_turns(browser: Chrome, 
     _slide(browser, "view", -100)
     assert _picture(browser, "space") != before
     assert fragment(browser) == "body=case-4&time=1"
-
-
-@pytest.mark.campaign
-def test_a_frame_takes_little_time(
-    browser: Chrome, body: Open, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Print the time of a change without judging it, because it depends on the machine."""
-    body("#body=case-4&time=1000000")
-    script = """const slider = document.getElementById("slider");
-      const begin = performance.now();
-      for (let n = 0; n < 20; n++) {
-        slider.value = 700 + n;
-        slider.dispatchEvent(new Event("input"));
-      }
-      return (performance.now() - begin) / 20;"""
-    taken = float(browser.execute_script(script))
-    assert math.isfinite(taken)
-    with capsys.disabled():
-        print(f"\nA change of the time in the page: {taken:.1f} ms")
-
-
-@pytest.mark.campaign
-def test_without_scripts_there_is_a_picture(browser: Chrome, site: Path) -> None:
-    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
-    try:
-        browser.get((site / "body.html").as_uri())
-        image = browser.find_element(By.CSS_SELECTOR, "main img")
-        assert image.is_displayed()
-        assert "polhode" in str(image.get_dom_attribute("alt"))
-        assert "changes its sign every" in browser.find_element(By.TAG_NAME, "figcaption").text
-        assert not browser.find_element(By.ID, "tumbling").is_displayed()
-    finally:
-        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})

@@ -1,6 +1,5 @@
 """The laboratory in a browser: numbers, switches, addresses, and the time that a change takes."""
 
-import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,7 +15,7 @@ from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.original.printer import page
-from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide, unnamed
+from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
 
 Open = Callable[[str], None]
 EXPERIMENTS = facts("experiments")["experiment"]
@@ -25,7 +24,6 @@ _DRAWN = "return document.querySelector('#omega1-chart canvas').toDataURL()"
 
 @pytest.fixture
 def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
-    """Yield a function that loads the page with a fragment; its console must stay empty."""
     with opening(browser, site / "laboratory.html") as opened:
         yield opened
 
@@ -33,21 +31,12 @@ def laboratory(browser: Chrome, site: Path) -> Iterator[Open]:
 def _rows(browser: Chrome) -> list[list[str]]:
     """Open the table and return the text of its cells."""
     browser.execute_script("document.getElementById('numbers').open = true")
-    read = (
-        "return [...document.querySelectorAll('#rows tr')]"
-        ".map((row) => [...row.cells].map((cell) => cell.textContent))"
-    )
     # The page fills the table after the browser has reported that it was opened.
-    deadline = time.monotonic() + 5.0
-    while True:
-        found: list[list[str]] = browser.execute_script(read)
-        if len(found) > 6 or time.monotonic() > deadline:
-            return found
-        time.sleep(0.02)
+    _wait(browser, lambda: len(_table(browser, "#rows tr")) > 6)
+    return _table(browser, "#rows tr")
 
 
 def _table(browser: Chrome, selector: str) -> list[list[str]]:
-    """Return the text of the cells of each row that a selector finds."""
     read = (
         "return [...document.querySelectorAll(arguments[0])]"
         ".map((row) => [...row.cells].map((cell) => cell.textContent))"
@@ -62,7 +51,6 @@ def _wait(browser: Chrome, holds: Callable[[], bool]) -> None:
 
 
 def _wait_for_drawing(browser: Chrome, before: str) -> None:
-    """Wait until the first chart differs from its picture `before`."""
     _wait(browser, lambda: browser.execute_script(_DRAWN) != before)
 
 
@@ -83,20 +71,20 @@ def test_the_numbers_are_the_twins(browser: Chrome, laboratory: Open) -> None:
     assert text_of(browser, "printer-page") == page(case_scene(2), "runge-kutta", twin)
     assert text_of(browser, "problems") == ""
     assert browser.execute_script("return document.querySelectorAll('canvas').length") == 6
-
-
-@pytest.mark.campaign
-def test_a_switch_draws_anew_and_is_in_the_address(browser: Chrome, laboratory: Open) -> None:
-    laboratory("#case=2&program=runge-kutta&listing=original")
-    draw = "return document.querySelector('canvas').toDataURL()"
-    before = browser.execute_script(draw)
+    assert text_of(browser, "why-head") == "Why did it stop?"
+    assert "V2 had just passed a turning point" in text_of(browser, "why")
+    # A switch draws anew, and is in the address.
+    before = browser.execute_script(_DRAWN)
     _click(browser, "input[value=stage-base]")
     assert fragment(browser) == "case=2&program=runge-kutta&listing=original&fix=stage-base"
     assert "step 25 " not in text_of(browser, "status")
     twin = run_program(case_scene(2), subset("runge-kutta", fix=["stage-base"]), "python")
     assert [float(row[2]) for row in _rows(browser)] == twin.omega[:, 0].tolist()
     assert text_of(browser, "command").endswith("--listing original --fix stage-base")
-    assert browser.execute_script(draw) != before
+    _wait_for_drawing(browser, before)
+    browser.find_element(By.ID, "stops").click()
+    assert text_of(browser, "why-head") == "Why did it not stop early?"
+    assert "The stop test is switched off." in text_of(browser, "why")
 
 
 @pytest.mark.campaign
@@ -115,10 +103,7 @@ def test_an_address_restores_its_state(browser: Chrome, laboratory: Open) -> Non
     assert len(_rows(browser)) == 30
     # Change the fragment without reloading the page.
     browser.execute_script("location.hash = 'case=2&program=runge-kutta&listing=original'")
-    deadline = time.monotonic() + 5.0
-    while "step 25" not in text_of(browser, "status") and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert "Stopped at step 25" in text_of(browser, "status")
+    _wait(browser, lambda: "Stopped at step 25" in text_of(browser, "status"))
     assert browser.find_element(By.ID, "stop-test").is_displayed()
 
 
@@ -154,9 +139,7 @@ def test_what_has_the_focus_is_in_sight(browser: Chrome, laboratory: Open) -> No
 
 
 @pytest.mark.campaign
-def test_curves_can_be_hidden_and_the_pointer_tells_numbers(
-    browser: Chrome, laboratory: Open
-) -> None:
+def test_curves_are_hidden_and_the_pointer_tells_numbers(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
     for id in ("show-solution", "show-limit"):
         before = browser.execute_script(_DRAWN)
@@ -202,25 +185,20 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     # A click on a chart chooses the step at the pointer.
     over = browser.find_element(By.CSS_SELECTOR, "#velocity-chart .u-over")
     width = over.size["width"]
-    ActionChains(browser).move_to_element_with_offset(
-        over, -width // 2 + width // 10, 0
-    ).click().perform()
+    chosen = ActionChains(browser).move_to_element_with_offset(over, -width // 2 + width // 10, 0)
+    chosen.click().perform()
     assert 8 <= int(text_of(browser, "step-told").split()[0]) <= 12
-    links = browser.find_elements(By.CSS_SELECTOR, ".cards a")
-    targets = {str(link.get_dom_attribute("href")) for link in links}
-    assert "listing/runge-kutta.html#860" in targets
+    link = ".cards a[href='listing/runge-kutta.html#860']"
+    assert browser.find_elements(By.CSS_SELECTOR, link)
     # A step that the next run has stays chosen.
     _click(browser, "input[value=stage-base]")
     assert 8 <= int(text_of(browser, "step-told").split()[0]) <= 12
-    assert "corrected" in next(
-        row[1] for row in _table(browser, ".cards tbody tr") if row[0] == "860"
-    )
+    cards = _table(browser, ".cards tbody tr")
+    assert "corrected" in next(row[1] for row in cards if row[0] == "860")
 
 
 @pytest.mark.campaign
-def test_every_card_of_a_step_has_its_place_in_the_listing(
-    browser: Chrome, laboratory: Open, site: Path
-) -> None:
+def test_cards_of_a_step_are_in_the_listing(browser: Chrome, laboratory: Open, site: Path) -> None:
     for program in PROGRAMS:
         laboratory(f"#case=5&program={program}")
         links = browser.execute_script(
@@ -282,16 +260,6 @@ def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
 
 
 @pytest.mark.campaign
-def test_the_end_is_explained(browser: Chrome, laboratory: Open) -> None:
-    laboratory("")
-    assert text_of(browser, "why-head") == "Why did it stop?"
-    assert "V2 had just passed a turning point" in text_of(browser, "why")
-    browser.find_element(By.ID, "stops").click()
-    assert text_of(browser, "why-head") == "Why did it not stop early?"
-    assert "The stop test is switched off." in text_of(browser, "why")
-
-
-@pytest.mark.campaign
 def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original")
     box = browser.find_element(By.CSS_SELECTOR, "input[value=torque-held]")
@@ -307,9 +275,7 @@ def test_a_switch_that_does_nothing_says_so(browser: Chrome, laboratory: Open) -
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda each: each["id"])
-def test_an_experiment_is_predicted_run_and_explained(
-    browser: Chrome, laboratory: Open, experiment: dict[str, Any]
-) -> None:
+def test_guided_experiment(browser: Chrome, laboratory: Open, experiment: dict[str, Any]) -> None:
     laboratory("")
     lesson = browser.find_element(By.ID, f"experiment-{experiment['id']}")
     assert not lesson.is_displayed()
@@ -380,21 +346,6 @@ def test_controls_make_the_address_that_restores_them(browser: Chrome, laborator
     assert fragment(browser) == "case=2&program=runge-kutta&listing=original"
 
 
-def test_mistakes_are_told_and_the_rest_holds(browser: Chrome, laboratory: Open) -> None:
-    laboratory("#case=9&program=runge-kutta&listing=original&spin=1")
-    assert text_of(browser, "problems").startswith("unknown word 'spin'; allowed: ")
-    assert "case: unknown '9'; allowed: 1, 2" in text_of(browser, "problems")
-    assert "Stopped at step 25" in text_of(browser, "status")
-    field = browser.find_element(By.ID, "steps")
-    field.send_keys("x", Keys.TAB)
-    assert "steps: '100x'; allowed: a whole number" in text_of(browser, "problems")
-    assert field.get_attribute("aria-invalid") == "true"
-    field.send_keys(Keys.BACKSPACE, Keys.TAB)
-    assert text_of(browser, "problems") == ""
-    assert field.get_attribute("aria-invalid") is None
-
-
-@pytest.mark.campaign
 def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Open) -> None:
     laboratory("#case=2&program=runge-kutta&listing=original&fix=stage-base")
     field = browser.find_element(By.ID, "steps")
@@ -414,66 +365,30 @@ def test_what_is_wrong_stays_until_it_is_mended(browser: Chrome, laboratory: Ope
     _click(browser, "#reset")
     assert text_of(browser, "problems") == ""
     assert field.get_property("value") == "100"
+    # An address with mistakes.
+    laboratory("#case=9&program=runge-kutta&listing=original&spin=1")
+    assert text_of(browser, "problems").startswith("unknown word 'spin'; allowed: ")
+    assert "case: unknown '9'; allowed: 1, 2" in text_of(browser, "problems")
+    assert "Stopped at step 25" in text_of(browser, "status")
+    field = browser.find_element(By.ID, "steps")
+    field.send_keys("x", Keys.TAB)
+    assert "steps: '100x'; allowed: a whole number" in text_of(browser, "problems")
+    assert field.get_attribute("aria-invalid") == "true"
+    field.send_keys(Keys.BACKSPACE, Keys.TAB)
+    assert text_of(browser, "problems") == ""
+    assert field.get_attribute("aria-invalid") is None
 
 
 @pytest.mark.campaign
-def test_every_control_has_a_name_and_nothing_is_wider_than_the_page(
-    browser: Chrome, laboratory: Open
-) -> None:
-    laboratory("#case=7&program=two-term&listing=original")
-    assert unnamed(browser) == []
+def test_nothing_is_wider_than_the_page(browser: Chrome, laboratory: Open) -> None:
     for width in WIDTHS:
         with screen(browser, width):
             laboratory("#case=7&program=two-term&listing=original")
             _rows(browser)
             assert too_wide(browser) <= 0, width
-
-
-@pytest.mark.campaign
-def test_colours_change_with_the_theme(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
-    draw = "return document.querySelector('canvas').toDataURL()"
-    before = browser.execute_script(draw)
+    before = browser.execute_script(_DRAWN)
     _click(browser, "#theme")
-    assert browser.execute_script(draw) != before
+    assert browser.execute_script(_DRAWN) != before
     _click(browser, "#theme")
-    assert browser.execute_script(draw) == before
-
-
-@pytest.mark.campaign
-def test_without_script_the_default_state_is_there(site: Path) -> None:
-    text = (site / "laboratory.html").read_text()
-    assert "step 25 by V2" in re.sub(r"\s+", " ", text)
-    twin = run_program(case_scene(2), subset("runge-kutta"), "python")
-    assert page(case_scene(2), "runge-kutta", twin) in text
-    assert repr(float(twin.omega[-1, 0])) in text
-
-
-@pytest.mark.campaign
-def test_how_long_a_change_takes(
-    browser: Chrome, laboratory: Open, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Print the times without judging them, because they depend on the machine."""
-    change = """const done = arguments[arguments.length - 1];
-      const box = document.querySelector("input[value=torque-held]");
-      const taken = [];
-      const again = async () => {
-        const begin = performance.now();
-        box.click();
-        await null;  // the charts draw at the end of the task
-        taken.push(performance.now() - begin);
-        if (taken.length < 7) requestAnimationFrame(again); else done(taken);
-      };
-      requestAnimationFrame(again);"""
-    lines = []
-    for program in PROGRAMS:
-        laboratory(f"#case=7&program={program}&listing=original&steps=300")
-        taken = browser.execute_async_script(change)
-        assert len(taken) == 7
-        ordered = sorted(taken)
-        lines.append(
-            f"{program}: first {taken[0]:.1f} ms, median {ordered[3]:.1f} ms, "
-            f"longest {ordered[-1]:.1f} ms"
-        )
-    with capsys.disabled():
-        print("\nCase 7, 300 steps, a change in the page:", *lines, sep="\n  ")
+    assert browser.execute_script(_DRAWN) == before

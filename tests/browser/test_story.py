@@ -15,14 +15,13 @@ from pyharness.edition import story
 from pyharness.edition.decks import TITLES
 from pyharness.model.listing import Listing, subset
 from pyharness.truth.reference import reference
-from tests.browser.screen import click, opening, screen
+from tests.browser.screen import click, on_paper, opening, screen, without_scripts
 
 pytestmark = pytest.mark.usefixtures("page")
 
 
 @pytest.fixture
 def page(browser: Chrome, site: Path) -> Iterator[None]:
-    """Open the story on a wide screen; its console must stay empty."""
     with screen(browser, 1200), opening(browser, site / "index.html") as opened:
         opened("")
         yield
@@ -56,38 +55,51 @@ def _largest(case: int, program: str, listing: Listing, components: slice = slic
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(("letter", "has"), [("A", "two terms"), ("B", "Runge-Kutta")])
-def test_a_reader_chooses_a_program_to_trust(browser: Chrome, letter: str, has: str) -> None:
+def test_a_reader_chooses_a_program_predicts_and_runs(browser: Chrome) -> None:
     assert _text(browser, "claim") == ""
-    click(browser, f"input[name=trust][value={letter}]")
-    assert has in _text(browser, "claim")
-    if letter == "B":
-        run = run_program(case_scene(2), subset("runge-kutta"), "python")
-        truth = reference(case_scene(2), list(run.time)).omega
-        error = np.abs(run.omega - truth)[:, 0].max()
-        assert _value(browser, "stop-error") == pytest.approx(error, rel=1e-12)
+    for letter, has in (("A", "two terms"), ("B", "Runge-Kutta")):
+        click(browser, f"input[name=trust][value={letter}]")
+        assert has in _text(browser, "claim")
+    run = run_program(case_scene(2), subset("runge-kutta"), "python")
+    assert run.stop is not None
+    error = _largest(2, "runge-kutta", subset("runge-kutta"), slice(0, 1))
+    assert _value(browser, "stop-error") == pytest.approx(error, rel=1e-12)
     for name in story.LETTERS.values():
         assert _points(browser, "claim", name) == _first_points("claim", name)
-
-
-@pytest.mark.campaign
-def test_a_reader_predicts_before_the_run(browser: Chrome) -> None:
     curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
     assert curve.value_of_css_property("visibility") == "hidden"
     assert not browser.find_element(By.CSS_SELECTOR, "#stop .answer").is_displayed()
-    slider = browser.find_element(By.ID, "prediction")
     before = _points(browser, "stop", "prediction")
-    slider.send_keys(Keys.ARROW_LEFT * 10)
+    browser.find_element(By.ID, "prediction").send_keys(Keys.ARROW_LEFT * 10)
     assert _points(browser, "stop", "prediction") != before
     click(browser, "#run")
     assert curve.value_of_css_property("visibility") == "visible"
-    stop = run_program(case_scene(2), subset("runge-kutta"), "python").stop
-    assert stop is not None
     assert _value(browser, "predicted") == 40
-    assert _value(browser, "run-step") == stop.step
-    assert _value(browser, "quotient") == stop.quotient
-    assert f"was {stop.variable}," in _text(browser, "stop")
+    assert _value(browser, "run-step") == run.stop.step
+    assert _value(browser, "quotient") == run.stop.quotient
+    assert f"was {run.stop.variable}," in _text(browser, "stop")
     assert _points(browser, "stop", "runge-kutta") == _first_points("stop", "runge-kutta")
+
+
+@pytest.mark.campaign
+def test_faults_hide_in_case_1_and_show_in_case_5_and_in_the_race(browser: Chrome) -> None:
+    assert _value(browser, "blind-error-1") < 1e-14
+    for case, program in ((5, "runge-kutta"), (5, "two-term"), (2, "four-term")):
+        click(browser, f"input[name=blind-program][value={program}]")
+        click(browser, f"input[name=blind-case][value='{case}']")
+        expected = _largest(case, program, subset(program), slice(0, 1))
+        assert _value(browser, f"blind-error-{case}") == pytest.approx(expected, rel=1e-12)
+        assert TITLES[program] in _text(browser, "blind")
+        charts = browser.find_elements(By.CSS_SELECTOR, "#blind .chart")
+        shown = [each.get_dom_attribute("id") for each in charts if each.is_displayed()]
+        assert shown == [f"chart-blind-{case}"]
+    for listing in ("corrected", "original"):
+        click(browser, f"input[name=race][value={listing}]")
+        for program in TITLES:
+            drawn = _points(browser, f"race-{listing}", program)
+            assert drawn == _first_points(f"race-{listing}", program)
+    errors = [_largest(2, name, Listing.corrected(name)) for name in ("four-term", "runge-kutta")]
+    assert _value(browser, "ratio") == pytest.approx(errors[0] / errors[1], rel=1e-9)
 
 
 def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
@@ -116,9 +128,8 @@ def test_v2_turns_and_its_quotient_leaps(browser: Chrome) -> None:
 
 @pytest.mark.campaign
 def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
-    assert _points(browser, "half-speed", "runge-kutta") == _first_points(
-        "half-speed", "runge-kutta"
-    )
+    names = "half-speed", "runge-kutta"
+    assert _points(browser, *names) == _first_points(*names)
     both = _value(browser, "from-limit")
     Select(browser.find_element(By.ID, "step-size")).select_by_index(3)
     assert _value(browser, "from-limit") < 0.2 * both
@@ -133,48 +144,8 @@ def test_either_fault_can_be_switched_off(browser: Chrome) -> None:
         run = run_program(finer, listing, "python", may_stop=False)
         expected = np.abs(run.omega[:, 0] - truth).max()
         assert _value(browser, slot) == pytest.approx(expected, rel=1e-9, abs=1e-14)
-        assert not browser.find_elements(By.CSS_SELECTOR, "[data-slot=from-limit]")[
-            0
-        ].is_displayed()
-
-
-@pytest.mark.campaign
-def test_faults_hide_in_case_1_and_show_in_case_5(browser: Chrome) -> None:
-    assert _value(browser, "blind-error-1") < 1e-14
-    for case, program in ((5, "runge-kutta"), (5, "two-term"), (2, "four-term")):
-        click(browser, f"input[name=blind-program][value={program}]")
-        click(browser, f"input[name=blind-case][value='{case}']")
-        expected = _largest(case, program, subset(program), slice(0, 1))
-        assert _value(browser, f"blind-error-{case}") == pytest.approx(expected, rel=1e-12)
-        assert TITLES[program] in _text(browser, "blind")
-        shown = [
-            each.get_dom_attribute("id")
-            for each in browser.find_elements(By.CSS_SELECTOR, "#blind .chart")
-            if each.is_displayed()
-        ]
-        assert shown == [f"chart-blind-{case}"]
-
-
-@pytest.mark.campaign
-def test_corrected_programs_are_run_beside_the_printed_ones(browser: Chrome) -> None:
-    for listing in ("corrected", "original"):
-        click(browser, f"input[name=race][value={listing}]")
-        for program in TITLES:
-            drawn = _points(browser, f"race-{listing}", program)
-            assert drawn == _first_points(f"race-{listing}", program)
-    errors = [_largest(2, name, Listing.corrected(name)) for name in ("four-term", "runge-kutta")]
-    assert _value(browser, "ratio") == pytest.approx(errors[0] / errors[1], rel=1e-9)
-
-
-@pytest.mark.campaign
-def test_all_actions_can_be_reached_with_the_keyboard(browser: Chrome) -> None:
-    reached = []
-    for _ in range(60):
-        browser.switch_to.active_element.send_keys(Keys.TAB)
-        focus = browser.switch_to.active_element
-        reached.append(focus.get_dom_attribute("id") or focus.get_dom_attribute("name"))
-    wanted = "trust prediction run step omega-alone fault step-size blind-case blind-program race"
-    assert set(wanted.split()) <= set(reached)
+        limit = browser.find_element(By.CSS_SELECTOR, "[data-slot=from-limit]")
+        assert not limit.is_displayed()
 
 
 @pytest.mark.campaign
@@ -189,31 +160,27 @@ def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
     """
     words = " ".join(browser.execute_script(script)).split()
     assert 600 < len(words) < 1000, len(words)
+    # All actions can be reached with the keyboard.
+    reached = []
+    for _ in range(60):
+        browser.switch_to.active_element.send_keys(Keys.TAB)
+        focus = browser.switch_to.active_element
+        reached.append(focus.get_dom_attribute("id") or focus.get_dom_attribute("name"))
+    wanted = "trust prediction run step omega-alone fault step-size blind-case blind-program race"
+    assert set(wanted.split()) <= set(reached)
 
 
 @pytest.mark.campaign
-def test_on_paper_every_answer_is_shown(browser: Chrome) -> None:
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    try:
+def test_on_paper_and_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> None:
+    with on_paper(browser):
         text = browser.find_element(By.TAG_NAME, "main").text
         curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
         assert curve.value_of_css_property("visibility") == "visible"
-    finally:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-    for told in (
-        "Program B is Runge-Kutta",
-        "ended at step 25 of 100.",
-        "to step 62",
-        "Case 5, Runge",
-    ):
+    answers = "Program B is Runge-Kutta", "ended at step 25 of 100.", "to step 62", "Case 5, Runge"
+    for told in answers:
         assert told in text
     assert "you predicted" not in text
-
-
-@pytest.mark.campaign
-def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> None:
-    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
-    try:
+    with without_scripts(browser):
         browser.get((site / "index.html").as_uri())
         text = browser.find_element(By.TAG_NAME, "main").text
         for told in ("ended at step 25 of 100", "Case 5, Runge-Kutta", "times smaller", "step 62"):
@@ -221,8 +188,6 @@ def test_without_scripts_the_story_can_be_read(browser: Chrome, site: Path) -> N
         assert "One fault: the curve is 0 " not in text
         assert not browser.find_element(By.ID, "run").is_displayed()
         assert _points(browser, "stop", "runge-kutta") != ""
-    finally:
-        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
 
 @pytest.mark.campaign

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from selenium.webdriver import Chrome
 
-from tests.browser.screen import errors, screen
+from tests.browser.screen import errors, on_paper, screen
 
 _OPEN = """
 const [id] = arguments, named = document.getElementById(id);
@@ -33,34 +33,23 @@ def _boxes(browser: Chrome, *selectors: str) -> list[dict[str, float]]:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("page", "name", "folded"),
-    [("claims.html", "vi-superior", 2), ("thesis.html", "sentence-27", 2)],
-)
-def test_an_address_opens_what_is_folded_there_alone(
-    browser: Chrome, site: Path, page: str, name: str, folded: int
-) -> None:
+def test_an_address_and_a_link_open_what_is_folded_there_alone(browser: Chrome, site: Path) -> None:
     with screen(browser, 1440):
-        browser.get(f"{(site / page).as_uri()}#{name}")
-        found: dict[str, Any] = browser.execute_script(_OPEN, name)
-        assert (found["folded"], found["open"], found["others"]) == (folded, folded, 0)
-        assert 0 <= found["top"] < 100  # at its place at once
+        for page, name in (("thesis.html", "sentence-27"), ("claims.html", "vi-superior")):
+            browser.get(f"{(site / page).as_uri()}#{name}")
+            found: dict[str, Any] = browser.execute_script(_OPEN, name)
+            assert (found["folded"], found["open"], found["others"]) == (2, 2, 0)
+            assert 0 <= found["top"] < 100  # at its place at once
+        assert browser.execute_script(_OPEN, "v2-case-2-stopped")["open"] == 0
+        browser.execute_async_script(
+            "const done = arguments[1]; addEventListener('hashchange', () => setTimeout(done));"
+            "document.querySelector(arguments[0]).click();",
+            'section#all a[href="#v2-case-2-stopped"]',
+        )
+        found = browser.execute_script(_OPEN, "v2-case-2-stopped")
+        assert found["open"] == found["folded"] > 0
+        assert 0 <= found["top"] < 100
     assert errors(browser) == []
-
-
-@pytest.mark.campaign
-def test_a_link_within_the_page_opens_its_claim(browser: Chrome, site: Path) -> None:
-    browser.get((site / "claims.html").as_uri())
-    assert browser.execute_script(_OPEN, "v2-case-2-stopped")["open"] == 0
-    link = 'section#all a[href="#v2-case-2-stopped"]'
-    browser.execute_async_script(
-        "const done = arguments[1]; addEventListener('hashchange', () => setTimeout(done));"
-        "document.querySelector(arguments[0]).click();",
-        link,
-    )
-    found = browser.execute_script(_OPEN, "v2-case-2-stopped")
-    assert found["open"] == found["folded"] > 0
-    assert 0 <= found["top"] < 100
 
 
 def test_verdicts_are_in_the_margin_or_below_the_sentence(browser: Chrome, site: Path) -> None:
@@ -90,22 +79,17 @@ def test_figures_of_the_paper_are_beside_ours(browser: Chrome, site: Path) -> No
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(("page", "least"), [("claims.html", 116), ("thesis.html", 78)])
-def test_print_keeps_verdicts_and_numbers(
-    browser: Chrome, site: Path, page: str, least: int
-) -> None:
-    browser.get((site / page).as_uri())
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    try:
-        shown = browser.execute_script(
-            "const seen = (each) => each.getBoundingClientRect().height > 0;"
-            "return ['.verdict', 'details table td'].map((each) => {"
-            "  const all = [...document.querySelectorAll(each)];"
-            "  return [all.length, all.filter(seen).length];"
-            "});"
-        )
-    finally:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-    (verdicts, seen), (cells, printed) = shown
-    assert verdicts == seen >= least
-    assert cells == printed > 100
+def test_print_keeps_verdicts_and_numbers(browser: Chrome, site: Path) -> None:
+    script = (
+        "const seen = (each) => each.getBoundingClientRect().height > 0;"
+        "return ['.verdict', 'details table td'].map((each) => {"
+        "  const all = [...document.querySelectorAll(each)];"
+        "  return [all.length, all.filter(seen).length];"
+        "});"
+    )
+    for page, least in (("claims.html", 116), ("thesis.html", 78)):
+        browser.get((site / page).as_uri())
+        with on_paper(browser):
+            (verdicts, seen), (cells, printed) = browser.execute_script(script)
+        assert verdicts == seen >= least
+        assert cells == printed > 100

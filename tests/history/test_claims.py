@@ -10,45 +10,31 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.cli.main import main
-from pyharness.history.claims import methods, theory, verdicts
+from pyharness.history.claims import ledger, methods, theory, verdicts
 from pyharness.history.claims.laboratory import LITERALS, Assumptions, Laboratory, by_literals
-from pyharness.history.claims.ledger import (
-    Judgement,
-    assignments,
-    claim,
-    claims,
-    judge,
-    judgement,
-    outcome,
-)
+from pyharness.history.claims.ledger import Judgement, claim, claims, judgement, outcome
 from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
 from pyharness.history.claims.stories import prose
-from pyharness.history.claims.verdicts import (
-    FALSE,
-    IN_PART,
-    NOT_REPRODUCED,
-    NOT_TESTABLE,
-    REPRODUCED,
-    UNDECIDED,
-)
+from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.history.family.members import Member
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, names_of, switches
 from pyharness.model.report import Report
 from pyharness.views import markdown
 from pyharness.views.render import render
+from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims
 SILENT = ("i2-euler-symmetric", "i2-lagrange")  # judged by their sources
-Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[2]
-THESIS = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
+THESIS = ROOT.parent / "shared/thesis/thesis.txt"
+
+
+Judged = dict[str, Judgement]
 
 
 @pytest.fixture(scope="module")
-def judged() -> dict[str, Judgement]:
-    """Every claim, judged once."""
+def judged() -> Judged:
     return {each["id"]: judgement(each["id"]) for each in claims()}
 
 
@@ -75,7 +61,7 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
     assert {int(n) for n in re.findall(r"V.2, Case (\d)", sections)} == set(range(1, 8))
 
 
-def test_every_claim_is_judged_and_its_numbers_are_told(judged: dict[str, Judgement]) -> None:
+def test_every_claim_is_judged_and_its_numbers_are_told(judged: Judged) -> None:
     for found in judged.values():
         assert found.original.numbers or found.corrected.numbers or found.claim["id"] in SILENT
         assert len(found.survivals) >= len(found.claim["assumptions"])
@@ -85,6 +71,7 @@ def test_every_claim_is_judged_and_its_numbers_are_told(judged: dict[str, Judgem
 
 
 BASES = ["stage-base", "base-not-restored"]
+NOT_REPRODUCED, UNDECIDED = verdicts.NOT_REPRODUCED, verdicts.UNDECIDED
 # claim, original, defects corrected, what the verdict turns to
 TURNS = [
     ("v2-case-2-stopped", REPRODUCED, ["base-not-restored"], IN_PART),
@@ -107,22 +94,19 @@ TURNS = [
 
 
 @pytest.mark.parametrize(("identity", "before", "fixed", "after"), TURNS)
-def test_mending_a_defect_turns_the_verdicts_that_hang_on_it(
-    identity: str, before: str, fixed: list[str], after: str
-) -> None:
+def test_mending_turns_verdicts(identity: str, before: str, fixed: list[str], after: str) -> None:
     assert _verdict(identity) == before
     assert _verdict(identity, *fixed) == after
 
 
-def test_mending_everything_gives_the_verdict_of_the_methods(judged: dict[str, Judgement]) -> None:
+def test_mending_everything_gives_the_verdict_of_the_methods(judged: Judged) -> None:
     for identity, found in judged.items():
         by_mending = _verdict(identity, *switches("two-term"), *switches("runge-kutta"))
         # What the thesis does not list stays untestable for the programs.
         assert by_mending in (found.corrected.verdict, "not testable"), identity
 
 
-def test_programs_and_methods_disagree_about_the_conclusion(judged: dict[str, Judgement]) -> None:
-    """The programs as printed show the conclusion of the thesis; corrected, they refute it."""
+def test_programs_and_methods_disagree_about_the_conclusion(judged: Judged) -> None:
     for identity in ("abstract-superior", "vi-superior"):
         found = judged[identity]
         assert (found.original.verdict, found.corrected.verdict) == (REPRODUCED, FALSE)
@@ -138,7 +122,6 @@ _LARGER = "larger error of collocation over that of Runge-Kutta"
 
 
 def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None:
-    """In Case 7 the four-term program alone is far below the range that the story tells."""
     lab, found = Laboratory(False), judgement("abstract-superior")
     for case in range(2, 8):
         two, four, third = (lab.error(program, case) for program in PROGRAMS)
@@ -149,46 +132,36 @@ def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None
         assert "the larger" in claim(identity)["truth"]
 
 
-def test_kinds_are_counted_apart_and_judged_as_what_they_are(
-    judged: dict[str, Judgement],
-) -> None:
+def test_kinds_are_counted_apart_and_judged_as_what_they_are(judged: Judged) -> None:
+    """The article has the counts."""
     table = kinds_table([*judged.values()])
     assert [row[0] for row in table.rows] == [*KINDS]
     assert sum(row[1] for row in table.rows) == len(judged)
+    lines = markdown.write(Report("claims", [[table]], dict, page=[[table]])).strip()
+    assert lines in (ROOT / "docs/article/article.md").read_text()
     for found in judged.values():
-        verdicts_ = {found.original.verdict, found.corrected.verdict}
+        both = {found.original.verdict, found.corrected.verdict}
         if found.claim["kind"] == "recommendation":
-            assert verdicts_ == {NOT_TESTABLE}
+            assert both == {NOT_TESTABLE}
         if "source" in found.claim:
             assert found.claim["kind"] == "history"
-            assert verdicts_ <= {REPRODUCED, FALSE}
+            assert both <= {REPRODUCED, FALSE}
     assert judged["v2-case-2-no-error"].claim["kind"] == "history"
     assert theory.by_sources(Laboratory(True), holds=True).verdict == REPRODUCED
-
-
-def test_counts_by_kind_are_in_the_article(judged: dict[str, Judgement]) -> None:
-    table = kinds_table([*judged.values()])
-    alone = Report("claims", [[table]], dict, page=[[table]])
-    lines = markdown.write(alone).strip()
-    assert lines in (ROOT / "docs/article/article.md").read_text()
 
 
 @pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
 def test_each_quote_stands_once_in_the_thesis() -> None:
     text = " ".join(THESIS.read_text().split())
-    for quote in (each["quote"] for each in (*claims(), *facts("sentences")["sentence"])):
-        assert text.count(quote) == 1, quote
+    for each in (*claims(), *facts("sentences")["sentence"]):
+        assert text.count(each["quote"]) == 1, each["quote"]
 
 
-def test_constant_of_the_mended_program_is_that_of_the_flow() -> None:
+def test_constant_of_the_mended_program_is_that_of_the_flow(judged: Judged) -> None:
     """In Case 2 the right-hand side turns omega with rate 5: its Lipschitz constant is 5."""
     assert Laboratory(False).required_constant(2) == pytest.approx(5.0, rel=1e-2)
     assert Laboratory(True).required_constant(2) > 3000.0
-
-
-def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
-    judged: dict[str, Judgement],
-) -> None:
+    # The ratio of cards is undecided where thresholds disagree.
     assert judged["v3-same-complexity"].original.verdict == UNDECIDED
     lab = Laboratory(True)
     assert methods.complexity(lab, [2.0, 3.0]).verdict == REPRODUCED
@@ -203,7 +176,7 @@ def test_ratio_of_cards_is_undecided_where_thresholds_disagree(
     ],
 )
 def test_a_verdict_names_the_parameters_on_which_it_rests(
-    identity: str, rests_on: list[str], verdicts: list[str], judged: dict[str, Judgement]
+    identity: str, rests_on: list[str], verdicts: list[str], judged: Judged
 ) -> None:
     found = judged[identity]
     changed = [each for each in found.survivals if not each.survives]
@@ -239,7 +212,7 @@ THEORY = {
 
 
 @pytest.mark.parametrize("identity", THEORY)
-def test_claims_of_theory_hang_on_no_program(identity: str, judged: dict[str, Judgement]) -> None:
+def test_claims_of_theory_hang_on_no_program(identity: str, judged: Judged) -> None:
     found = judged[identity]
     assert found.original.verdict == found.corrected.verdict == THEORY[identity]
     if found.claim["kind"] == "theory" and identity != "iv1-higher-powers":
@@ -265,7 +238,7 @@ def test_theory_is_judged_by_its_numbers() -> None:
 
 
 def test_assignments_are_computed_from_all_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = assignments()
+    found = ledger.assignments()
     assert {each.case for each in found} == {1, 3, 4, 6, 7}
     assert len(found) == 5 * 3
     by_key = {(each.case, each.start): each for each in found}
@@ -277,13 +250,13 @@ def test_assignments_are_computed_from_all_starts(monkeypatch: pytest.MonkeyPatc
         return verdicts.Judged(NOT_REPRODUCED if wrong else REPRODUCED, {})
 
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", failing)
-    assert [each.start for each in assignments() if not each.holds] == [(0.0, 1.0, 1.0)]
+    assert [each.start for each in ledger.assignments() if not each.holds] == [(0.0, 1.0, 1.0)]
     assert by_key[3, (0.0, 1.0, 10.0)].holds
 
 
 @pytest.mark.parametrize(("program", "terms"), [("two-term", 2), ("four-term", 4)])
 @pytest.mark.parametrize(("changed", "parts"), [(frozenset(), 1), (frozenset(LITERALS), 10)])
-def test_literals_of_the_step_all_or_none_are_a_step(
+def test_literals_all_or_none(
     program: str, terms: int, changed: frozenset[str], parts: int
 ) -> None:
     lab = Laboratory(True)
@@ -293,7 +266,7 @@ def test_literals_of_the_step_all_or_none_are_a_step(
         assert np.abs(omega - run.omega[parts - 1 :: parts]).max() < 1e-12
 
 
-def test_one_literal_alone_is_another_experiment(judged: dict[str, Judgement]) -> None:
+def test_one_literal_alone_is_another_experiment(judged: Judged) -> None:
     """Where only the growth of DT is smaller, the points come back and the step stays: Case 2."""
     numbers = judged["v3-small-step-collocation"].original.numbers
     assert numbers["two-term, .001 in DT+: of 5 cases improve"] == 4
@@ -314,20 +287,16 @@ def test_assumptions_reach_the_runs() -> None:
 
 
 @pytest.mark.campaign
-def test_claims_in_every_form(capsys: Capture) -> None:
-    def told(*options: str) -> str:
-        assert main(["claims", *options]) == 0
-        return capsys.readouterr().out
-
-    for options in ([], ["--assignments"]):
-        assert max(map(len, told(*options).splitlines())) <= 100
-    record: dict[str, Any] = json.loads(told("--format", "json"), parse_constant=pytest.fail)
+def test_claims_in_every_form(printed: Printed) -> None:
+    for command in ("claims", "claims --assignments"):
+        assert max(map(len, printed(command).splitlines())) <= 100
+    record = json.loads(printed("claims --format json"), parse_constant=pytest.fail)
     assert (record["schema"], len(record["claims"])) == (1, len(claims()))
     wanted = {"id", "kind", "where", "quote", "original", "corrected", "numbers", "assumptions"}
     assert all(set(each) == wanted for each in record["claims"])
-    rows = list(csv.DictReader(told("--format", "csv").splitlines()))
+    rows = list(csv.DictReader(printed("claims --format csv").splitlines()))
     assert [row["original"] for row in rows] == [each["original"] for each in record["claims"]]
-    assert re.search("stopped at step  +25", told("--explain", "v2-case-2-stopped"))
+    assert re.search("stopped at step  +25", printed("claims --explain v2-case-2-stopped"))
 
 
 # The verdicts turn where their rules say, by laboratories made by hand.
@@ -346,19 +315,8 @@ def _lab(run: Any = None, error: Any = None, truth: Any = None) -> Any:
     )
 
 
-@pytest.mark.parametrize(
-    ("case", "factor", "verdict"),
-    [(7, 1.1, REPRODUCED), (7, 1.2, NOT_REPRODUCED), (6, 0.9, NOT_REPRODUCED)],
-)
-def test_liveliest_case_is_held_against_the_others(case: int, factor: float, verdict: str) -> None:
-    lab = _lab(lambda case: SimpleNamespace(omega=np.array([[0.0] * 3, [case, 0.0, 0.0]])))
-    assert verdicts.dynamic(lab, case, factor).verdict == verdict
-
-
 @pytest.mark.parametrize(("factor", "verdict"), [(9.0, NOT_REPRODUCED), (11.0, IN_PART)])
-def test_weightings_within_ten_times_the_error_of_collocation_are_as_good(
-    factor: float, verdict: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_weightings_as_good(factor: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def error(lab: Laboratory, case: int, member: Member) -> float:
         return 1e-6 * (1.0 if member.weighting == "collocation" else factor)
 
@@ -373,16 +331,19 @@ def test_overflow_is_an_infinite_error(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lab.error("two-term", 3) == float("inf")
 
 
-def test_error_is_a_part_of_the_amplitude() -> None:
+def test_judgements_by_hand() -> None:
     found = verdicts.error_size(_lab(error=0.1, truth=[[0.0] * 3, [8.0] * 3]), 3, 0.02, 0.03)
     assert found.verdict == REPRODUCED
     assert set(found.numbers.values()) == {0.025}
+    # The liveliest case is compared with the others.
+    lab = _lab(lambda case: SimpleNamespace(omega=np.array([[0.0] * 3, [case, 0.0, 0.0]])))
+    rows = ((7, 1.1, REPRODUCED), (7, 1.2, NOT_REPRODUCED), (6, 0.9, NOT_REPRODUCED))
+    for case, factor, verdict in rows:
+        assert verdicts.dynamic(lab, case, factor).verdict == verdict
 
 
 @pytest.mark.parametrize("error", [1.1e-2, 9e-3])
-def test_what_a_search_could_find_is_told_and_not_judged(
-    error: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_search_finds_is_not_judged(error: float, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(error: float) -> Any:
         return lambda *_: SimpleNamespace(steps=2, omega=np.full((2, 3), error))
 
@@ -404,16 +365,14 @@ def test_more_terms_than_four_are_compared_with_four(gain: float, verdict: str) 
 
 
 @pytest.mark.parametrize("turning", ["original", "corrected"])
-def test_a_verdict_that_turns_on_either_side_does_not_survive(
-    turning: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_verdict_survives_on_both_sides(turning: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def other(entry: dict[str, Any], laboratory: Laboratory) -> Any:
         turns = laboratory.is_original == (turning == "original")
         verdict = FALSE if turns and laboratory.assumptions != Assumptions() else REPRODUCED
         return SimpleNamespace(verdict=verdict)
 
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", other)
-    survivals = judge(claim("abstract-superior")).survivals
+    survivals = ledger.judge(claim("abstract-superior")).survivals
     assert survivals
     assert not any(each.survives for each in survivals)
 
@@ -434,7 +393,7 @@ def test_programs_run_in_the_word_that_is_assumed(word: str) -> None:
     assert 0.0 < np.abs(lab.models(4, 3) - floats.models(4, 3)).max() < 1e-8
 
 
-def test_computer_error_is_judged_in_the_machines_words(judged: dict[str, Judgement]) -> None:
+def test_computer_error_is_judged_in_the_machines_words(judged: Judged) -> None:
     entry = claim("iv2-computer-error")
     numbers = judged[entry["id"]].corrected.numbers
     apart = {name: x for name, x in numbers.items() if "apart from binary64" in name}

@@ -5,13 +5,8 @@ from typing import Any
 
 import pytest
 
-from pyharness.history.claims.evidence import (
-    Combination,
-    combinations,
-    discriminating,
-    evidence,
-    undecided,
-)
+from pyharness.history.claims import evidence as scored
+from pyharness.history.claims.evidence import Combination, evidence
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_REPRODUCED, REPRODUCED
@@ -27,29 +22,25 @@ def _combination(*verdicts: str, steps: int = 100) -> Combination:
     )
 
 
-def test_score_is_one_a_half_and_nothing() -> None:
-    found = _combination(REPRODUCED, IN_PART, IN_PART, FALSE, NOT_REPRODUCED)
-    assert (found.score, found.holding) == (2.0, 3)
-
-
 def test_what_discriminates_and_what_remains() -> None:
     best, equal, worse = (
         _combination(REPRODUCED, IN_PART),
         _combination(IN_PART, REPRODUCED, steps=300),
         _combination(IN_PART, FALSE),
     )
-    assert discriminating([best, equal, worse]) == ["claim-0", "claim-1"]
-    assert discriminating([best, best]) == []
-    assert undecided([worse, best, equal])["steps"] == ["100", "300"]
-    assert undecided([worse, best])["steps"] == ["100"]
-    assert undecided([_combination(FALSE, steps=300), best])["steps"] == ["100"]
+    assert scored.discriminating([best, equal, worse]) == ["claim-0", "claim-1"]
+    assert scored.discriminating([best, best]) == []
+    assert scored.undecided([worse, best, equal])["steps"] == ["100", "300"]
+    assert scored.undecided([worse, best])["steps"] == ["100"]
+    assert scored.undecided([_combination(FALSE, steps=300), best])["steps"] == ["100"]
+    found = _combination(REPRODUCED, IN_PART, IN_PART, FALSE, NOT_REPRODUCED)
+    assert (found.score, found.holding) == (2.0, 3)
 
 
 @pytest.mark.parametrize("identity", ["v2-case-3-concur", "v2-case-7-concur", "v2-case-2-stopped"])
 def test_verdict_of_a_combination_is_that_of_its_laboratory(identity: str) -> None:
-    """The evidence computes only what the claim depends on, and still has the same verdict."""
     every = {each.assumptions: each.verdicts[identity] for each in evidence()}
-    assert len(every) == len(combinations()) == 4 * 4 * 4 * 2
+    assert len(every) == len(scored.combinations()) == 4 * 4 * 4 * 2
     for assumptions in list(every)[::17]:
         whole = outcome(claim(identity), Laboratory(True, assumptions)).verdict
         assert every[assumptions] == whole, assumptions
@@ -67,22 +58,18 @@ def test_evidence_is_told(printed: Printed) -> None:
 
 def test_what_the_report_says_of_each_choice() -> None:
     """Compare docs/article/article.md: each choice changes the score, with all others kept."""
-    found = list(evidence())
-    steps, held, last, c1 = (
-        _effects(found, axis)
-        for axis in ("steps", "conjecture torque-held", "reading do-variable", "reading c1-for-c")
-    )
-    assert max(steps) < 0.0
+    assert max(_effects("steps")) < 0.0
+    held = _effects("conjecture torque-held")
     assert min(held) < max(held) == 0.0
-    assert max(last) < 0.0
-    assert min(c1) == 0.0
-    assert max(c1) == 0.5
+    assert max(_effects("reading do-variable")) < 0.0
+    c1 = _effects("reading c1-for-c")
+    assert (min(c1), max(c1)) == (0.0, 0.5)
 
 
-def _effects(found: list[Combination], axis: str) -> list[float]:
-    scores: dict[tuple[tuple[str, str], ...], dict[str, float]] = {}
-    for each in found:
+def _effects(axis: str) -> list[float]:
+    scores: dict[tuple[tuple[str, str], ...], list[float]] = {}
+    for each in evidence():
         choices = each.choices()
-        chosen = choices.pop(axis)
-        scores.setdefault(tuple(choices.items()), {})[chosen] = each.score
-    return [second - first for first, second in (each.values() for each in scores.values())]
+        del choices[axis]
+        scores.setdefault(tuple(choices.items()), []).append(each.score)
+    return [second - first for first, second in scores.values()]

@@ -58,9 +58,7 @@ ORDERS = {
 
 @pytest.mark.sampled
 @pytest.mark.parametrize("case", ORDERS)
-def test_orders_are_those_derived_or_better(
-    case: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_orders_as_derived(case: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     part, told = ORDERS[case]
     every = family_members()
     assert len(every) == 200
@@ -280,9 +278,7 @@ def test_one_member_in_every_format(printed: Printed) -> None:
     assert "| collocation | 0,0.5,1 | 3 | 4/" in printed(f"{one} --format markdown")
 
 
-def test_order_below_the_one_derived_is_exit_code_1(
-    capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_order_too_low_is_exit_code_1(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pyharness.history.family.orders.predicted_order", lambda member: 3)
     assert main(["family", "--terms", "2"]) == 1
     told = "UNEXPECTED: collocation at points thesis, 2 terms, 1 corrections: order 2.0"

@@ -10,13 +10,7 @@ from pathlib import Path
 import pytest
 
 from pyharness.history import identifiers
-from pyharness.history.identifiers import (
-    DATA,
-    content_identifier,
-    data_identifier,
-    directory_identifier,
-    source_files,
-)
+from pyharness.history.identifiers import DATA, content_identifier, directory_identifier
 from pyharness.model import facts as tables
 from pyharness.model.facts import SHIPPED
 from pyharness.model.listing import PROGRAMS
@@ -93,14 +87,14 @@ def test_git_has_the_same_identifiers_of_the_data_and_the_port() -> None:
         pytest.skip("not a clone")
     if _git(ROOT, "status", "--porcelain", "--", DATA):
         pytest.skip("the data differ from those of the last commit")
-    assert data_identifier() == f"swh:1:dir:{_git(ROOT, 'rev-parse', f'HEAD:{DATA}')}"
-    for path, content in source_files().items():
+    assert identifiers.data_identifier() == f"swh:1:dir:{_git(ROOT, 'rev-parse', f'HEAD:{DATA}')}"
+    for path, content in identifiers.source_files().items():
         assert content_identifier(content) == f"swh:1:cnt:{_git(ROOT, 'hash-object', path)}"
 
 
 def test_an_installation_has_the_same_ids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The folder of the data of an installed package has more files, and those of the port."""
-    before = data_identifier(), [*source_files().items()]
+    before = identifiers.data_identifier(), [*identifiers.source_files().items()]
     folder = Path(shutil.copytree(ROOT / DATA, tmp_path / "data"))
     shutil.copytree(ROOT / "fortran/original", folder / "fortran/original")
     for name in SHIPPED:
@@ -109,11 +103,11 @@ def test_an_installation_has_the_same_ids(tmp_path: Path, monkeypatch: pytest.Mo
     (folder / "web").mkdir()
     (folder / "web/page.js").write_text("0;")
     monkeypatch.setattr(tables, "_FOLDER", folder)
-    source_files.cache_clear()
+    identifiers.source_files.cache_clear()
     try:
-        assert (data_identifier(), [*source_files().items()]) == before
+        assert (identifiers.data_identifier(), [*identifiers.source_files().items()]) == before
     finally:
-        source_files.cache_clear()
+        identifiers.source_files.cache_clear()
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -13,7 +13,6 @@ from tests.conftest import Printed
 
 
 def _tends_elsewhere(found: Limit) -> bool:
-    """Whether the program approaches its limit while its distance from the truth stays."""
     first, last = found.halvings[0], found.halvings[-1]
     return last.from_limit < first.from_limit / 8.0 and last.from_truth > first.from_truth / 2.0
 
@@ -36,7 +35,6 @@ def test_four_term_tends_to_the_truth(case: int) -> None:
 
 
 def test_two_term_in_case_6_follows_its_limit_into_the_blow_up() -> None:
-    """The limit equation's solution grows without bound before t = 1; the program follows it."""
     assert _tends_elsewhere(limit("two-term", replace(case_scene(6), steps=30)))
     found = limit("two-term", case_scene(6), 2)
     assert math.isinf(found.halvings[0].from_limit)

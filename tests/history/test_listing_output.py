@@ -73,7 +73,6 @@ def test_a_digit_and_a_row_that_differ_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
 def test_shipped_pages_are_what_is_printed(path: Path) -> None:
-    """The pages are those of the cards, with the steps of their DO statements."""
     program, _, rest = path.stem.partition("-case-")
     case, _, word = rest.partition("-")
     steps = card_steps(program)
@@ -103,7 +102,7 @@ def test_a_page_tells_its_reading(tmp_path: Path) -> None:
     assert {each.listing for each in found if each.is_whole} == {"original with do-variable"}
 
 
-def test_command_exits_with_1_where_no_word_prints_it(
+def test_command_exits_with_1_for_no_word(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert len(PAGES) == 6

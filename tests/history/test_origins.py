@@ -5,6 +5,7 @@ import csv
 import json
 import re
 from functools import reduce
+from itertools import combinations
 from operator import getitem
 from typing import Any
 
@@ -14,13 +15,7 @@ import pytest
 from docs.text.page import text_page
 from pyharness import run_program
 from pyharness.history import origins
-from pyharness.history.origins import (
-    disagreements,
-    mistakes,
-    shared_statements,
-    statement_count,
-    unexplained_defects,
-)
+from pyharness.history.origins import disagreements, mistakes, unexplained_defects
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
@@ -31,6 +26,11 @@ from tests.conftest import Printed
 def test_nothing_is_wrong() -> None:
     assert mistakes() == []
     assert set(unexplained_defects()) == {"impossible-body", "case-7-torque"}
+    # J=I-1 gives stages 3 and 4 the values that cards 940 and 1110 set.
+    cards = deck("runge-kutta").cards
+    assert cards[780].statement.endswith("J=I-1")
+    for number, stage in ((940, 3), (1110, 4)):
+        assert cards[number].statement.replace(" ", "") == f"J={stage - 1}"
 
 
 _NEITHER = "must be in a disagreement or"
@@ -70,34 +70,24 @@ def test_a_mistake_is_found(
 ) -> None:
     content = copy.deepcopy(facts("disagreements"))
     reduce(getitem, place[:-1], content)[place[-1]] = value
-    monkeypatch.setattr(
-        origins, "facts", lambda name: content if name == "disagreements" else facts(name)
-    )
+    tables = {"disagreements": content}
+    monkeypatch.setattr(origins, "facts", lambda name: tables.get(name) or facts(name))
     found = mistakes()
     for each in told:
         assert any(each in mistake for mistake in found), found
 
 
 def test_decks_share_statements() -> None:
-    found = shared_statements()
-    assert found[PROGRAMS[0], PROGRAMS[1]] > 2 * max(
-        found[PROGRAMS[0], PROGRAMS[2]], found[PROGRAMS[1], PROGRAMS[2]]
-    )
+    found = origins.shared_statements()
+    two, *with_third = (found[pair] for pair in combinations(PROGRAMS, 2))
+    assert two > 2 * max(with_third)
     for (one, other), count in found.items():
-        assert count < min(statement_count(one), statement_count(other))
+        assert count < min(origins.statement_count(one), origins.statement_count(other))
     # Seven statements are the same because we call the torques N in both decks.
-    in_scan = shared_statements(scanned_names=True)
+    in_scan = origins.shared_statements(scanned_names=True)
     assert [found[pair] - in_scan[pair] for pair in found] == [7, 1, 0]
     rows = re.findall(r"^\| ([\w-]+) and ([\w-]+) \| (\d+) \| (\d+) \|", text_page(), re.M)
     assert rows == [(*pair, str(n), str(n - in_scan[pair])) for pair, n in found.items()]
-
-
-def test_known_facts_of_the_stages_are_on_the_cards() -> None:
-    """J=I-1 gives stages 3 and 4 the values that cards 940 and 1110 set."""
-    cards = deck("runge-kutta").cards
-    assert cards[780].statement.endswith("J=I-1")
-    for number, stage in ((940, 3), (1110, 4)):
-        assert cards[number].statement.replace(" ", "") == f"J={stage - 1}"
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -110,9 +100,7 @@ def test_faults_have_no_effect_on_omega_in_case_1(program: str) -> None:
     np.testing.assert_allclose(original.omega, truth, rtol=0, atol=1e-12)
 
 
-def test_page_and_verb_have_every_disagreement_once(
-    printed: Printed, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_page_and_verb_have_every_row(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
     page = text_page()
     for each in disagreements():
         assert page.count(f"\n| {each.title} | {each.suggests} |") == 1

@@ -16,7 +16,6 @@ from pyharness.methods.batch import Batch, Solver
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Array
 
 pytestmark = pytest.mark.claims
 CODES = {REPRODUCED: HOLDS, PARTLY: IN_PART}
@@ -34,23 +33,17 @@ FEW = [STARTS[k] for k in (0, 1, 2, 3, 8, 10, 11)]
 FEWER = [STARTS[k] for k in (0, 5, 9)]
 
 
-def _solved(
-    omega0: list[Triple] | Array, listing: Listing | None, steps: int = 100, **more: Any
-) -> Batch:
+def _solved(omega0: list[Triple], listing: Listing | None, steps: int = 100, **more: Any) -> Batch:
     """Return a batch as a sweep passes it to a claim."""
-    scene = replace(case_scene(4), steps=steps)
-    starts = {"omega0": np.array(omega0)}
-    batch = Batch(scene, Solver(), listing, np.full(len(omega0), 1.0), starts)
+    scene, ones = replace(case_scene(4), steps=steps), np.full(len(omega0), 1.0)
+    batch = Batch(scene, Solver(), listing, ones, {"omega0": np.array(omega0)})
     return replace(batch, **more)
 
 
 def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[int]:
-    """Return the codes of the ledger's verdicts."""
-    found = []
-    for start in omega0:
-        one = replace(laboratory, assumptions=replace(laboratory.assumptions, start=start))
-        found.append(CODES.get(outcome(claim(identity), one).verdict, FAILS))
-    return found
+    chosen = laboratory.assumptions
+    labs = (replace(laboratory, assumptions=replace(chosen, start=start)) for start in omega0)
+    return [CODES.get(outcome(claim(identity), lab).verdict, FAILS) for lab in labs]
 
 
 def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
@@ -73,7 +66,6 @@ def test_verdicts_are_those_of_the_ledger(identity: str) -> None:
 @pytest.mark.sampled
 @pytest.mark.parametrize("identity", [each for each in JUDGED if each.startswith("v2")])
 def test_verdicts_are_those_of_the_ledger_elsewhere(identity: str) -> None:
-    """Test corrected programs and other readings, with a few starts of each."""
     few = [FEW[0], *FEW[3:5]]
     for program, reading in (("runge-kutta", "do-variable"), ("two-term", "c1-for-c")):
         listing = subset(program, "original", readings=[reading])
@@ -103,12 +95,12 @@ def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
 
 def test_solutions_are_those_of_the_reference() -> None:
     one = Laboratory(True)
-    found = over_starts.Starts(one, np.array([one.scene(1).omega]))
-    for case in (1, 7):
-        bench = over_starts.Starts(one, np.array([one.scene(case).omega]))
-        assert np.abs(bench.solution(case)[0] - one.solution(case)).max() < 1e-11
-    assert found.solution(5).shape == (100, 3)
-    assert np.abs(found.solution(5) - one.solution(5)).max() < 1e-11
+    for case, start in ((1, 1), (7, 7), (5, 1)):
+        bench = over_starts.Starts(one, np.array([one.scene(start).omega]))
+        # Case 5 has its own start, whatever the others have.
+        found = bench.solution(case) if case == 5 else bench.solution(case)[0]
+        assert found.shape == (100, 3)
+        assert np.abs(found - one.solution(case)).max() < 1e-11
 
 
 def test_runs_end_by_the_stop_test_unless_told_otherwise() -> None:

@@ -7,29 +7,23 @@ from itertools import product
 import numpy as np
 import pytest
 
-from pyharness.history.second_reading import (
-    chapman,
-    disagreeing,
-    misread_places,
-    read_cards,
-    recapture_interval,
-    recaptures,
-    sample,
-)
+from pyharness.history import second_reading
+from pyharness.history.second_reading import chapman, misread_places, read_cards, recaptures
 from pyharness.original.cards import tight
 from tests.conftest import Printed
 
 
 def test_sample_is_the_one_that_the_seed_draws() -> None:
     read = {each.card.name for each in read_cards()}
-    assert read == {card.name for card in sample()}
+    assert read == {card.name for card in second_reading.sample()}
     assert len(read) == 120
-
-
-def test_chapman_corrects_lincoln_and_petersen() -> None:
-    assert chapman(10, 8, 8) == 10
-    assert chapman(20, 10, 5) == pytest.approx(21 * 11 / 6 - 1)
-    assert chapman(2000, 1000, 500) == pytest.approx(4000, rel=2e-3)
+    # Few misreadings remain if the readings are independent.
+    places, cards = recaptures()
+    assert (places.unit, cards.unit) == ("places", "cards")
+    assert cards.both == cards.second
+    for each in (places, cards):
+        assert each.first <= each.lower <= each.upper
+        assert each.uncorrected == each.upper - each.first <= 2
 
 
 @pytest.mark.campaign
@@ -37,16 +31,21 @@ def test_interval_contains_the_size_as_often_as_promised() -> None:
     """All samples of a small population: the interval has the size in 95 % or more of them."""
     size, first = 12, 7
     samples = [(sum(each[:first]), sum(each)) for each in product((0, 1), repeat=size)]
-    intervals = [recapture_interval(first, second, both) for both, second in samples if both]
+    intervals = [
+        second_reading.recapture_interval(first, second, both) for both, second in samples if both
+    ]
     assert np.mean([lower <= size <= upper for lower, upper in intervals]) >= 0.95
 
 
 def test_interval_contains_the_estimate() -> None:
     for first, second, both in ((43, 42, 42), (20, 10, 5), (9, 9, 9), (30, 30, 20)):
-        lower, upper = recapture_interval(first, second, both)
+        lower, upper = second_reading.recapture_interval(first, second, both)
         assert first + second - both <= lower <= chapman(first, second, both) <= upper
     with pytest.raises(ValueError, match="both must be positive"):
-        recapture_interval(3, 3, 0)
+        second_reading.recapture_interval(3, 3, 0)
+    assert chapman(10, 8, 8) == 10
+    assert chapman(20, 10, 5) == pytest.approx(21 * 11 / 6 - 1)
+    assert chapman(2000, 1000, 500) == pytest.approx(4000, rel=2e-3)
 
 
 def test_places_are_those_of_the_scan() -> None:
@@ -58,24 +57,14 @@ def test_places_are_those_of_the_scan() -> None:
 
 
 def test_the_readings_differ_in_a_name_alone() -> None:
-    assert [each.card.name for each in disagreeing()] == ["two-term:110", "four-term:2010"]
-    for each in disagreeing():
+    differing = second_reading.disagreeing()
+    assert [each.card.name for each in differing] == ["two-term:110", "four-term:2010"]
+    for each in differing:
         assert each.first.replace("WKA", "USA") == each.second
-
-
-def test_names_that_we_make_uniform_are_no_misreadings() -> None:
+    # Names that we make uniform are no misreadings.
     (found,) = (each for each in read_cards() if each.card.name == "four-term:480")
     assert tight(found.card.text) == "M3=N3/I3"
     assert found.scan == found.first == found.second == "M3=M3/I3"
-
-
-def test_few_misreadings_remain_if_the_readings_are_independent() -> None:
-    places, cards = recaptures()
-    assert (places.unit, cards.unit) == ("places", "cards")
-    assert cards.both == cards.second
-    for each in (places, cards):
-        assert each.first <= each.lower <= each.upper
-        assert each.uncorrected == each.upper - each.first <= 2
 
 
 def test_the_verb_shows_it_in_every_form(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:

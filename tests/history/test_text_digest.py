@@ -18,7 +18,6 @@ from tests.conftest import Printed
 
 @pytest.fixture
 def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield a copy of the port with which the cards are compared."""
     folder = tmp_path / "original"
     shutil.copytree(shipped("fortran/original"), folder)
     monkeypatch.setattr(port_lines, "shipped", lambda _: folder)
@@ -43,7 +42,6 @@ def _rows(content: Any) -> list[Any]:
 
 
 def _changed(content: Any) -> Iterator[Any]:
-    """Yield copies of a table, each with one change."""
     rows = _rows(content)
     for index in (0, len(rows) // 2, len(rows) - 1):
         for key, value in rows[index].items():

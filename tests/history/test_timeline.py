@@ -51,7 +51,6 @@ def test_every_quotation_is_in_the_thesis_and_no_later_date_or_missing_part() ->
 
 
 def test_dates_are_those_of_the_account() -> None:
-    """Home page, README and documents take their dates from `account.toml`."""
     work = facts("account")["work"]
     for name in ("began", "ended", "submitted", "published"):
         event = {"began": "work-begins", "ended": "work-ends"}.get(name, name)

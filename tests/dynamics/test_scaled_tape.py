@@ -8,16 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import (
-    ChangingMoments,
-    Scene,
-    TorqueLaw,
-    opaque,
-    prepare,
-    solve,
-    solve_many,
-    torques,
-)
+from pyharness import ChangingMoments, Scene, TorqueLaw, opaque, prepare, solve, solve_many, torques
 from pyharness.dynamics.scaled_tape import scaled_tape
 from pyharness.dynamics.system import with_constant_body
 from pyharness.model.codes import Statuses

@@ -99,10 +99,7 @@ CASES: dict[str, tuple[StateTorque, Formula]] = {
     "damping": (damping(D), lambda t, w, r: -D @ w),
     "damping by a number": (damping(0.3), lambda t, w, r: -0.3 * w),
     "damping by axes": (damping(V), lambda t, w, r: -V * w),
-    "drag": (
-        drag([0.2, D, V]),
-        lambda t, w, r: -0.2 * w - D @ w * (w @ w) - V * w * (w @ w) ** 2,
-    ),
+    "drag": (drag([0.2, D, V]), lambda t, w, r: -0.2 * w - D @ w * (w @ w) - V * w * (w @ w) ** 2),
     "cubic drag": (drag([0, 2]), lambda t, w, r: -2.0 * np.linalg.norm(w) ** 2 * w),
     "drag by axes": (
         drag([0.2, D, V], per_axis=True),
@@ -111,14 +108,8 @@ CASES: dict[str, tuple[StateTorque, Formula]] = {
     "rate control": (rate_control(K, V), lambda t, w, r: -K @ (w - V)),
     "attitude control": (attitude_control(D, K, TARGET), control),
     "wheels": (wheels(H), lambda t, w, r: -np.cross(w, H)),
-    "wheels with motors": (
-        wheels(H, LAW),
-        lambda t, w, r: -np.cross(w, momentum(t)) - vector(t),
-    ),
-    "wheels with a constant motor": (
-        wheels(H, V),
-        lambda t, w, r: -np.cross(w, H + t * V) - V,
-    ),
+    "wheels with motors": (wheels(H, LAW), lambda t, w, r: -np.cross(w, momentum(t)) - vector(t)),
+    "wheels with a constant motor": (wheels(H, V), lambda t, w, r: -np.cross(w, H + t * V) - V),
     "gravity gradient, moments": (gravity_gradient(MOMENTS, ORBIT), gradient(np.diag(MOMENTS))),
     "gravity gradient, matrix": (gravity_gradient(INERTIA, ORBIT), gradient(INERTIA)),
     "dipole": (magnetic_dipole(M, V), lambda t, w, r: np.cross(M, r.T @ V)),

@@ -10,16 +10,7 @@ import pytest
 from scipy.integrate import quad
 
 import pyharness
-from pyharness import (
-    InputError,
-    Scene,
-    TorqueLaw,
-    case_scene,
-    prepare,
-    run_program,
-    solve,
-    subset,
-)
+from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.plan import plan
 from pyharness.model.attitude import angle_between

@@ -99,8 +99,7 @@ def test_finest_tolerance_is_met(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "seed"),
-    [("from rest", 16), *(("nearly symmetric", seed) for seed in (8, 10, 18))],
+    ("kind", "seed"), [("from rest", 16), *(("nearly symmetric", seed) for seed in (8, 10, 18))]
 )
 def test_long_steps_of_high_order_are_not_trusted(kind: str, seed: int) -> None:
     """If both steps are too long to show the order, their difference is too small an estimate."""

@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import (
-    Scene,
-    TorqueLaw,
-    case_scene,
-    prepare,
-    solve,
-    solve_many,
-    torques,
-)
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many, torques
 from pyharness.methods.recorded import kernel_tape, system
 from pyharness.methods.taylor import taylor
 from pyharness.model.codes import Operations

@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import (
-    InputError,
-    Scene,
-    TorqueLaw,
-    case_scene,
-    prepare,
-    solve,
-)
+from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.methods.plan import plan
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.trajectory import Array, turned_to_space

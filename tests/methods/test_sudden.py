@@ -118,10 +118,7 @@ POWERS: dict[str, tuple[Callable[[Any], Any], list[tuple[float, float]]]] = {
         lambda t: (1.0 - ((t - 50.0) / 50.0) ** 2) ** 1000,
         [(100.0, 50.0 * _of_parabola(1000))],
     ),
-    "chain of products": (
-        lambda t: math.prod([np.sin(t)] * 64),
-        [(2.0 * math.pi, _of_sine(64))],
-    ),
+    "chain of products": (lambda t: math.prod([np.sin(t)] * 64), [(2.0 * math.pi, _of_sine(64))]),
     "power of a sum of powers": (
         lambda t: (np.sin(t) ** 14 + np.cos(t) ** 14) ** 6,
         [(2.0 * math.pi, 0.0)],

@@ -148,8 +148,7 @@ def test_scene_without_steady_rotations_says_why(scene: Scene, words: str) -> No
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
-    ("coefficients", "omega"),
-    [((3e-173, 1.0, -1e-271), 3e-192), ((1e-7, 2.5e-92, -1.5e274), 7e8)],
+    ("coefficients", "omega"), [((3e-173, 1.0, -1e-271), 3e-192), ((1e-7, 2.5e-92, -1.5e274), 7e8)]
 )
 def test_end_of_the_linear_picture_beyond_binary64_is_not_told(
     coefficients: Triple, omega: float

@@ -1,7 +1,7 @@
 """`python -m tests.attitude_errors N [SEED]`: the largest errors of the attitude by kind of body.
 
 It draws N random bodies of each kind, with initial conditions and times up to 1e6 s. The results
-are compared with the series in integer arithmetic of `tests.exact_attitude`.
+are compared with the enclosures of `tests.exact_attitude`.
 """
 
 import random

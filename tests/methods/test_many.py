@@ -2,13 +2,14 @@
 
 import tracemalloc
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, solve_many, torques
+from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve_many, torques
 from pyharness.methods import many_scenes
 from pyharness.methods.many import Ensemble
 from pyharness.methods.problem import normalized
@@ -16,10 +17,12 @@ from pyharness.methods.registry import FIXED_STEP
 from pyharness.methods.solver import CODES, PREPARED
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
+from pyharness.model.listing import Listing
 from tests.as_written import compiler_here, many_as_written
 from tests.many_errors import bodies, exceeding
 from tests.methods.tolerance_scenes import EDGES
 
+LISTING = Listing.corrected("two-term")
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 
 
@@ -387,3 +390,41 @@ def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> Non
     assert status[2]
     assert np.array_equal(attitude[1], good[1][1])
     assert np.array_equal(omega[1], good[0][1])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"omega0": np.ones((5, 2))},
+        {"omega0": "abc"},
+        {"omega0": [10**400, 1, 1]},
+        {"omega0": [[1.0, 2.0, 3.0], [1.0]]},
+        {"omega0": np.ones((4, 3)), "moments": np.ones((3, 3))},
+        {"moments": [1.0, 1, 1], "coefficients": [1.0, 1, 1]},
+        {"threads": 0},
+        {"effort": 0.0},
+    ],
+)
+def test_mistake_has_the_same_words_for_methods_and_programs(given: dict[str, Any]) -> None:
+    with pytest.raises(InputError) as first:
+        solve_many(TOP, 1.0, **given)
+    with pytest.raises(InputError) as second:
+        run_many(TOP, LISTING, **given)
+    assert str(first.value) == str(second.value)
+    if given.keys() == {"omega0"}:
+        with pytest.raises(InputError) as third:
+            prepare(TOP).many(given["omega0"], 1.0)
+        assert str(first.value) == str(third.value)
+
+
+def test_one_row_is_shared_and_fractions_are_numbers() -> None:
+    starts = np.ones((4, 3))
+    moments: Any = [[Fraction(5, 2), 3, 4]]
+    times = np.full(4, 0.5)
+    found = solve_many(TOP, times, omega0=starts[:1], moments=moments)
+    wanted = solve_many(TOP, times, omega0=starts, moments=np.tile([2.5, 3.0, 4.0], (4, 1)))
+    assert np.array_equal(found.omega, wanted.omega)
+    sizes = np.full(4, 0.01)
+    run = run_many(TOP, LISTING, omega0=starts[:1], moments=moments, step_size=sizes)
+    alone = run_many(TOP, LISTING, omega0=starts[0], moments=[2.5, 3.0, 4.0], step_size=0.01)
+    assert np.array_equal(run.omega, np.tile(alone.omega, (4, 1, 1)))

@@ -120,12 +120,6 @@ def test_scipy_refuses_what_it_can_not_meet(method: str) -> None:
     assert _errs(solve(scene, [8.0], method, 2.0 * least).omega[-1], scene, 8.0) <= 2.0 * least
 
 
-@pytest.mark.parametrize("method", [*SCIPY_METHODS, "taylor", "gauss-2", "auto", "reference"])
-def test_rest_that_nothing_moves_stays(method: str) -> None:
-    run = solve(Scene("rest", REST, BODY), [1.0, 2.0], method, 1e-6)
-    assert (run.ended, run.omega.tolist()) == ("complete", [[0.0, 0.0, 0.0]] * 2)
-
-
 @pytest.mark.parametrize("method", SCIPY_METHODS)
 def test_spin_that_turns_too_often_is_no_overflow(method: str) -> None:
     """Nothing grows without bound, but the phase has no digit left."""

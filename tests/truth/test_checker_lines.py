@@ -245,12 +245,16 @@ EXEMPT = (
 
 def entries() -> list[tuple[str, str, str]]:
     """Return each part of a line, the weaker one, and the name of a forgery or an empty text."""
-    found: list[list[str]] = []
+    found, name, old = [], "", ""
     for line in Path(__file__).with_name("weaker_lines.txt").read_text().splitlines()[2:]:
-        if line[0] == "-":
-            found.append(["", "", ""])
-        found[-1]["-+=".index(line[0])] = line[2:].replace("\\n", "\n")
-    return [(old, new, name) for old, new, name in found]
+        text = line[2:].replace("\\n", "\n")
+        if line[0] == "=":
+            name = text
+        elif line[0] == "-":
+            old = text
+        else:
+            found.append((old, text, name))
+    return found
 
 
 WEAKER = entries()

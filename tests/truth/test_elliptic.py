@@ -61,7 +61,6 @@ def test_digits_hold_over_many_flips() -> None:
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("moments", [(6.0, 5.0, 2.0), (5.0, 6.0, 2.0), (3.0, 0.7, 2.9)])
 def test_steady_rotation_is_constant(moments: Triple, axis: int) -> None:
-    """A steady rotation about the middle axis is unstable, but its exact solution is constant."""
     for size in (1.0, -0.3):
         omega = [0.0, 0.0, 0.0]
         omega[axis] = size

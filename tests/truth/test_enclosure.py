@@ -10,15 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import (
-    ChangingInertia,
-    ChangingMoments,
-    InputError,
-    Scene,
-    TorqueLaw,
-    case_scene,
-    principal,
-)
+from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, principal
+from pyharness.model.errors import InputError
 from pyharness.model.state_torque import of_law
 from pyharness.scenes import state_scenes
 from pyharness.scenes.random_scenes import random_scene

@@ -131,7 +131,6 @@ def test_two_times_compose(moments: Triple, signs: Triple) -> None:
     "omega", [(1e-3, 1.0, 1e-3), (-1e-3, 1.0, 1e-3), (1e-3, -1.0, 1e-3), (-1e-3, -1.0, -1e-3)]
 )
 def test_separatrix(omega: Triple) -> None:
-    """The motion approaches the middle axis, with a limit that energy and momentum determine."""
     scene = Scene("", omega, moments=(6.0, 5.0, 2.0), attitude=ATTITUDE)
     for end in (-9.0, 0.0, 12.5):
         row = enclosed(scene, end, 5, attitude=True)

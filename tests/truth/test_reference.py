@@ -125,7 +125,6 @@ def test_torque_free_top_agrees_with_jacobis_elliptic_functions(
 
 @pytest.mark.campaign
 def test_case_7_agrees_with_mpmaths_own_integrator_to_25_digits() -> None:
-    """Test a torque that varies."""
     scene = case_scene(7)
     found = reference(scene, [0.05], precise=True)
     with mpmath.workdps(32):

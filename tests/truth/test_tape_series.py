@@ -134,7 +134,6 @@ def test_all_operations_are_tested() -> None:
 
 @pytest.mark.campaign
 def test_the_less_precise_series_states_its_error() -> None:
-    """The series of 20 and 24 terms has an estimate that bounds its true error."""
     scene = Scene("", _OMEGA, _MOMENTS, torque=_torque(_pointing), attitude=_ATTITUDE)
     times = [1.0, 20.0]
     quick, precise = reference(scene, times), reference(scene, times, precise=True)

@@ -13,6 +13,7 @@ from pyharness.cli.main import main
 from pyharness.edition import site
 from pyharness.edition.libraries import LIBRARIES
 from pyharness.edition.report import MARK
+from tests.ensembles.sweeps import files
 
 Capture = pytest.CaptureFixture[str]
 LISTED = {"schema": 1, "files": {"index.html": 3, "docs/a.html": 1, "docs/old.html": 2}}
@@ -25,20 +26,19 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(site, "build_site", lambda progress, docs: FILES)
 
 
-def _there(folder: Path) -> dict[str, bytes]:
-    files = [each for each in folder.rglob("*") if each.is_file()]
-    return {each.relative_to(folder).as_posix(): each.read_bytes() for each in files}
+def edition(folder: Path | str, *more: str) -> int:
+    return main(["edition", "--out", str(folder), *more])
 
 
 @pytest.mark.usefixtures("quick")
 def test_a_folder_is_made_and_made_anew(tmp_path: Path, capsys: Capture) -> None:
     folder = tmp_path / "site"
-    assert main(["edition", "--out", str(folder)]) == 0
-    assert _there(folder) == FILES
+    assert edition(folder) == 0
+    assert files(folder) == FILES
     assert f"Open {folder}/index.html" in capsys.readouterr().out
     (folder / "docs/old.html").write_bytes(b"of before")  # listed, but no longer part of the site
-    assert main(["edition", "--out", str(folder), "--format", "json"]) == 0
-    assert _there(folder) == FILES
+    assert edition(folder, "--format", "json") == 0
+    assert files(folder) == FILES
     assert json.loads(capsys.readouterr().out)["files"]["docs/a.html"] == 1
     assert [each.name for each in tmp_path.iterdir()] == ["site"]
 
@@ -48,9 +48,9 @@ def test_an_empty_folder_and_a_link_to_one_will_do(tmp_path: Path) -> None:
     folder, link = tmp_path / "site", tmp_path / "link"
     folder.mkdir()
     link.symlink_to(folder)
-    assert main(["edition", "--out", str(link)]) == 0
+    assert edition(link) == 0
     assert link.is_symlink()
-    assert _there(folder) == FILES
+    assert files(folder) == FILES
 
 
 @pytest.mark.usefixtures("quick")
@@ -62,18 +62,18 @@ def test_a_folder_of_others_is_left_alone(
     (tmp_path / "docs/thesis.txt").write_bytes(b"mine")
     if mark is not None:
         (tmp_path / MARK).write_bytes(mark)
-    before = _there(tmp_path)
-    assert main(["edition", "--out", str(tmp_path)]) == 2
+    before = files(tmp_path)
+    assert edition(tmp_path) == 2
     assert "'docs/thesis.txt'" in capsys.readouterr().err
-    assert _there(tmp_path) == before
+    assert files(tmp_path) == before
 
 
 @pytest.mark.usefixtures("quick")
 def test_what_was_added_to_the_pages_is_left_alone(tmp_path: Path, capsys: Capture) -> None:
     folder = tmp_path / "site"
-    assert main(["edition", "--out", str(folder)]) == 0
+    assert edition(folder) == 0
     (folder / "CNAME").symlink_to("nowhere")
-    assert main(["edition", "--out", str(folder)]) == 2
+    assert edition(folder) == 2
     assert "'CNAME'" in capsys.readouterr().err
     assert (folder / "CNAME").is_symlink()
 
@@ -85,7 +85,7 @@ def test_the_folder_that_one_is_in_stays(
 ) -> None:
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    assert main(["edition", "--out", where]) == 2
+    assert edition(where) == 2
     assert f"'{where}'" in capsys.readouterr().err
 
 
@@ -95,9 +95,9 @@ def test_what_fails_leaves_all_as_it_was(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
     folder = tmp_path / "site"
-    assert main(["edition", "--out", str(folder)]) == 0
+    assert edition(folder) == 0
     (folder / "index.html").write_bytes(b"of before")
-    before = _there(folder)
+    before = files(folder)
     calls = []
 
     def full(*arguments: Any) -> None:
@@ -109,9 +109,9 @@ def test_what_fails_leaves_all_as_it_was(
     target: Any = Path if broken == "write_bytes" else os
     real = getattr(target, broken)
     monkeypatch.setattr(target, broken, full)
-    assert main(["edition", "--out", str(folder)]) == 2
+    assert edition(folder) == 2
     assert "No space left on device" in capsys.readouterr().err
-    assert _there(folder) == before
+    assert files(folder) == before
     assert [each.name for each in tmp_path.iterdir()] == ["site"]
 
 
@@ -120,7 +120,7 @@ def test_without_the_documents_it_says_where_they_are(
 ) -> None:
     """An installed package has no documents, and the files beside it belong to other packages."""
     monkeypatch.setattr("pyharness.edition.documents.shipped", lambda _: tmp_path)
-    assert main(["edition", "--out", str(tmp_path / "site")]) == 2
+    assert edition(tmp_path / "site") == 2
     assert "--docs" in capsys.readouterr().err
     assert not (tmp_path / "site").exists()
 
@@ -132,7 +132,7 @@ def test_what_writes_pages_may_be_missing(
     for module in [each for each in sys.modules if each.startswith("pyharness.edition")]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, name, None)  # importing it fails
-    assert main(["edition", "--out", str(tmp_path / "site")]) == 2
+    assert edition(tmp_path / "site") == 2
     assert name in capsys.readouterr().err
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -54,15 +55,14 @@ LOST = {
 }
 
 
+def python(*arguments: str, **more: Any) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **more)
+
+
 def run_script(body: str) -> "subprocess.CompletedProcess[str]":
     with hearing():
-        return subprocess.run(
-            [sys.executable, "-c", SCRIPT.format(body=body)],
-            capture_output=True,
-            text=True,
-            timeout=60.0,
-            check=False,
-        )
+        return python("-c", SCRIPT.format(body=body), timeout=60.0)
 
 
 @pytest.mark.parametrize("name", LOST)
@@ -92,12 +92,8 @@ def test_third_interrupt_waits_for_nothing() -> None:
 
 def test_interrupt_that_the_caller_ignores_stays_ignored() -> None:
     deaf = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
-    script = SCRIPT.format(body="interrupt(); return 0")
-    found = subprocess.run(
-        [sys.executable, "-c", deaf + "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])",
-         "-c", script],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    deaf += "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+    found = python("-c", deaf, "-c", SCRIPT.format(body="interrupt(); return 0"))
     assert (found.stdout, found.stderr) == ("code 0\n", "")
 
 
@@ -114,9 +110,7 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
         "next(executors._by_pool(None, [], 1))"
     )
     # The resource tracker keeps the streams open, so that its last message is captured too.
-    found = subprocess.run(
-        [sys.executable, "-u", "-c", script], capture_output=True, text=True, check=False
-    )
+    found = python("-u", "-c", script)
     assert (found.returncode, found.stderr) == (130, "")
     assert not Path(f"/dev/shm/sem.{found.stdout.strip().removeprefix('/')}").exists()
 
@@ -142,13 +136,10 @@ def test_interrupt_during_an_import_ends_in_a_line(module: str) -> None:
     """Without -S, the interpreter itself imports the first two modules for an editable install."""
     bare = ["-S"] if module in {"typing", "enum"} else []
     with hearing():
-        found = subprocess.run(
-            [sys.executable, *bare, "-c", IMPORTS, module, "compare", "--case", "3"],
+        found = python(
+            *bare, "-c", IMPORTS, module, "compare", "--case", "3",
             env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]) if bare else ""},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        )  # fmt: skip
     assert (found.returncode, found.stdout) == (130, "")
     assert found.stderr == "pyharness: interrupted\n"
 
@@ -168,10 +159,8 @@ def test_workers_end_with_the_process_that_started_them(executor: str, tmp_path:
     command = ["sweep", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "store")]
     process = subprocess.Popen(
         [sys.executable, "-m", "pyharness", *command, "--executor", executor, "--workers", "2"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
     try:
         end = time.monotonic() + 120.0
         while not (tmp_path / "store" / "checksums" / "c").exists():

@@ -17,6 +17,7 @@ from pyharness.dynamics.scene_reader import SCENE_TABLES as TABLES
 from pyharness.dynamics.scene_reader import scene_of
 from pyharness.dynamics.term_file import KINDS
 from pyharness.model.facts import facts_folder
+from tests.conftest import Printed
 
 ROOT = Path(__file__).parent.parent.parent
 SCHEMA = json.loads((facts_folder() / "scene.schema.json").read_text())
@@ -28,14 +29,9 @@ FILES = [
 VALIDATOR = Draft202012Validator(SCHEMA)
 
 
-def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(["scene", *arguments]) == 0
-    return capsys.readouterr().out
-
-
-def test_a_new_scene_file_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_scene_file_is_read(tmp_path: Path, printed: Printed) -> None:
     path = tmp_path / "brick.toml"
-    printed(capsys, "new", "--out", str(path))
+    printed(f"scene new --out {path}")
     assert read_scene(path).moments == (40.0, 30.0, 20.0)
     assert VALIDATOR.is_valid(tomllib.loads(path.read_text()))
     # The line of comment shows an expression that may replace the law.
@@ -46,26 +42,28 @@ def test_a_new_scene_file_is_read(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert VALIDATOR.is_valid(tomllib.loads(other))
     assert scene_of(tomllib.loads(other), "x").torque.needs_attitude
     path = tmp_path / "case-3.toml"
-    printed(capsys, "new", "--case", "3", "--out", str(path))
+    printed(f"scene new --case 3 --out {path}")
     assert read_scene(path).omega == case_scene(3).omega
 
 
-def test_check_describes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = printed(capsys, "check", str(ROOT / "docs" / "satellite.toml"))
+def test_check_describes_a_scene(
+    tmp_path: Path, printed: Printed, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = printed(f"scene check {ROOT}/docs/satellite.toml")
     assert "gravity gradient + wheels + damping" in found
     assert max(map(len, found.splitlines())) <= 100
-    record = json.loads(printed(capsys, "check", str(FILES[0]), "--format", "json"))
+    record = json.loads(printed(f"scene check {FILES[0]} --format json"))
     assert record["scene"]["name"] == read_scene(FILES[0]).name
     path = tmp_path / "long.toml"
     path.write_text(
-        "[body]\nmoments = [1, 2, 3]\n[initial]\nomega = [1, 2, 3]\nattitude = [2, 0, 0, 0]\n"
+        "body.moments = [1, 2, 3]\ninitial = { omega = [1, 2, 3], attitude = [2, 0, 0, 0] }\n"
     )
     assert main(["scene", "check", str(path)]) == 0
     assert "the attitude has the norm 2" in capsys.readouterr().err
 
 
-def test_the_schema_is_printed_and_is_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert json.loads(printed(capsys, "schema")) == SCHEMA
+def test_the_schema_is_printed_and_is_one(printed: Printed) -> None:
+    assert json.loads(printed("scene schema")) == SCHEMA
     VALIDATOR.check_schema(SCHEMA)
 
 

@@ -1,4 +1,4 @@
-"""Every verb with a scene whose torque depends on the state: it works, or is refused."""
+"""Verbs with a scene whose torque depends on the state, or whose moments change with time."""
 
 import json
 import re
@@ -11,22 +11,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
-from pyharness import (
-    InputError,
-    Scene,
-    StateTorque,
-    case_scene,
-    prepare,
-    principal,
-    read_scene,
-    solve,
-    solve_many,
-)
+from pyharness import ChangingMoments, Scene, StateTorque, prepare, principal, solve_many
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
+from pyharness.dynamics.scene_reader import read_scene
 from pyharness.methods.registry import METHODS
+from pyharness.methods.solve import solve
+from pyharness.model.errors import InputError
 from pyharness.model.expressions import parsed
+from pyharness.model.scene_file import case_scene
+from tests.conftest import Printed
+from tests.json_reference import schema_of
 from tests.refusals.test_refusals import COMMANDS
 
 DAMPED = """\
@@ -42,6 +39,19 @@ constants = { k = 0.1 }
 step_size = 0.01
 steps = 5
 """
+BOOMS = """\
+name = "booms"
+body.moments = [[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]]
+initial.omega = [0.1, 1.0, 1.0]
+initial.attitude = [1.0, 0.0, 0.0, 0.0]
+run = { step_size = 0.5, steps = 4 }
+"""
+MOMENTS = ChangingMoments([[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]])
+# What a run shows of each scene.
+SHOWN = {
+    "damped": "-k*w2 + 0.1*w1*w3",
+    "booms": "I = (40 + 1.5 t - 0.25 t^2, 30 + 0.5 t, 20) kg m2",
+}
 TERMS = """\
 [[torque.terms]]
 kind = "wheels"
@@ -51,11 +61,11 @@ motor = { rate = [0.0, 0.0, 0.5] }
 """
 
 
-@pytest.fixture
-def damped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scene:
+@pytest.fixture(autouse=True)
+def _scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("damped.toml").write_text(DAMPED)
-    return read_scene("damped.toml")
+    Path("booms.toml").write_text(BOOMS)
 
 
 @pytest.mark.parametrize(
@@ -69,49 +79,45 @@ def test_every_verb_with_a_scene_is_tried(scene: str, takers: set[str]) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.usefixtures("damped")
-def test_methods_and_their_plan_take_a_torque_that_depends_on_the_state(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    for method in ("auto", "taylor", "dop853", "reference"):
-        assert main(["run", "--scene", "damped.toml", "--method", method]) == 0
-        assert "complete" in capsys.readouterr().out
-    assert main(shlex.split("stress --scene damped.toml --only threads,length/auto")) == 0
-    assert "all well" in capsys.readouterr().out
-    assert main(["plan", "--scene", "damped.toml"]) == 0
-    assert "its torque depends on the state" in capsys.readouterr().out
+def test_stress_takes_a_torque_that_depends_on_the_state(printed: Printed) -> None:
+    assert "all well" in printed("stress --scene damped.toml --only threads,length/auto")
 
 
-@pytest.mark.usefixtures("damped")
-def test_law_in_expressions_gives_the_output_of_the_law(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_names_the_reason_of_an_integration(printed: Printed) -> None:
+    assert "its torque depends on the state" in printed("plan --scene damped.toml")
+    record = json.loads(printed("plan --scene booms.toml --format json"))
+    Draft202012Validator(schema_of("plan")).validate(record)
+    text = printed("plan --scene booms.toml --tolerance 1e-3")
+    assert re.search(r"integration +yes +its inertia changes with time", text)
+    assert "method: taylor" in text
+
+
+def test_json_has_the_polynomials(printed: Printed) -> None:
+    record = json.loads(printed("run --scene booms.toml --method auto --times 2 --format json"))
+    Draft202012Validator(schema_of("run")).validate(record)
+    assert record["scene"]["body"] == {"moments": [[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]]}
+    found = solve(Scene("booms", (0.1, 1.0, 1.0), moments=MOMENTS), 2.0)
+    assert record["trajectory"]["omega"] == found.omega.tolist()
+
+
+def test_law_in_expressions_gives_the_output_of_the_law(printed: Printed) -> None:
     head, _, rest = DAMPED.partition("expression")
     tail = rest[rest.index("[run]") :]
-    Path("law.toml").write_text(f"{head}constant = [1.0, 0.0, 0.0]\nrate = [0.0, 2.0, 0.0]\n{tail}")
-    Path("text.toml").write_text(f'{head}expression = ["sqrt(1)", "2*t", "w1 - w1"]\n{tail}')
+    names = "law.toml", "text.toml"
+    Path(names[0]).write_text(f"{head}constant = [1.0, 0.0, 0.0]\nrate = [0.0, 2.0, 0.0]\n{tail}")
+    Path(names[1]).write_text(f'{head}expression = ["sqrt(1)", "2*t", "w1 - w1"]\n{tail}')
     for command in (
-        "run --program two-term",
-        "run --method auto",
-        "plan",
-        "compare --program four-term",
-    ):
-        verb, _, options = command.partition(" ")
-        shown = []
-        for name in ("law", "text"):
-            status = main(shlex.split(f"{verb} --scene {name}.toml {options} --format json"))
-            assert status == 0
-            shown.append(capsys.readouterr().out)
-        assert _without_times(shown[0]) == _without_times(shown[1])
-
-
-def _without_times(text: str) -> list[str]:
-    return [line for line in text.splitlines() if '"seconds' not in line]
+        "run --program two-term", "run --method auto", "plan", "compare --program four-term",
+    ):  # fmt: skip
+        shown = [printed(f"{command} --scene {name} --format json") for name in names]
+        law, text = ([x for x in each.splitlines() if '"seconds' not in x] for each in shown)
+        assert law == text
 
 
 def _solved(method: str, scene: Scene) -> Any:
     return solve(scene, 1.0, method).omega[-1]
 
 
-DECAY = ["-0.2*w1", "-0.2*w2", "-0.2*w3"]
 SOLVERS: dict[str, Callable[[Scene], Any]] = {
     "solve": lambda scene: solve(scene, 1.0).omega[-1],
     "attitude": lambda scene: solve(scene, 1.0, attitude=True).omega[-1],
@@ -131,8 +137,8 @@ def test_method_solves_a_damped_sphere_or_refuses_it(solver: str, body: str) -> 
     bodies: dict[str, Any] = {
         "moments": (2, 2, 2), "inertia": np.diag([2.0, 2.0, 2.0]), "coefficients": (0, 0, 0),
     }  # fmt: skip
-    texts = DECAY if body != "coefficients" else [text.replace("0.2", "0.1") for text in DECAY]
-    torque = parsed(texts, {})
+    k = 0.1 if body == "coefficients" else 0.2
+    torque = parsed(["-k*w1", "-k*w2", "-k*w3"], {"k": k})
     scene = Scene("sphere", (1.0, 2.0, 3.0), torque=torque, **{body: bodies[body]})
     start = np.array(scene.omega)
     try:
@@ -152,39 +158,35 @@ def test_the_same_calls_solve_a_sphere_without_torque(solver: str) -> None:
     assert np.ravel(SOLVERS[solver](scene)) == pytest.approx(np.array(scene.omega))
 
 
-@pytest.mark.usefixtures("damped")
+@pytest.mark.parametrize("scene", SHOWN)
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("options", ["", "--attitude quaternion", "--times 1,2 --format json"])
-def test_run_with_a_method_shows_the_torque_or_refuses_it(
-    method: str, options: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("options", ["", "--attitude quaternion"])
+def test_run_with_a_method_shows_the_scene_or_refuses_it(
+    scene: str, method: str, options: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status = main(shlex.split(f"run --scene damped.toml --method {method} {options}"))
-    captured = capsys.readouterr()
-    if status == 0:
-        assert "-k*w2 + 0.1*w1*w3" in captured.out
+    status = main(shlex.split(f"run --scene {scene}.toml --method {method} {options}"))
+    captured, chosen = capsys.readouterr(), METHODS[method]
+    if chosen.state_torque and (chosen.attitude or not options):
+        assert status == 0
+        assert SHOWN[scene] in captured.out
     else:
-        assert status == 2
-        assert captured.out == ""
-        assert captured.err.startswith("pyharness: ")
+        assert (status, captured.out) == (2, "")
+        assert re.match(f"pyharness: .*{method}[: ]", captured.err)
         assert captured.err.count("\n") == 1
 
 
-@pytest.mark.usefixtures("damped")
 @pytest.mark.parametrize("options", ["", "--attitude quaternion", "--times 0.05 --format json"])
-def test_run_with_ready_terms_shows_them(options: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_with_ready_terms_shows_them(options: str, printed: Printed) -> None:
     Path("terms.toml").write_text(DAMPED.replace("[run]\n", TERMS))
-    rows = []
-    for name in ("damped", "terms"):
-        assert main(shlex.split(f"run --scene {name}.toml --method auto {options}")) == 0
-        rows.append(capsys.readouterr().out)
+    names = "damped.toml", "terms.toml"
+    rows = [printed(f"run --scene {name} --method auto {options}") for name in names]
     assert ('"kind": "wheels"' in rows[1]) if "json" in options else ("+ wheels;" in rows[1])
     assert "wheels" not in rows[0]
-    ends = [solve(read_scene(f"{name}.toml"), 0.05).omega[-1] for name in ("damped", "terms")]
+    ends = [solve(read_scene(name), 0.05).omega[-1] for name in names]
     assert np.abs(ends[0] - ends[1]).max() > 1e-6
 
 
 def test_principal_scene_has_the_torque_in_principal_axes() -> None:
-    """A point of the motion has the same torque in space in both scenes."""
     matrix = [[3.0, 0.1, 0.0], [0.1, 4.0, 0.2], [0.0, 0.2, 5.0]]
     torque = parsed(["-0.1*w1 + q1", "w1*w3", "0.5*q0*q0"], {})
     scene = Scene("full", (1, 2, 3), inertia=matrix, torque=torque, attitude=(0.8, 0, 0.6, 0))
@@ -198,16 +200,12 @@ def test_principal_scene_has_the_torque_in_principal_axes() -> None:
     assert axes @ np.array(new) == pytest.approx(np.array(old), abs=1e-14)
 
 
-@pytest.mark.usefixtures("damped")
-def test_sweep_solves_by_a_method(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    axis = '[[axis]]\nfield = "omega.1"\nvalues = [0.1, 2.0]\n'
-    scene = '[scene]\nfile = "damped.toml"\n'
-    sweep = f'reductions = ["end"]\n{scene}[solve]\nt_end = 1.0\n{axis}'
-    Path("sweep.toml").write_text(sweep)
-    assert main(["sweep", "sweep.toml", "--out", "store", "--format", "json"]) == 0
-    shown = json.loads(capsys.readouterr().out)["reductions"]
+def test_sweep_solves_by_a_method(printed: Printed) -> None:
+    Path("sweep.toml").write_text(
+        'reductions = ["end"]\nscene.file = "damped.toml"\nsolve.t_end = 1.0\n'
+        'axis = [{ field = "omega.1", values = [0.1, 2.0] }]\n'
+    )
+    shown = json.loads(printed("sweep sweep.toml --out store --format json"))["reductions"]
     ends = [solve(replace(read_scene("damped.toml"), omega=(x, 1, 1)), 1.0) for x in (0.1, 2.0)]
     lower, upper = np.sort([each.omega[0] for each in ends], axis=0)
     assert [each["least"] for each in shown] == pytest.approx(lower.tolist(), abs=1e-11)

@@ -2,9 +2,10 @@
 
 import time
 from pathlib import Path
+from typing import Any
 
 from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.sweep import Arrays, Sweep
+from pyharness.ensembles.sweep import Arrays, Sweep, points
 
 BASE = """
 [scene.body]
@@ -45,6 +46,16 @@ seed = 4
 field = "step_size"
 values = [0.01, 0.02]
 """
+
+
+def every(sweep: Sweep) -> list[Any]:
+    """Return the places of all scenes."""
+    return points(tuple(slice(0, n) for n in sweep.shape))
+
+
+def axis(field: str, values: object) -> str:
+    """Return a table [[axis]] with these values."""
+    return f'[[axis]]\nfield = "{field}"\nvalues = {values}\n'
 
 
 def text(*axes: str, top: str = 'reductions = ["end", "status"]', scene: str = BASE) -> str:

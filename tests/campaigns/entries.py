@@ -1,18 +1,18 @@
 """The entry points that solve a scene by the series, and the true motion in 30 digits."""
 
 import decimal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
 import numpy as np
 
-from pyharness import ChangingInertia, Scene, prepare, solve, solve_many
+from pyharness import ChangingInertia, InputError, Scene, prepare, solve, solve_many
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.state_torque import of_law
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.reference import exact_coefficients
 
@@ -88,35 +88,51 @@ class Result:
     last_only: bool
 
 
+_ready: Any = prepare
+
+
 def results(scene: Scene, times: list[float], tolerance: float) -> Iterator[Result]:
-    """Yield the results of every entry point; with the attitude if the scene has one."""
+    """Yield the results of every entry point; with the attitude if the scene has one.
+
+    A refusal has no rows, and `ended` begins with "refused".
+    """
+    for entry, solved in ENTRIES.items():
+        try:
+            yield solved(entry, scene, times, tolerance)
+        except InputError as refusal:
+            none = np.zeros((0, 3))
+            yield Result(entry, none, None, f"refused: {refusal}", None, None, False)
+
+
+def _rows(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
     turning = scene.attitude is not None
+    if entry == "trajectory":
+        ready = _ready(scene, tolerance=tolerance, attitude=turning)
+        found = ready.trajectory(scene.omega, times)
+    else:
+        found = solve(scene, times, entry.split()[1], tolerance, attitude=turning)
+    values = found.omega, found.attitude, found.ended, found.error, found.growth
+    return Result(entry, *values, last_only=False)
 
-    def of(entry: str, found: Trajectory) -> Result:
-        values = found.omega, found.attitude, found.ended, found.error, found.growth
-        return Result(entry, *values, last_only=False)
 
-    for method in ("auto", "taylor"):
-        found = solve(scene, times, method, tolerance, attitude=turning)
-        yield of(f"solve {method}", found)
-    end: Any = times[-1]
-    for method in ("auto", "taylor"):
-        ready: Any = prepare(scene, method, tolerance, attitude=turning)
-        if turning:
-            omega, attitude = ready(scene.omega, end, scene.attitude)
-        else:
-            omega, attitude = ready(scene.omega, end), None
-        yield _row(f"prepare {method}", omega, attitude, ready.status, ready.error, ready.growth)
-    yield of(
-        "prepare, trajectory",
-        prepare(scene, tolerance=tolerance, attitude=turning).trajectory(scene.omega, times),
-    )
-    starts = [scene.omega, tuple(0.5 * w for w in scene.omega)]
-    many = solve_many(scene, end, omega0=starts, tolerance=tolerance)
-    several = solve_many([scene, scene], end, tolerance=tolerance)
-    for entry, each in (("solve_many", many), ("solve_many of scenes", several)):
-        turned = None if each.attitude is None else each.attitude[0]
-        yield _row(entry, each.omega[0], turned, str(each.ended[0]), None, found.growth)
+def _prepared(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
+    turning = scene.attitude is not None
+    ready = _ready(scene, entry.split()[1], tolerance, attitude=turning)
+    start = [scene.omega, times[-1], *([scene.attitude] if turning else [])]
+    omega, attitude = ready(*start) if turning else (ready(*start), None)
+    return _row(entry, omega, attitude, ready.status, ready.error, ready.growth)
+
+
+def _many(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
+    if entry == "solve_many":
+        starts = [scene.omega, tuple(0.5 * w for w in scene.omega)]
+        found = solve_many(scene, times[-1], omega0=starts, tolerance=tolerance)
+    else:
+        found = solve_many([scene, scene], times[-1], tolerance=tolerance)
+    turned = None if found.attitude is None else found.attitude[0]
+    # The amplification is reported by `solve` alone.
+    growth = _rows("solve taylor", scene, times[-1:], tolerance).growth
+    return _row(entry, found.omega[0], turned, str(found.ended[0]), None, growth)
 
 
 def _row(
@@ -131,3 +147,10 @@ def _row(
     count = 1 if np.isfinite(omega).all() else 0
     turned = None if attitude is None else attitude[None][:count]
     return Result(entry, omega[None][:count], turned, ended, estimate, growth, True)
+
+
+ENTRIES: dict[str, Callable[[str, Scene, list[float], float], Result]] = {
+    **dict.fromkeys(("solve taylor", "solve auto", "trajectory"), _rows),
+    **dict.fromkeys(("prepare taylor", "prepare auto"), _prepared),
+    **dict.fromkeys(("solve_many", "solve_many of scenes"), _many),
+}

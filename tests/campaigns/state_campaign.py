@@ -44,7 +44,7 @@ _FLOOR = 1e-15  # error that rounding of the result alone may cause
 
 def judge(tally: Tally, truth: Truth, result: Result, tolerance: float, scene: Scene) -> None:
     """Compare a result with the reference, and count it."""
-    if result.ended in ("gave up", "refused"):
+    if result.ended == "gave up" or result.ended.startswith("refused"):
         tally.counts["refused"] += 1
         return
     complete = len(truth.omega) == len(truth.times)
@@ -98,11 +98,8 @@ def try_scene(tally: Tally) -> None:
         variants.append(replace(scene, attitude=None))
     for variant in variants:
         for tolerance in TOLERANCES:
-            try:
-                for result in results(variant, times, tolerance):
-                    judge(tally, truth, result, tolerance, variant)
-            except InputError:
-                tally.counts["refused"] += 1
+            for result in results(variant, times, tolerance):
+                judge(tally, truth, result, tolerance, variant)
     if tally.number // 2 % _EVERY == 0:
         _try_scipy(tally, scene, truth, source)
 

@@ -48,7 +48,9 @@ def test_a_wrong_result_is_reported(
     monkeypatch.setattr(entries, "_row", wrong)
     assert main(["1", "test", "3"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("python -m tests.campaigns.state_campaign 1 test 3: prepare auto: ")
+    assert lines[0].startswith(
+        "python -m tests.campaigns.state_campaign 1 test 3: prepare taylor: "
+    )
     assert any("tolerance 0.0001" in line for line in lines)
     assert not any("tolerance 0.001," in line for line in lines)
 
@@ -64,10 +66,10 @@ def test_missing_rows_are_reported() -> None:
     scene, time = draw_ready(Random("rows"))
     truth = truth_of(scene, [0.1 * time])
     result = Result("solve", truth.omega[:0], None, "overflow", None, 1.0, False)
-    tally = Tally("module", "seed", 7)
+    tally = Tally("again {seed} {number}", "seed", 7)
     judge(tally, truth, result, 1e-6, scene)
     (fault,) = tally.faults
-    assert fault.startswith("python -m module 1 seed 7: solve: 0 rows instead of 1, tolerance 1e-0")
+    assert fault.startswith("again seed 7: solve: 0 rows instead of 1, tolerance 1e-0")
 
 
 @pytest.mark.campaign

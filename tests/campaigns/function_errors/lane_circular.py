@@ -5,14 +5,15 @@ arithmetic, and a bound of the error by rounding. A product is counted as rounde
 also holds where a compiler fuses a product and a sum, since then one of the roundings is omitted.
 """
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from tests.campaigns.function_errors.nearness import half_pi, least_distance
+from flint import fmpq, fmpq_poly
+
+from tests.campaigns.function_errors.nearness import exponent, half_pi, least_distance
 from tests.campaigns.function_errors.sources import expressions, fortran_numbers
 
 DIGITS = 53
@@ -32,17 +33,7 @@ _REDUCTION = [
 
 def half_unit(size: Fraction) -> Fraction:
     """Return the largest rounding error of a result of at most this size, without underflow."""
-    if not size:
-        return Fraction(0)
-    return Fraction(2) ** (_exponent(size) - DIGITS - 1)
-
-
-def _exponent(size: Fraction) -> int:
-    """Return the least n with size <= 2**n."""
-    n = size.numerator.bit_length() - size.denominator.bit_length() - 1
-    while size > Fraction(2) ** n:
-        n += 1
-    return n
+    return Fraction(2) ** (exponent(size) - DIGITS - 1) if size else Fraction(0)
 
 
 @dataclass(frozen=True)
@@ -102,30 +93,6 @@ def _units(x: Fraction, up: bool) -> int:
     return math.ceil(scaled) if up else math.floor(scaled)
 
 
-@dataclass(frozen=True)
-class Polynomial:
-    """A polynomial in x in exact arithmetic, by its coefficients from the power 0 on."""
-
-    coefficients: tuple[Fraction, ...]
-
-    def __add__(self, other: "Polynomial") -> "Polynomial":
-        """Return the sum."""
-        pairs = itertools.zip_longest(self.coefficients, other.coefficients, fillvalue=Fraction(0))
-        return Polynomial(tuple(x + y for x, y in pairs))
-
-    def __sub__(self, other: "Polynomial") -> "Polynomial":
-        """Return the difference."""
-        return self + Polynomial(tuple(-x for x in other.coefficients))
-
-    def __mul__(self, other: "Polynomial") -> "Polynomial":
-        """Return the product."""
-        found = [Fraction(0)] * (len(self.coefficients) + len(other.coefficients) - 1)
-        for n, x in enumerate(self.coefficients):
-            for k, y in enumerate(other.coefficients):
-                found[n + k] += x * y
-        return Polynomial(tuple(found))
-
-
 def constants(text: str) -> dict[str, Any]:
     """Return the constants of the kernel by name, as exact fractions."""
     names = ("ROUNDS", "QUARTERS", "HALF_PI", "HALF_PI_LOW")
@@ -175,7 +142,7 @@ def reduction(known: dict[str, Any]) -> Reduction:
     if widest >= 1:
         raise ValueError("the reduced angle may exceed 1")
     error = most * missing + half_unit(most * second)
-    exponents = range(0, _exponent(LIMIT) + 1)
+    exponents = range(0, exponent(LIMIT) + 1)
     return Reduction(widest + error, error, min(least_distance(DIGITS, n) for n in exponents))
 
 
@@ -198,8 +165,7 @@ def bound(text: str) -> Bound:
     known = constants(text)
     reduced = reduction(known)
     _, polynomials = statements(text)
-    scope: dict[str, Any] = {each: _call([None, *map(_exact, known[each])]) for each in "SC"}
-    scope["number"] = lambda literal: _exact(Fraction(literal))
+    scope = _scope(known, _exact)
     differences = _differences(polynomials, known)
     worst = {"s_": Fraction(0), "c_": Fraction(0)}
     width = Fraction(_units(reduced.widest, True) // _PIECES + 1, 2**_GRID)
@@ -226,24 +192,25 @@ def _call(values: list[Any]) -> Callable[[int], Any]:
     return lambda n: values[n]
 
 
+def _scope(known: dict[str, Any], constant: Callable[[Fraction], Any]) -> dict[str, Any]:
+    """Return the names of the polynomials' statements, for numbers of a kind."""
+    scope: dict[str, Any] = {each: _call([None, *map(constant, known[each])]) for each in "SC"}
+    return scope | {"number": lambda literal: constant(Fraction(literal))}
+
+
 def _differences(polynomials: Statements, known: dict[str, Any]) -> dict[str, list[int]]:
     """Return the coefficients of s_ and c_ minus those of Taylor polynomials, to a unit each."""
-
-    def constant(x: Fraction) -> Polynomial:
-        return Polynomial((x,))
-
-    scope: dict[str, Any] = {each: _call([None, *map(constant, known[each])]) for each in "SC"}
-    scope |= {"number": lambda literal: constant(Fraction(literal))}
-    scope |= {"x": Polynomial((Fraction(0), Fraction(1)))}
+    scope = _scope(known, lambda x: fmpq_poly([fmpq(x.numerator, x.denominator)]))
+    scope["x"] = fmpq_poly([0, 1])
     for name, code in polynomials:
         scope[name] = eval(code, {}, scope)
     found = {}
     for name, odd in (("s_", 1), ("c_", 0)):
-        taylor = [Fraction(0)] * (2 * _TERMS)
+        taylor = [fmpq(0)] * (2 * _TERMS)
         for k in range(_TERMS):
-            taylor[2 * k + odd] = Fraction((-1) ** k, math.factorial(2 * k + odd))
-        difference = scope[name] - Polynomial(tuple(taylor))
-        found[name] = [_units(x, False) for x in difference.coefficients]
+            taylor[2 * k + odd] = fmpq((-1) ** k, math.factorial(2 * k + odd))
+        difference = (scope[name] - fmpq_poly(taylor)).coeffs()
+        found[name] = [_units(Fraction(int(x.p), int(x.q)), False) for x in difference]
     return found
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import mpmath
 import numpy as np
+from mpmath import libmp
 from numpy.typing import NDArray
 
 from pyharness.model.codes import Waves
@@ -28,7 +29,6 @@ from tests.campaigns.function_errors.sources import (
     WIDE,
     WORD_PAIRS,
     Pair,
-    rounded,
 )
 from tests.instruction_sets import fuses_here
 
@@ -167,34 +167,6 @@ def longer_product_error(count: int, seed: int = 1) -> float:
     return float(worst * 2**159)
 
 
-class Wide:
-    """A number of binary128, as an exact fraction."""
-
-    def __init__(self, value: Any) -> None:
-        """Store the nearest number."""
-        self.value = rounded(Fraction(value), 113)
-
-    def __add__(self, other: "Wide") -> "Wide":
-        """Return the rounded sum."""
-        return Wide(self.value + other.value)
-
-    def __sub__(self, other: "Wide") -> "Wide":
-        """Return the rounded difference."""
-        return Wide(self.value - other.value)
-
-    def __mul__(self, other: "Wide") -> "Wide":
-        """Return the rounded product."""
-        return Wide(self.value * other.value)
-
-    def __rmul__(self, other: float) -> "Wide":
-        """Return the rounded product with a constant."""
-        return Wide(Fraction(other) * self.value)
-
-    def __neg__(self) -> "Wide":
-        """Return the negative."""
-        return Wide(-self.value)
-
-
 def reduction_error(method: Method, angle: Fraction) -> Fraction:
     """Return the relative error of the reduced angle of binary128, by the operations of its source.
 
@@ -202,13 +174,18 @@ def reduction_error(method: Method, angle: Fraction) -> Fraction:
     """
     own = pair_operations.routines(113)[WIDE]
     turns = round(angle / half_pi()[0])
-    rest = Pair(Wide(angle), Wide(0))
-    for each in method.parts:
-        part = own["product_of"](Wide(turns), Wide(each))
-        rest = own["sum_of_pairs"](rest, Pair(-part.high, -part.low))
+    with mpmath.workprec(113):
+        rest = Pair(_binary128(angle), mpmath.mpf(0))
+        for each in method.parts:
+            part = own["product_of"](mpmath.mpf(turns), _binary128(each))
+            rest = own["sum_of_pairs"](rest, Pair(-part.high, -part.low))
     true = angle - turns * half_pi()[0]
-    found: Fraction = rest.high.value + rest.low.value
+    found = sum(Fraction(*libmp.to_rational(x._mpf_)) for x in (rest.high, rest.low))
     return abs(found / true - 1)
+
+
+def _binary128(x: Fraction) -> Any:
+    return mpmath.mpf(x.numerator) / x.denominator
 
 
 def javascript_ulps(given: Sequence[float]) -> float:

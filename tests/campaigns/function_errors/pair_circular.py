@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from tests.campaigns.function_errors import pair_operations
-from tests.campaigns.function_errors.nearness import half_pi, least_distance
+from tests.campaigns.function_errors.nearness import exponent, half_pi, least_distance
 from tests.campaigns.function_errors.pair_operations import rounded_up
 from tests.campaigns.function_errors.sources import fortran_numbers, javascript_numbers
 
@@ -47,10 +47,7 @@ def of_javascript(text: str) -> Method:
     """Return the constants of the functions in JavaScript."""
     length = re.search(r"terms\.length < (\d+)", text)
     assert length
-    limit, least = (
-        pair_operations.exponent(javascript_numbers(text, name)[0])
-        for name in ("LARGEST", "SMALLEST")
-    )
+    limit, least = (exponent(javascript_numbers(text, name)[0]) for name in ("LARGEST", "SMALLEST"))
     parts = javascript_numbers(text, "QUARTER_TURN")
     quarters = javascript_numbers(text, "TWO_OVER_PI")[0]
     return Method(53, limit, least, int(length[1]) - 1, parts, quarters, 2, False)
@@ -77,7 +74,7 @@ def bound(method: Method) -> Bound:
     assert small / 6 < u / 2
     assert small / 2 <= u / 2
     ulps = Fraction(1, 2) + relative * 2**method.digits
-    bits = -pair_operations.exponent(relative) - method.digits
+    bits = -exponent(relative) - method.digits
     return Bound(reduced, relative, ulps, bits)
 
 

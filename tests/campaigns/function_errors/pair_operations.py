@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.campaigns.function_errors.nearness import exponent
 from tests.campaigns.function_errors.sources import (
     TWO_WORDS,
     WIDE,
@@ -26,14 +27,6 @@ from tests.campaigns.function_errors.sources import (
 )
 
 Numbers = NDArray[np.float64]
-
-
-def exponent(x: Fraction) -> int:
-    """Return the least n with x <= 2**n, for x above 0."""
-    n = x.numerator.bit_length() - x.denominator.bit_length() - 1
-    while x > Fraction(2) ** n:
-        n += 1
-    return n
 
 
 def rounded_up(x: Fraction) -> Fraction:

@@ -214,10 +214,7 @@ def test_error_does_not_depend_on_the_phase(radians: float) -> None:
 
 @pytest.mark.parametrize("time", [1e-3, 0.5, -2.0, 30.0, 300.0, -1000.0])
 def test_small_components_beside_the_separatrix_keep_their_digits(time: float) -> None:
-    """For A = C and omega1 = omega3, omega2 is r tanh; the others are r sech over the root of 2.
-
-    The sech falls by exp(-phase), which would amplify the rounding of the phase.
-    """
+    """For A = C and omega1 = omega3, omega2 is r tanh; the others are r sech over the root of 2."""
     omega = (1.0, 0.3, 1.0)
     found = _at((0.25, -0.5, 0.25), omega, time)
     with mpmath.workdps(DIGITS):

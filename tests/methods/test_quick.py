@@ -67,11 +67,7 @@ def test_tolerance_holds_on_nasty_scenes(kind: str) -> None:
 def test_gaps_that_are_small_by_chance_are_not_believed(
     kind: str, number: int, tolerance: float
 ) -> None:
-    """Test the draws, of 15 000, that fail first if one gap alone, or too large a gap, is trusted.
-
-    A gap is the difference of results with steps of h and 2 h. It may be a third of the tolerance,
-    and extrapolation makes the result better than the gap: a fifth of the tolerance is much.
-    """
+    """Draws, of 15 000, that fail first if one gap (of results with h and 2 h) is trusted."""
     scenes = timed_scenes(kind, [7, list(NASTY).index(kind)])
     scene, t_end = next(islice(scenes, number, None))
     times = np.linspace(0.0, t_end, 33)[1:].tolist()

@@ -1,7 +1,6 @@
 """Power, work and momentum of trajectories, against integrals that SciPy computes beside them."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, TorqueLaw, opaque, solve
-from pyharness.dynamics.scene_reader import scene_of
 from pyharness.model.trajectory import Array
 from pyharness.torques import (
     attitude_control,
@@ -165,13 +163,6 @@ def test_momentum_of_body_and_wheels_is_constant_in_space(
     assert total == pytest.approx(np.tile(total[2], (len(TIMES), 1)), abs=2e-11)
 
 
-def test_torque_in_space_changes_the_momentum_by_its_integral() -> None:
-    found = solve(scene_with(in_space(V) + in_space(LAW_IN_SPACE)), TIMES, attitude=True)
-    law = np.array([momentum(t) - H for t in TIMES])
-    space = found.angular_momentum("space")
-    assert space - space[2] == pytest.approx(law + np.outer(TIMES, V), abs=1e-10)
-
-
 def test_every_order_of_times_and_no_attitude_have_the_same_work() -> None:
     scene = scene_with(damping(0.3))
     forward = solve(scene, TIMES)
@@ -193,17 +184,3 @@ def test_rows_before_an_overflow_have_power_and_work() -> None:
     assert found.work() == pytest.approx([3.0 * first], rel=1e-10)
     none = solve(scene, [2.0, 3.0])
     assert none.power().shape == none.work().shape == (0,)
-
-
-def test_torque_of_a_file_has_power_and_work() -> None:
-    scene = scene_of(
-        {
-            "body": {"moments": list(MOMENTS)},
-            "initial": {"omega": list(OMEGA)},
-            "torque": {"expression": ["-k*w1", "-k*w2", "-k*w3"], "constants": {"k": 0.3}},
-        },
-        "file",
-    )
-    found = solve(scene, TIMES)
-    assert found.power() == pytest.approx(-0.3 * (found.omega**2).sum(axis=1), rel=1e-14)
-    assert found.work()[-1] == pytest.approx(integrals(replace(scene, attitude=ATTITUDE), 2.0)[7])

@@ -63,24 +63,6 @@ def test_momentum_in_space_is_what_torque_made_of_it(name: str) -> None:
     assert np.abs(found.angular_momentum("space") - true).max() < 1e-13 * np.abs(true).max()
 
 
-def test_momentum_on_random_scenes() -> None:
-    ways = []
-    for number in range(0, 200, 2):
-        drawn = draw("space torque", number)
-        scene = drawn.scene
-        if scene.moments is None or scene.torque.is_zero:
-            continue
-        scene = replace(scene, torque=replace(scene.law, frame="space"), attitude=TURNED)
-        found = solve(scene, [drawn.time], tolerance=1e-13, attitude=True)
-        true = momentum(scene, np.array([drawn.time]))
-        # The angle of a wave may be rounded.
-        error = np.abs(found.angular_momentum("space") - true).max()
-        largest = max(np.abs(true).max(), np.abs(momentum(scene, np.zeros(1))).max())
-        ways.append(error / largest)
-    assert len(ways) > 50
-    assert max(ways) < 1e-12
-
-
 def test_energy_is_the_work_of_the_torque() -> None:
     scene = SCENES["waves"]
     nodes, weights = np.polynomial.legendre.leggauss(40)

@@ -339,7 +339,7 @@ def test_one_attitude_for_all_and_arrays_of_the_caller() -> None:
     starts = np.random.default_rng(1).standard_normal((30, 3))
     turned = [0.5, -0.5, 0.5, 0.5]
     each: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
-    out = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
+    out: Any = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
     shared: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
     assert shared is out
     assert np.array_equal(shared.attitude, each.attitude)

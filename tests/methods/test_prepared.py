@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -97,15 +98,17 @@ def test_what_is_no_start_or_no_time_is_refused_and_not_counted(solver: Solver) 
     out = np.zeros(3)
     solver(np.ones(3), 1.0)
     steps = solver.steps
-    wrong: list[tuple[str, Any, Any]] = [("omega0", each, 1.0) for each in _NO_STARTS]
-    for name, omega0, t_end in wrong + [("t_end", np.ones(3), each) for each in _NO_TIMES]:
-        calls = [lambda: solver(omega0, t_end), lambda: solver(omega0, t_end, out=out)]  # noqa: B023
-        if name == "omega0":
-            calls.append(lambda: solver.trajectory(omega0, [1.0]).omega)  # noqa: B023
-        for call in calls:
-            with pytest.raises(InputError, match=name) as caught:
-                call()
-            assert str(caught.value).isprintable()
+    given: Any
+    for name, wrongs in (("omega0", _NO_STARTS), ("t_end", _NO_TIMES)):
+        for wrong in wrongs:
+            given = (wrong, 1.0) if name == "omega0" else (np.ones(3), wrong)
+            calls: list[Any] = [partial(solver, *given), partial(solver, *given, out=out)]
+            if name == "omega0":
+                calls.append(partial(solver.trajectory, wrong, [1.0]))
+            for call in calls:
+                with pytest.raises(InputError, match=name) as caught:
+                    call()
+                assert str(caught.value).isprintable()
     assert not out.any()
     assert solver.steps == steps > 0
 

@@ -104,7 +104,7 @@ def test_what_is_no_start_or_no_time_is_refused_and_not_counted(solver: Solver) 
             given = (wrong, 1.0) if name == "omega0" else (np.ones(3), wrong)
             calls: list[Any] = [partial(solver, *given), partial(solver, *given, out=out)]
             if name == "omega0":
-                calls.append(partial(solver.trajectory, wrong, [1.0]))
+                calls.append(partial(solver.trajectory, given[0], [1.0]))
             for call in calls:
                 with pytest.raises(InputError, match=name) as caught:
                     call()

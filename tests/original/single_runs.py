@@ -26,21 +26,19 @@ def same_bits(found: object, wanted: object) -> bool:
 
 def single_scene(scene: Scene, options: Options, row: int) -> Scene:
     """Return the scene of one body."""
-    given = {
+    given: Options = {
         name: options[name] if np.ndim(options[name]) < 2 else options[name][row]
         for name in ("omega0", "moments", "coefficients", "torque_constant")
         if name in options
     }
     if "torque_constant" in given:
-        scene = replace(scene, torque=replace(scene.law, constant=given["torque_constant"]))
-    if "moments" in given:
-        scene = replace(scene, moments=given["moments"], coefficients=None, inertia=None)
-    if "coefficients" in given:
-        scene = replace(scene, coefficients=given["coefficients"], moments=None, inertia=None)
+        given["torque"] = replace(scene.law, constant=given.pop("torque_constant"))
+    if {"moments", "coefficients"} & given.keys():
+        given = {"moments": None, "coefficients": None, "inertia": None} | given
     if "omega0" in given:
-        scene = replace(scene, omega=given["omega0"])
+        given["omega"] = given.pop("omega0")
     step_size = options.get("step_size", scene.step_size)
-    return replace(scene, step_size=step_size[row] if np.ndim(step_size) else step_size)
+    return replace(scene, **given, step_size=step_size[row] if np.ndim(step_size) else step_size)
 
 
 def assert_alike(found: ProgramEnsemble, scene: Scene, listing: Listing, options: Options) -> None:

@@ -10,16 +10,9 @@ from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_scene
+from pyharness.original import decks as punched
 from pyharness.original.cards import deck
-from pyharness.original.decks import (
-    DIALECTS,
-    SYSTEMS,
-    compiler,
-    deck_text,
-    job_text,
-    model_cards,
-    run_deck,
-)
+from pyharness.original.decks import compiler, deck_text, run_deck
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -63,12 +56,12 @@ def test_case_stands_on_the_cards_of_the_deck(case: int) -> None:
     assert cards[250].strip() == ("N1=0." if case == 2 else "N1=100.")
 
 
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", punched.SYSTEMS)
 @pytest.mark.parametrize("rounds", [False, True])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_job_for_ftn_has_the_cards_as_they_are(program: str, rounds: bool, system: str) -> None:
     listing = Listing.original(program)
-    job = job_text(deck_text(listing, None, "ftn"), system, rounds)
+    job = punched.job_text(deck_text(listing, None, "ftn"), system, rounds)
     control, _, rest = job.partition("~eor\n")
     assert rest.startswith(deck_text(listing))
     after = rest.removeprefix(deck_text(listing))
@@ -96,7 +89,7 @@ def test_dialect_of_today_adds_marked_lines_alone() -> None:
     reading = subset("runge-kutta", readings=["do-variable"])
     assert "I=2  " not in deck_text(reading, None, "gfortran")
     # A corrected deck needs no rule for the variable of a DO, in any dialect.
-    for dialect in DIALECTS:
+    for dialect in punched.DIALECTS:
         text = deck_text(Listing.corrected("runge-kutta"), None, dialect)
         assert _cards(text)[930].strip() == "I=3"
         assert "I=2  " not in text
@@ -144,7 +137,7 @@ def test_without_a_compiler_verify_says_so(
 
 
 def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
-    printed, made = deck("four-term").cards, model_cards(4)
+    printed, made = deck("four-term").cards, punched.model_cards(4)
     assert set(printed) == set(made)
     points = {720: "T1=DT*1./5.", 730: "T2=DT*2./5.", 740: "T3=DT*3./5.", 750: "T4=DT*4./5."}
     sizes = (110, 120, 150, 190)
@@ -156,7 +149,6 @@ def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
 @pytest.mark.parametrize("terms", [3, 5])
 @pytest.mark.parametrize("is_original", [True, False])
 def test_models_of_case_6_are_those_of_the_claims(terms: int, is_original: bool) -> None:
-    """Compare the decks that V.2 used and did not print with the laboratory's models."""
     listing = (Listing.original if is_original else Listing.corrected)("four-term")
     run = run_deck(deck_text(listing, case_scene(6), "gfortran", terms))
     wanted = Laboratory(is_original).models(6, terms)

@@ -87,15 +87,11 @@ def test_long_runs_and_overflow_end_in_asterisks(capsys: Capture) -> None:
         (0.00005, 10, 4, "0.0001"),  # binary64 holds a little more than the tie
         (0.00015, 10, 4, "0.0001"),  # and a little less here
         (0.03125, 10, 4, "0.0313"),  # an exact tie is rounded away from zero
-        (-0.03125, 10, 4, "-0.0313"),
-        (-0.00001, 10, 4, "0.0000"),
-        (-0.0, 10, 4, "0.0000"),
-        (0.25, 3, 2, ".25"),
-        (-0.25, 4, 2, "-.25"),
-        (2.5, 4, 0, "3."),
+        (-0.03125, 10, 4, "-0.0313"), (-0.00001, 10, 4, "0.0000"), (-0.0, 10, 4, "0.0000"),
+        (0.25, 3, 2, ".25"), (-0.25, 4, 2, "-.25"), (2.5, 4, 0, "3."),
         (1e22, 40, 4, "10000000000000000000000.0000"),
     ],
-)
+)  # fmt: skip
 def test_rounding(value: float, width: int, decimals: int, wanted: str) -> None:
     assert write(f"(F{width}.{decimals})", [value]) == [wanted.rjust(width)]
 

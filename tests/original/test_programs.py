@@ -145,6 +145,11 @@ def test_recorded_time_is_what_tape5_got() -> None:
     np.testing.assert_array_equal(before.time, n * 0.01)
     after = compiled.run(scene, Listing.corrected("four-term"))
     np.testing.assert_array_equal(after.recorded_time, np.cumsum(np.full(100, 0.01)))
+    # The stop test has the constant of the deck everywhere.
+    wanted = facts("cases")["deck"]["lipschitz"]
+    program = PROGRAM_REGISTRY["runge-kutta"]
+    for function in (run_program, program.run, compiled.run, runge_kutta.run):
+        assert inspect.signature(function).parameters["lipschitz"].default == wanted
 
 
 @pytest.mark.parametrize("velocity", [True, False])
@@ -242,10 +247,3 @@ def test_torque_that_table_1_gives_initially_acts_over_the_first_step(program: s
     other = case_scene(5)
     with_it, without = (run_program(other, each).omega for each in (assumed, plain))
     np.testing.assert_array_equal(with_it, without)
-
-
-def test_the_stop_test_has_the_constant_of_the_deck_everywhere() -> None:
-    wanted = facts("cases")["deck"]["lipschitz"]
-    program = PROGRAM_REGISTRY["runge-kutta"]
-    for function in (run_program, program.run, compiled.run, runge_kutta.run):
-        assert inspect.signature(function).parameters["lipschitz"].default == wanted

@@ -43,13 +43,18 @@ def test_every_rule_agrees_with_exact_rationals(rule: str, p: int) -> None:
     assert disagreements(p, rule, 1000, "test") == []
 
 
-def test_vectors_agree() -> None:
+def test_vectors_agree(tmp_path: Path) -> None:
     found = answers()
     assert len(found) == 24
     assert [each.vector.name for each in found if not each.agrees] == []
     assert tuple(WORDS) == WORD_NAMES
     with pytest.raises(TypeError):  # words of two kinds have no sum
         CDC(1.0) + Word(48, "RX")(1.0)
+    path = tmp_path / "vectors.json"
+    for content in ("[3]", "3"):
+        path.write_text(content)
+        with pytest.raises(InputError, match="vectors"):
+            answers(path)
 
 
 def test_octal_words_are_numbers_and_back() -> None:
@@ -96,8 +101,8 @@ def test_no_guard_bit_survives() -> None:
     assert plain(1 - Fraction(2) ** -48) != plain(1.0)
     # Literals beside a tie go to their own side.
     tie, little = Fraction(17, 16), Fraction(1, 10**9)
-    due = {-little: Fraction(1), Fraction(0): Fraction(1), little: Fraction(9, 8)}
-    assert {each: Word(4)(tie + each).fraction() for each in due} == due
+    sides = {-little: Fraction(1), Fraction(0): Fraction(1), little: Fraction(9, 8)}
+    assert {each: Word(4)(tie + each).fraction() for each in sides} == sides
 
 
 def test_infinite_indefinite_and_underflow() -> None:
@@ -200,11 +205,3 @@ def test_page_is_printed_from_the_exact_value() -> None:
     step = case_scene(5).step_size
     assert run.exact[0, 0].fraction() == WORDS["binary128"](step).fraction() != Fraction(step)
     assert run.exact[-1, 2].m.bit_length() == 113
-
-
-def test_what_is_no_vector_file_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "vectors.json"
-    for content in ("[3]", "3"):
-        path.write_text(content)
-        with pytest.raises(InputError, match="vectors"):
-            answers(path)

@@ -22,14 +22,8 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 # These differ from run to run: seconds and their consequences; the build and its folder.
 _VARIES = (
-    "seconds",
-    "seconds_per_step",
-    "build",
-    "speed",
-    "preparation",
-    "time_ratio",
-    "installation",
-)
+    "seconds", "seconds_per_step", "build", "speed", "preparation", "time_ratio", "installation",
+)  # fmt: skip
 _SCENE = """\
 name = "forced"
 [body]

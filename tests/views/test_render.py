@@ -7,18 +7,8 @@ from xml.etree import ElementTree as xml
 import numpy as np
 import pytest
 
-from pyharness.model.report import (
-    Column,
-    Field,
-    Line,
-    Report,
-    Section,
-    Table,
-    digits,
-    exact,
-    short,
-    words,
-)
+from pyharness.model import report
+from pyharness.model.report import Column, Field, Line, Report, Section, Table, digits, short, words
 from pyharness.views.render import render
 
 NAME = "a-name-with-hyphens"
@@ -62,7 +52,7 @@ def test_numbers_are_given_in_full() -> None:
     array = Table(words("a b"), np.array([[0.1, 1e22], [5e-324, -0.0]]))
     found = render(REPORT._replace(data=array), "csv").splitlines()
     assert found == ["a,b", "0.1,1e+22", "5e-324,-0.0"]
-    assert [exact(x) for x in (None, True, 3, "x")] == ["", "true", "3", "x"]
+    assert [report.exact(x) for x in (None, True, 3, "x")] == ["", "true", "3", "x"]
     # A page is written for people.
     page: list[Section] = [["title", TABLE], [Line("- " + "note " * 30)]]
     found = render(REPORT._replace(page=page), "markdown").split("\n\n")

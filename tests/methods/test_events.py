@@ -125,32 +125,27 @@ def test_double_root_counts_once_and_for_direction_0_alone() -> None:
         )
 
 
+@pytest.mark.parametrize(
+    ("function", "expected", "rel"),
+    [
+        (lambda t: (t - 2.0) * (t - 2.000001), [2.0, 2.000001], 5e-10),
+        *((lambda t, n=n: (t - 3.25) ** n, [3.25], 0.1) for n in (3, 4, 5)),
+        (lambda t: abs(t - 3.1) - 0.5, [2.6, 3.6], 1e-6),
+        (lambda t: 1.0 if t > math.pi else -1.0, [math.pi], 1e-12),
+        (lambda t: np.tanh(1e6 * (t - 4.4)), [4.4], 1e-12),
+    ],
+)
+def test_near_multiple_and_sudden_roots(function: Any, expected: list[float], rel: float) -> None:
+    found = times_of(BODY, 9.0, lambda t, omega: function(t))
+    assert found == pytest.approx(expected, rel=rel)
+
+
 def test_value_of_an_extremum_of_omega_counts_once() -> None:
     (tops,), (states,) = events_of(solve(BODY, 6.9, events=extremum(2, direction=-1)))
     (found,) = events_of(solve(BODY, 6.9, events=crosses(2, states[0, 1])))[0]
     assert found == pytest.approx(tops, abs=1e-7)
     assert len(times_of(BODY, 6.9, crosses(2, states[0, 1] - 1e-9))) == 2
     assert times_of(BODY, 6.9, crosses(2, states[0, 1] + 1e-9)) == []
-
-
-def test_near_roots_are_distinguished() -> None:
-    def pair(t: Any, omega: Any) -> Any:
-        return (t - 2.0) * (t - 2.000001)
-
-    assert times_of(BODY, 9.0, pair) == pytest.approx([2.0, 2.000001], abs=1e-9)
-
-
-@pytest.mark.parametrize("power", [3, 4, 5])
-def test_root_of_higher_order_counts_once(power: int) -> None:
-    assert len(times_of(BODY, 9.0, lambda t, omega: (t - 3.25) ** power)) == 1
-
-
-def test_function_without_a_derivative() -> None:
-    assert times_of(BODY, 9.0, lambda t, omega: abs(t - 3.1) - 0.5) == pytest.approx([2.6, 3.6])
-    jump = times_of(BODY, 9.0, lambda t, omega: 1.0 if t > math.pi else -1.0)
-    assert jump == pytest.approx([math.pi], rel=1e-12)
-    steep = times_of(BODY, 9.0, lambda t, omega: np.tanh(1e6 * (t - 4.4)))
-    assert steep == pytest.approx([4.4], rel=1e-12)
 
 
 @pytest.mark.sampled
@@ -251,9 +246,10 @@ def test_terminal_event_removes_what_follows(terminal: bool | int) -> None:
     assert found.sol.t_max == times[0][-1]
 
 
-def test_terminal_event_that_does_not_occur() -> None:
-    event = with_attributes(lambda t, omega: omega[1], 9)
-    found = solve(BODY, [10.0, 30.0], events=event)
+def test_terminal_event_at_time_0_and_one_that_does_not_occur() -> None:
+    found = solve(BODY, [0.0, 1.0], events=crosses(1, BODY.omega[0], terminal=True))
+    assert events_of(found)[0][0].tolist() == found.time.tolist() == [0.0]
+    found = solve(BODY, [10.0, 30.0], events=with_attributes(lambda t, omega: omega[1], 9))
     assert (found.status, found.ended, len(found.time)) == (0, "complete", 2)
 
 
@@ -268,12 +264,6 @@ def test_each_side_of_0_has_its_terminal_event() -> None:
     descending = solve(BODY, rows[::-1], events=with_attributes(lambda t, omega: omega[1], True))
     assert events_of(descending)[0][0].tolist() == times[::-1].tolist()
     np.testing.assert_array_equal(events_of(descending)[1][0], states[::-1])
-
-
-def test_terminal_event_at_time_0() -> None:
-    found = solve(BODY, [0.0, 1.0], events=crosses(1, BODY.omega[0], terminal=True))
-    assert events_of(found)[0][0].tolist() == [0.0]
-    assert found.time.tolist() == [0.0]
 
 
 def test_no_events_without_a_request() -> None:

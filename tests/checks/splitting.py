@@ -17,11 +17,9 @@ def times_axis(q: list[float], axis: int, angle: float) -> list[float]:
     turn[axis + 1] = math.sin(angle / 2)
     (a, b, c, d), (e, f, g, h) = q, turn
     return [
-        a * e - b * f - c * g - d * h,
-        a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f,
-        a * h + b * g - c * f + d * e,
-    ]
+        a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
+    ]  # fmt: skip
 
 
 for line in sys.stdin:

@@ -1,5 +1,6 @@
 """`verify --integrator`: orders, drifts, known faults, invalid answers, and planted faults."""
 
+import itertools
 import json
 import math
 import shlex
@@ -21,16 +22,8 @@ from pyharness.checks.port_process import PortError
 from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from pyharness.scenes.moderate import KINDS, draw_moderate
-from tests.campaigns import integrator_campaign
-from tests.campaigns.integrator_campaign import (
-    METHODS,
-    Drawn,
-    drawn,
-    is_right,
-    judged,
-    right,
-    solve_of,
-)
+from tests.campaigns import integrator_campaign as campaign
+from tests.campaigns.integrator_campaign import METHODS, Drawn, drawn, is_right, right, solve_of
 from tests.json_reference import schema_of
 from tests.ports import documented_command
 
@@ -42,6 +35,21 @@ RK4 = FOLDER / "rk4.py"
 
 def command_of(path: Path) -> str:
     return shlex.join([sys.executable, str(path)])
+
+
+def written(folder: Path, text: str) -> str:
+    """Return the command of an integrator with this source."""
+    (folder / "written.py").write_text(text)
+    return command_of(folder / "written.py")
+
+
+def edited(folder: Path, *changes: tuple[str, str]) -> str:
+    """Return the command of a copy of the example with other texts."""
+    text = RK4.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return written(folder, text)
 
 
 def _json(capsys: Capture, command: str, *words: str, status: int = 0) -> Any:
@@ -59,9 +67,8 @@ def _faults(record: Any) -> set[str]:
 def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
     record = _json(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
     assert record["findings"] == []
-    assert [each["problem"] for each in record["convergence"][::2]] == [
-        f"{kind}-0" for kind in KINDS
-    ]
+    names = [each["problem"] for each in record["convergence"][::2]]
+    assert names == [f"{kind}-0" for kind in KINDS]
     for each in record["convergence"]:
         assert each["order"] == pytest.approx(4.0, abs=0.2)
         assert each["control"] == "step_size"
@@ -71,10 +78,8 @@ def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
     assert checks["integrator/omega/free-0/order"]["reference_bound"]["basis"] == "proved"
     assert 0.0 < checks["integrator/energy/free-0/drift"]["value"] < 1e-4
     assert checks["integrator/return/free-0"]["note"] == "not reversible"
-    assert (
-        "--seed right --draws 1 --cell free-0 --order 4"
-        in (checks["integrator/norm/free-0"]["replay"])
-    )
+    replay = checks["integrator/norm/free-0"]["replay"]
+    assert "--seed right --draws 1 --cell free-0 --order 4" in replay
 
 
 @pytest.mark.campaign
@@ -85,11 +90,9 @@ def test_a_higher_order_than_it_has_is_refused(capsys: Capture) -> None:
     assert [check["id"] for check in failed] == [
         "integrator/omega/free-0/order", "integrator/attitude/free-0/order",
     ]  # fmt: skip
-    _, _, command, *rest = shlex.split(failed[0]["replay"])[3:]
-    again = _json(capsys, command, *rest, status=1)["checks"]
-    assert [check["note"] for check in again if not check["passed"]] == [
-        check["note"] for check in failed
-    ]
+    again = _json(capsys, *shlex.split(failed[0]["replay"])[5:], status=1)["checks"]
+    notes = [check["note"] for check in again if not check["passed"]]
+    assert notes == [check["note"] for check in failed]
 
 
 # Changes of a line of the example, and the fault that has to be named.
@@ -127,20 +130,14 @@ MISTAKES = (
 def test_a_mistake_in_the_source_is_named(
     old: str, new: str, fault: str, tmp_path: Path, capsys: Capture
 ) -> None:
-    text = RK4.read_text()
-    for before, after in zip(old.split("|"), new.split("|"), strict=True):
-        assert before in text
-        text = text.replace(before, after)
-    path = tmp_path / "mistaken.py"
-    path.write_text(text)
+    command = edited(tmp_path, *zip(old.split("|"), new.split("|"), strict=True))
     remark = fault in FIRST_ORDER
-    status = 0 if remark else 1
     # Without a scene without torque, the long motion is left out.
-    words = ("--seed", "mistake", "--cell")
-    record = _json(capsys, command_of(path), *words, "constant-0,wave-0", status=status)
+    words = (command, "--seed", "mistake", "--cell")
+    record = _json(capsys, *words, "constant-0,wave-0", status=int(not remark))
     assert _faults(record) == {fault}
     if remark:
-        _json(capsys, command_of(path), *words, "wave-0", "--order", "4", status=1)
+        _json(capsys, *words, "wave-0", "--order", "4", status=1)
 
 
 PROGRAM = """
@@ -166,10 +163,9 @@ for line in sys.stdin:
 def test_the_program_of_the_thesis_is_an_integrator(
     label: str, order: str, tmp_path: Path, capsys: Capture
 ) -> None:
-    path = tmp_path / "program.py"
-    path.write_text(PROGRAM.replace("LABEL", label))
-    words = ("--order", order, "--draws", "1", "--seed", "1982")
-    record = _json(capsys, command_of(path), *words, status=int(label == "original"))
+    command = written(tmp_path, PROGRAM.replace("LABEL", label))
+    words = (command, "--order", order, "--draws", "1", "--seed", "1982")
+    record = _json(capsys, *words, status=int(label == "original"))
     assert _faults(record) == ({"thesis-runge-kutta"} if label == "original" else set())
 
 
@@ -193,11 +189,11 @@ def test_rounding_errors_are_not_named_first_order() -> None:
 
 @pytest.mark.campaign
 def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
-    text = RK4.read_text().replace("(i2 - i3)", "(i3 - i2)").replace("(i3 - i1)", "(i1 - i3)")
-    text = text.replace("(i1 - i2)", "(i2 - i1)")
-    path = tmp_path / "two.py"
-    path.write_text(text.replace("[y[3:] for", "[[y[3], -y[4], -y[5], -y[6]] for"))
-    record = _json(capsys, command_of(path), "--draws", "1", "--seed", "two", status=1)
+    command = edited(
+        tmp_path, ("(i2 - i3)", "(i3 - i2)"), ("(i3 - i1)", "(i1 - i3)"),
+        ("(i1 - i2)", "(i2 - i1)"), ("[y[3:] for", "[[y[3], -y[4], -y[5], -y[6]] for"),
+    )  # fmt: skip
+    record = _json(capsys, command, "--draws", "1", "--seed", "two", status=1)
     assert _faults(record) == {"gyroscopic-sign", "quaternion-transposed"}
 
 
@@ -214,20 +210,18 @@ def test_every_planted_fault_is_named() -> None:
 
 @pytest.mark.campaign
 def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Capture) -> None:
-    path = tmp_path / "faulty.py"
-    path.write_text(RK4.read_text().replace("0.5 * (-b", "0.6 * (-b"))
-    words = ["verify", "--integrator", command_of(path), "--self-test", "--cell", "free-0"]
+    command = edited(tmp_path, ("0.5 * (-b", "0.6 * (-b"))
+    words = ["verify", "--integrator", command, "--self-test", "--cell", "free-0"]
     assert main([*words, "--seed", "x"]) == 1
     assert "FAILED control" in capsys.readouterr().out
 
 
 @pytest.mark.campaign
 def test_drawn_integrators_have_the_right_verdict() -> None:
-    """The campaign draws more of them: a wrong one fails, and its fault is named or unknown."""
     chosen = problems("drawn", 1, ["free", "wave"])
-    for each in [*right("drawn"), *(drawn(kind, "drawn", 0) for kind in integrator_campaign.KINDS)]:
-        found = judged(each, chosen)
-        assert is_right(each, found), (each.says, integrator_campaign.named(found))
+    for each in [*right("drawn"), *(drawn(kind, "drawn", 0) for kind in campaign.KINDS)]:
+        found = campaign.judged(each, chosen)
+        assert is_right(each, found), (each.says, campaign.named(found))
 
 
 @pytest.mark.sampled
@@ -247,9 +241,9 @@ def test_a_late_failure_is_noticed(last: str, seconds: float, failed: str) -> No
                 answer["omega"][row] = [last] * 3
         return answer
 
-    found = judged(Drawn("late", late, "unknown"), problems("late", 1, ["free"]))
+    found = campaign.judged(Drawn("late", late, "unknown"), problems("late", 1, ["free"]))
     assert f"integrator/{failed}" in {check.id for check in found.checks if not check.passed}
-    assert integrator_campaign.named(found) == {"unknown"}
+    assert campaign.named(found) == {"unknown"}
 
 
 @pytest.mark.sampled
@@ -258,15 +252,15 @@ def test_a_late_failure_is_noticed(last: str, seconds: float, failed: str) -> No
 def test_the_sign_of_one_gyroscopic_term_is_named_where_the_motion_is_finite(axis: int) -> None:
     """It was named gyroscopic-missing where the answer overflows, and moments-213 elsewhere."""
     wrong = Drawn("", solve_of((f"(n{axis} +", f"(n{axis} -")), f"gyroscopic-sign-{axis}")
-    found = judged(wrong, problems("a", 1, ["free", "wave"]))
-    assert integrator_campaign.named(found) == {wrong.fault}
+    found = campaign.judged(wrong, problems("a", 1, ["free", "wave"]))
+    assert campaign.named(found) == {wrong.fault}
 
 
 @pytest.mark.campaign
 def test_an_explicit_method_of_order_1_may_drift() -> None:
     """With steps of 1/32 s, it overflows in this scene within 512 s."""
     euler = Drawn("", solve_of((METHODS[0][1], METHODS[-1][1])), "", 1.0)
-    found = judged(euler, problems("1/26", 1, ["free"]))
+    found = campaign.judged(euler, problems("1/26", 1, ["free"]))
     assert all(check.passed for check in found.checks)
     assert found.drift is not None
     assert 1e-2 < found.drift.energy[-1] < 10.0
@@ -277,7 +271,7 @@ def test_a_missing_attitude_in_some_answers_is_invalid() -> None:
     some = Drawn("", lambda asked: {
         **solve(asked), **({"attitude": None} if asked["step_size"] == 0.25 else {})
     }, "unknown")  # fmt: skip
-    (check,) = judged(some, problems("some", 1, ["free"])).checks
+    (check,) = campaign.judged(some, problems("some", 1, ["free"])).checks
     assert check.note == "only some of the answers in a scene have an attitude"
 
 
@@ -306,9 +300,8 @@ ANSWERS = (
 def test_an_invalid_answer_is_a_line(
     body: str, message: str, tmp_path: Path, capsys: Capture
 ) -> None:
-    path = tmp_path / "answer.py"
-    path.write_text(f"import json, sys\nfor line in sys.stdin:\n    {body}\n")
-    record = _json(capsys, command_of(path), "--draws", "1", status=1)
+    command = written(tmp_path, f"import json, sys\nfor line in sys.stdin:\n    {body}\n")
+    record = _json(capsys, command, "--draws", "1", status=1)
     (check,) = record["checks"]
     assert check["id"] == "integrator/free-0"
     assert message in check["note"]
@@ -318,12 +311,12 @@ def test_an_invalid_answer_is_a_line(
 def test_an_integrator_that_refuses_everything_does_not_pass(
     tmp_path: Path, capsys: Capture
 ) -> None:
-    path = tmp_path / "refusing.py"
-    path.write_text('for _ in open(0):\n    print(\'{"refused": "never"}\', flush=True)\n')
-    record = _json(capsys, command_of(path), "--draws", "1", status=1)
+    body = 'for _ in open(0):\n    print(\'{"refused": "never"}\', flush=True)\n'
+    command = written(tmp_path, body)
+    record = _json(capsys, command, "--draws", "1", status=1)
     (failed,) = [check for check in record["checks"] if not check["passed"]]
     assert failed["note"] == "the integrator refused every scene"
-    assert main(["verify", "--integrator", command_of(path), "--self-test", "--draws", "1"]) == 1
+    assert main(["verify", "--integrator", command, "--self-test", "--draws", "1"]) == 1
 
 
 @pytest.mark.campaign
@@ -334,43 +327,38 @@ def test_a_port_is_sent_to_its_option(more: list[str], capsys: Capture) -> None:
 
 
 def test_numbers_that_are_not_finite_are_an_error(tmp_path: Path, capsys: Capture) -> None:
-    path = tmp_path / "lost.py"
-    path.write_text(RK4.read_text().replace("[y[:3] for y in rows]", '[["nan"] * 3 for _ in rows]'))
-    record = _json(capsys, command_of(path), "--cell", "free-0", "--seed", "n", status=1)
+    command = edited(tmp_path, ("[y[:3] for y in rows]", '[["nan"] * 3 for _ in rows]'))
+    record = _json(capsys, command, "--cell", "free-0", "--seed", "n", status=1)
     assert record["convergence"][0]["errors"] == [None] * LEVELS
     failed = {check["id"] for check in record["checks"] if not check["passed"]}
     assert "integrator/omega/free-0/order" in failed
 
 
 def test_an_integrator_that_forgets_its_request_is_noticed(tmp_path: Path, capsys: Capture) -> None:
-    """An answer that depends on what was requested before is not repeated."""
-    path = tmp_path / "drifting.py"
-    text = RK4.read_text().replace("for line in sys.stdin:", "COUNT = 0\nfor line in sys.stdin:")
-    text = text.replace(
-        "    print(json.dumps(solve(asked)), flush=True)",
-        "    COUNT += 1\n    answer = solve(asked)\n    answer['omega'][0][0] += COUNT * 1e-15\n"
-        "    print(json.dumps(answer), flush=True)",
-    )
-    path.write_text(text)
-    record = _json(capsys, command_of(path), "--cell", "free-0", "--seed", "r", status=1)
+    command = edited(
+        tmp_path, ("for line in sys.stdin:", "COUNT = 0\nfor line in sys.stdin:"),
+        ("    print(json.dumps(solve(asked)), flush=True)",
+         "    COUNT += 1\n    answer = solve(asked)\n    answer['omega'][0][0] += COUNT * 1e-15\n"
+         "    print(json.dumps(answer), flush=True)"),
+    )  # fmt: skip
+    record = _json(capsys, command, "--cell", "free-0", "--seed", "r", status=1)
     checks = {check["id"]: check for check in record["checks"]}
     assert checks["integrator/repeated/free-0"]["value"] == 1.0
 
 
 @pytest.mark.campaign
 def test_single_precision_and_no_attitude(tmp_path: Path, capsys: Capture) -> None:
-    path = tmp_path / "single.py"
-    text = RK4.read_text().replace(
+    change = (
         'return {"omega": [y[:3] for y in rows], "attitude": [y[3:] for y in rows]}',
         'import struct\n    single = lambda x: struct.unpack("f", struct.pack("f", x))[0]\n'
         '    return {"omega": [[single(x) for x in y[:3]] for y in rows], "precision": "binary32"}',
     )
-    path.write_text(text)
-    record = _json(capsys, command_of(path), "--draws", "1", "--seed", "single", "--order", "4")
+    words = ("--draws", "1", "--seed", "single", "--order", "4")
+    record = _json(capsys, edited(tmp_path, change), *words)
     assert {each["part"] for each in record["convergence"]} == {"omega"}
     # In binary64 the same errors are those of a method that ceases to converge.
-    path.write_text(text.replace(', "precision": "binary32"', ""))
-    _json(capsys, command_of(path), "--draws", "1", "--seed", "single", "--order", "4", status=1)
+    command = edited(tmp_path, change, (', "precision": "binary32"', ""))
+    _json(capsys, command, *words, status=1)
 
 
 @pytest.mark.campaign
@@ -408,9 +396,8 @@ def test_known_motions_differ_from_the_true_one_and_from_each_other(kind: str) -
     assert missing == {"free": torques, "constant": parts, "wave": set()}[kind]
 
 
-@pytest.mark.parametrize("number", range(20))
-def test_scenes_are_bodies_that_can_be(number: int) -> None:
-    for kind in KINDS:
+def test_scenes_are_bodies_that_can_be() -> None:
+    for kind, number in itertools.product(KINDS, range(20)):
         scene = draw_moderate("bodies", kind, number)
         assert not scene.is_impossible
         a, b, c = sorted(scene.moments or ())

@@ -1,11 +1,8 @@
 """The port in JavaScript: bits in random scenes, planted faults, sine and cosine."""
 
-import json
 import math
 import random
-import shlex
 import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +18,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.original.linear_solver import leqt1f
 from pyharness.scenes.random_scenes import draw
-from tests.ports import WEB, node, sample
+from tests.ports import WEB, node, run_javascript, sample
 
 
 @pytest.mark.campaign
@@ -73,8 +70,7 @@ FAULTS = {
         "runge-kutta",
     ),
     "the points of the stop test": (
-        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)",
-        "runge-kutta",
+        "runge-kutta.js", "distances(result, base)", "distances(result, firstPoint)", "runge-kutta",
     ),
     "a defect forgotten": ("two-term.js", '"c1-for-c"', '"no-such"', "two-term"),
     "a point of collocation": ("four-term.js", "dt * 0.6", "dt * 0.60000001", "four-term"),
@@ -104,22 +100,13 @@ def test_a_fault_in_the_javascript_is_found(fault: str, tmp_path: Path) -> None:
 
 @pytest.mark.campaign
 def test_sine_and_cosine_of_the_javascript_are_the_nearest_floats() -> None:
-    engine = shlex.split(node(WEB))[0]
     source = random.Random(1982)
     angles = [source.uniform(-1.0, 1.0) * 10.0 ** source.uniform(-9.0, 8.0) for _ in range(20_000)]
     # Angles close to a multiple of a quarter turn, where digits cancel.
     angles += [n * (math.pi / 2) for n in range(-500, 500)]
     angles += [0.0, -0.0, 1e-300, 2.0**-27, 29.2, 112.60000000000004, 170.00000000000006]
-    script = (
-        f"import {{ sine, cosine }} from {json.dumps(str(WEB / 'programs/circular.js'))};"
-        'import { readFileSync } from "node:fs";'
-        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map((x) => [sine(x), cosine(x)])));"
-    )
-    done = subprocess.run(
-        [engine, "--input-type=module", "--eval", script],
-        input=json.dumps(angles), capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    found = json.loads(done.stdout)
+    body = "return angles.map((x) => [circular.sine(x), circular.cosine(x)])"
+    found = run_javascript({"circular": WEB / "programs/circular.js"}, body, angles=angles)
     assert len(found) == len(angles)
     with mp.workprec(300):
         wanted = [[float(mp.sin(x)), float(mp.cos(x))] for x in map(mp.mpf, angles)]
@@ -135,14 +122,8 @@ def test_the_linear_solver_of_the_javascript_has_the_twins_bits() -> None:
                   for _ in range(n)]  # fmt: skip
         systems.append([matrix, [[source.gauss(0.0, 1.0) for _ in range(n)] for _ in range(2)]])
     systems.append([[[1.0, 2.0], [2.0, 4.0]], [[1.0, 1.0]]])
-    script = (
-        f"import {{ leqt1f }} from {json.dumps(str(WEB / 'programs/linear-solver.js'))};"
-        'import { readFileSync } from "node:fs";'
-        "console.log(JSON.stringify(JSON.parse(readFileSync(0)).map(([a, b]) => leqt1f(a, b))));"
-    )
-    done = subprocess.run(
-        [shlex.split(node(WEB))[0], "--input-type=module", "--eval", script],
-        input=json.dumps(systems), capture_output=True, text=True, check=True,
-    )  # fmt: skip
+    body = "return systems.map(([a, b]) => solver.leqt1f(a, b))"
+    modules = {"solver": WEB / "programs/linear-solver.js"}
+    found = run_javascript(modules, body, systems=systems)
     wanted = [[[list(column) for column in x], ier] for x, ier in (leqt1f(*s) for s in systems)]
-    assert json.loads(done.stdout) == wanted
+    assert found == wanted

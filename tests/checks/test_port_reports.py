@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 from pyharness import run_program
 from pyharness.checks.plants.port_plants import PLANTS
 from pyharness.checks.plants.port_self_test import as_check, self_test
-from pyharness.checks.port import Cell, compared, port, port_cells, random_cells
+from pyharness.checks.port import Cell, compared, port_cells, random_cells
 from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS
@@ -37,14 +37,20 @@ def test_every_variable_of_the_first_different_step_is_reported(
 ) -> None:
     command = answering(tmp_path / "port.py", BIT)
     (check,) = _json(capsys, command, "--cell", CELL, status=1)["checks"]
+    assert check["note"].startswith("first at step 7, U2: 1 ulp (0x")
+    assert (check["value"], check["limit"]) == (1.0, 0.0)
+    words = shlex.split(check["replay"])
+    assert words[:3] == ["python", "-m", "pyharness"]
+    assert words[3:] == ["verify", "--port", command, "--cell", CELL]
     assert check["difference"]["step"] == 7
     values = {each["variable"]: each for each in check["difference"]["values"]}
     assert tuple(values) == VARIABLES
     assert {name: each["ulps"] for name, each in values.items() if each["ulps"]} == {"U2": 1.0}
     theirs, ours = (float.fromhex(values["U2"][whose]) for whose in ("theirs", "ours"))
     assert theirs == math.nextafter(ours, math.inf)
-    assert main(["verify", "--port", command, "--cell", CELL]) == 1
+    assert main(words[3:]) == 1
     printed = capsys.readouterr().out
+    assert "step 7, U2" in " ".join(printed.split())
     assert f"port/{CELL}, step 7:\nvariable  unit   ours" in printed
     (line,) = [each.split() for each in printed.splitlines() if each.startswith("U2 ")]
     assert line == ["U2", "rad/s", repr(ours), repr(theirs), "1"]
@@ -83,9 +89,8 @@ def test_random_scenes_are_repeated_by_their_command(tmp_path: Path, capsys: Cap
     words = shlex.split(failed[-1]["replay"])[3:]
     assert words[-2:] == ["--seed", "a b"]
     again = _json(capsys, *words[2:], status=1)["checks"]
-    assert [(each["id"], each["note"]) for each in again] == [
-        (failed[-1]["id"], failed[-1]["note"])
-    ]
+    (found,) = ((each["id"], each["note"]) for each in again)
+    assert found == (failed[-1]["id"], failed[-1]["note"])
 
 
 def test_draws_come_after_the_cells_of_the_same_programs() -> None:
@@ -100,7 +105,6 @@ def test_draws_come_after_the_cells_of_the_same_programs() -> None:
 
 @pytest.mark.campaign
 def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
-    """All faults have an effect in the cells, and their names are different."""
     assert len(PLANTS) >= 40
     assert len({plant.name for plant in PLANTS}) == len(PLANTS)
     cells = port_cells(PROGRAMS, case_numbers(), ())
@@ -115,9 +119,8 @@ def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
 def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None:
     command = answering(tmp_path / "port.py", BIT)
     record = _json(capsys, command, "--self-test", "--cell", CELL, status=1)
-    assert [each["id"] for each in record["checks"] if not each["passed"]] == [
-        "self-test/port/none"
-    ]
+    (failed,) = (each["id"] for each in record["checks"] if not each["passed"])
+    assert failed == "self-test/port/none"
     assert main(["verify", "--port", documented_command(), "--self-test", "--cell", CELL]) == 0
     printed = capsys.readouterr().out
     assert printed.endswith("without effect in these runs\n")
@@ -133,11 +136,9 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(
 
     def blind(cell: Cell, twin: Any, line: bytes, *rest: Any) -> Any:
         run = run_program(cell.scene, cell.listing)
-        rows = [
-            [run.recorded_time[n], *run.omega[n], *run.velocity[n]]  # type: ignore[index]
-            for n in range(len(run.omega))
-        ]
-        right = {**json.loads(line), "rows": [[float(x).hex() for x in row] for row in rows]}
+        columns = run.recorded_time, *run.omega.T, *run.velocity.T  # type: ignore[union-attr]
+        rows = [[float(x).hex() for x in row] for row in zip(*columns, strict=True)]
+        right = {**json.loads(line), "rows": rows}
         return compared(cell, twin, json.dumps(right).encode(), *rest)
 
     monkeypatch.setattr("pyharness.checks.plants.port_self_test.compared", blind)
@@ -157,9 +158,6 @@ def test_a_port_is_asked_for_random_scenes_with_their_stop_tests() -> None:
     for cell in cells[:5]:
         asked = json.loads(cell.request)
         assert (asked["lipschitz"], asked["may_stop"]) == (cell.lipschitz, cell.may_stop)
-    assert [
-        check.id for check in port(documented_command(), port_cells(PROGRAMS, [2], [CELL]))
-    ] == [f"port/{CELL}"]
 
 
 def _tables(text: str) -> list[list[str]]:

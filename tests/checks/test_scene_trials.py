@@ -11,7 +11,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from pyharness import Scene, read_scene, torques
+from pyharness import Scene, read_scene, solve, torques
 from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
@@ -51,9 +51,8 @@ def test_all_checks_pass_and_have_names_of_their_own(kind: str) -> None:
     assert len({check.id for check in found}) == len(found) > 60
     assert set(SCENE_TRIALS) <= set(TRIALS)
     is_law = kind in ("law", "free")
-    assert {check.suite for check in found} == set(SCENE_TRIALS) - (
-        set() if is_law else {"step-size"}
-    )
+    left_out = set() if is_law else {"step-size"}
+    assert {check.suite for check in found} == set(SCENE_TRIALS) - left_out
     bounded = {check.name.subject for check in found if check.limit is not None}
     assert bounded >= {"auto", "taylor", "dop853"}
     assert {"gauss-8", "rk4"} <= bounded or not is_law
@@ -75,14 +74,11 @@ def _off(real: Callable[..., Any], only_at: Callable[[Scene], bool]) -> Callable
 def test_fault_is_seen(trial: str) -> None:
     """Omega has an error of .001 in some of the calls."""
     scene = SCENES["terms"]()
-    place = "pyharness.compare.candidates.solve" if "length" in trial else None
+    place = "compare.candidates" if "length" in trial else "checks.scene_trials"
     is_same = trial.endswith(("split", "length/taylor"))
-    with patch(
-        place or "pyharness.checks.scene_trials.solve",
-        _off(room.solve, lambda each: is_same == (each.torque == scene.torque)),  # type: ignore[attr-defined]
-    ):
-        found = checks_of(scene, trial)
-    found = [check for check in found if check.name.quantity != "angle"]
+    wrong = _off(solve, lambda each: is_same == (each.torque == scene.torque))
+    with patch(f"pyharness.{place}.solve", wrong):
+        found = [each for each in checks_of(scene, trial) if each.name.quantity != "angle"]
     assert found
     assert not any(check.passed for check in found)
 

@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -93,13 +94,10 @@ def test_the_worst_is_the_nearest_to_its_limit_or_failed() -> None:
     found = worst(
         Check(Name(*id.split("/"), scene=scene), passed, value, limit, BITS if limit else None)
         for id, value, limit, passed in (
-            ("a/b/1", 1e-3, 1.0, True),
-            ("a/b/2", 1e-9, 1e-9, True),
-            ("a/b/3", 9.0, None, True),
-            ("a/c/1", math.nan, 1.0, False),
-            ("a/c/2", 2.0, 1.0, False),
+            ("a/b/1", 1e-3, 1.0, True), ("a/b/2", 1e-9, 1e-9, True), ("a/b/3", 9.0, None, True),
+            ("a/c/1", math.nan, 1.0, False), ("a/c/2", 2.0, 1.0, False),
         )
-    )
+    )  # fmt: skip
     assert {name: each.id for name, each in found.items()} == {"a/b": "a/b/2", "a/c": "a/c/1"}
 
 
@@ -175,22 +173,18 @@ def test_only_what_failed_is_saved_unless_a_folder_is_given(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "worst"
     scene = Scene("", (1.0, 2.0, 3.0), (3.0, 2.0, 1.5))
     good = named("separatrix", "taylor", "a", scene=scene).bounded(1.0, 2.0, BITS)
     bad = named("separatrix", "quick", "b", scene=scene).bounded(3.0, 2.0, BITS)
-    for checks, code, names in (
-        ([good], 0, None),
-        ([good, bad], 1, ["separatrix-quick.toml"]),
-    ):
+    for checks, code, names in (([good], 0, None), ([good, bad], 1, ["separatrix-quick.toml"])):
         monkeypatch.setattr("pyharness.cli.verbs.stress.stress", lambda _, found=checks: found)
         assert _run(capsys, "--only", "separatrix")[0] == code
-        folder = tmp_path / "worst"
         assert folder.exists() == (names is not None)
         assert names is None or [each.name for each in folder.iterdir()] == names
     # A failure to save the worst scene does not hide the failed check.
-    (tmp_path / "worst/separatrix-quick.toml").unlink()
-    (tmp_path / "worst").rmdir()
-    (tmp_path / "worst").write_text("a file")
+    shutil.rmtree(folder)
+    folder.write_text("a file")
     assert main(["stress", "--only", "separatrix"]) == 1
     assert "the inputs of what failed are not saved: " in capsys.readouterr().err
 
@@ -215,14 +209,12 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     ("only", "key"),
     [
         # Programs have their own markers, and a long name is placed above the kinds of disturbance.
-        (
-            "separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term",
-            "coarse error,coarse drift,steps error,steps drift,original,corrected,no setting",
-        ),
+        ("separatrix/improved-euler,separatrix/gauss-1,separatrix/two-term",
+         "coarse error,coarse drift,steps error,steps drift,original,corrected,no setting"),
         # Four bodies each, with names as long as impossible-three.
         ("shapes/closed-form", "fine error,fine drift"),
     ],
-)
+)  # fmt: skip
 def test_picture_shows_what_its_numbers_say_and_no_title_meets_another(
     only: str, key: str, figures: list[Any], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -236,12 +228,9 @@ def test_picture_shows_what_its_numbers_say_and_no_title_meets_another(
     assert {each.get_text() for each in legend.get_texts()} == set(key.split(","))
     for axes in (axes for axes in figure.axes if axes.get_visible()):
         title = axes.get_title(loc="left")
-        (name,) = (each for each in axes.get_children() if _says(each, title))
+        texts = (each for each in axes.get_children() if hasattr(each, "get_text"))
+        (name,) = (each for each in texts if each.get_text() == title)
         boxes = [each.get_window_extent() for each in (name, *axes.texts)]
         assert len(boxes) > 1
         assert not any(x.overlaps(y) for x, y in itertools.combinations(boxes, 2)), title
         assert not legend.get_window_extent().overlaps(boxes[0])
-
-
-def _says(artist: Any, text: str) -> bool:
-    return hasattr(artist, "get_text") and artist.get_text() == text

@@ -25,6 +25,8 @@ from pyharness.cli.progress import end_progress, progress
 from pyharness.model import output_files
 from pyharness.model.output_files import write_files
 
+Capture = pytest.CaptureFixture[str]
+Patch = pytest.MonkeyPatch
 RUN = ["run", "--case", "3", "--program", "two-term", "--format", "csv"]
 
 
@@ -89,28 +91,27 @@ class _Failing:
         return partial(self, instance) if isinstance(instance, Path) else self
 
 
-CALLS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
-    "open": (output_files, "open", open),
-    "link": (os, "link", os.link),
-    "replace": (os, "replace", os.replace),
-    "mkdir": (Path, "mkdir", Path.mkdir),
-}
+# Each has the owner, and the function.
+CALLS: dict[str, tuple[Any, Callable[..., Any]]] = {
+    "open": (output_files, open), "link": (os, os.link), "replace": (os, os.replace),
+    "mkdir": (Path, Path.mkdir),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, OSError])
 @pytest.mark.parametrize("call", CALLS)
 @pytest.mark.parametrize("writer", WRITERS)
 def test_nothing_is_left_behind_by_a_call_that_fails(
-    writer: str, call: str, error: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    writer: str, call: str, error: type, tmp_path: Path, monkeypatch: Patch
 ) -> None:
     """Let each call fail in turn, before it has done anything and when it is done."""
     write, after = WRITERS[writer]
-    owner, name, real = CALLS[call]
+    owner, real = CALLS[call]
     for number, done in itertools.product(range(4), (False, True)):
         folder = _folder(tmp_path)
         failing = _Failing(real, number + 1, done, error)
         with monkeypatch.context() as patch:
-            patch.setattr(owner, name, failing, raising=False)
+            patch.setattr(owner, call, failing, raising=False)
             try:
                 write(folder)
             except (KeyboardInterrupt, MemoryError, InputError):
@@ -172,9 +173,7 @@ def test_a_ctrl_c_at_any_line_leaves_all_or_nothing(writer: str, tmp_path: Path)
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_a_ctrl_c_while_files_are_written_gives_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_ctrl_c_while_files_are_written_gives_up(tmp_path: Path, monkeypatch: Patch) -> None:
     def interrupted(*given: Any) -> Any:
         signal.raise_signal(signal.SIGINT)
         return open(*given)
@@ -214,9 +213,7 @@ def test_a_link_is_followed_wherever_it_leads(there: bool, elsewhere: Path, tmp_
     assert set(tmp_path.iterdir()) <= {link, elsewhere}
 
 
-def test_a_link_that_leads_nowhere_is_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_a_link_that_leads_nowhere_is_refused(capsys: Capture, tmp_path: Path) -> None:
     (tmp_path / "lost").symlink_to(tmp_path / "no folder" / "file")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "folder").symlink_to(tmp_path)
@@ -231,13 +228,10 @@ IMPOSSIBLE = "[body]\nmoments=[200,10,20]\n[initial]\nomega=[0.1,1,0.2]\n"
 @pytest.mark.sampled
 @pytest.mark.parametrize(
     ("arguments", "code"),
-    [
-        ("run --case 99 --method auto", 2),
-        ("run --scene impossible.toml --program two-term --steps 2 --out /dev/stdout", 0),
-        ("doctor >/dev/full", 2),
-        ("doctor >&-", 2),
-    ],
-)
+    [("run --case 99 --method auto", 2),
+     ("run --scene impossible.toml --program two-term --steps 2 --out /dev/stdout", 0),
+     ("doctor >/dev/full", 2), ("doctor >&-", 2)],
+)  # fmt: skip
 def test_a_stderr_that_is_full_or_closed_has_no_say(
     arguments: str, code: int, tmp_path: Path
 ) -> None:
@@ -246,10 +240,8 @@ def test_a_stderr_that_is_full_or_closed_has_no_say(
     (tmp_path / "impossible.toml").write_text(IMPOSSIBLE)
     command = f"{sys.executable} -m pyharness {arguments}"
     wanted, *found = (
-        subprocess.run(
-            ["sh", "-c", f"{command} {redirection}"], cwd=tmp_path, capture_output=True, check=False
-        )
-        for redirection in ("", "2>/dev/full", "2>&-")
+        subprocess.run(f"{command} {away}", shell=True, cwd=tmp_path, capture_output=True)
+        for away in ("", "2>/dev/full", "2>&-")
     )
     assert wanted.returncode == code
     assert wanted.stderr.startswith(b"pyharness: ")
@@ -258,14 +250,9 @@ def test_a_stderr_that_is_full_or_closed_has_no_say(
         assert (each.returncode, each.stdout, each.stderr) == (code, wanted.stdout, b"")
 
 
-def test_progress_falls_silent_where_the_terminal_goes_away(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    gone = Mock(
-        encoding="ascii",
-        isatty=lambda: True,
-        write=Mock(side_effect=OSError(5, "Input/output error")),
-    )
+def test_progress_falls_silent_where_the_terminal_goes_away(monkeypatch: Patch) -> None:
+    write = Mock(side_effect=OSError(5, "Input/output error"))
+    gone = Mock(encoding="ascii", isatty=lambda: True, write=write)
     monkeypatch.setattr(sys, "stderr", gone)
     progress(1, 2, "parts")
     end_progress()

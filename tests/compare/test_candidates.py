@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
-from pyharness.compare.candidates import (
-    method_candidate,
-    prepared_candidate,
-    program_candidate,
-)
+from pyharness.compare.candidates import method_candidate, prepared_candidate, program_candidate
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original.programs import IMPLEMENTATIONS
 
@@ -29,10 +25,8 @@ def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> N
     """The bits are the same, so only the module that computed them distinguishes the two."""
     for room in ("compare.candidates", "original.compiled"):
         monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
-    assert (
-        program_candidate(Listing.original("two-term"), "python").end(SCENE, END).ended
-        == "complete"
-    )
+    twin = program_candidate(Listing.original("two-term"), "python")
+    assert twin.end(SCENE, END).ended == "complete"
 
 
 def test_end_of_a_method_is_that_of_its_rows() -> None:

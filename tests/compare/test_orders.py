@@ -24,6 +24,8 @@ from pyharness.theory.conditioning import ROUNDING
 from pyharness.truth.reference import Reference, reference
 from pyharness.views.render import render
 
+Patch = pytest.MonkeyPatch
+
 
 def _steps(case: int, step_size: float, steps: int) -> Scene:
     return replace(case_scene(case), step_size=step_size, steps=steps)
@@ -40,8 +42,6 @@ def _order(scene: Scene, program: str | Program, listing: Listing | None = None)
 
 
 WAVE = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e4),))
-# The motion of Case 4 with rescaled time.
-SLOW = scaled(case_scene(4), 1e-8)
 
 
 @pytest.mark.campaign
@@ -49,13 +49,11 @@ SLOW = scaled(case_scene(4), 1e-8)
 @pytest.mark.parametrize(
     "scene",
     [
-        _steps(
-            7, 1.0, 3
-        ),  # results with steps that skip periods of the torque agree, but are wrong
+        _steps(7, 1.0, 3),  # steps that skip periods of the torque agree, but are wrong
         _steps(6, 0.5, 6),  # each program overflows at first
         _steps(4, 5.0, 3),
         Scene("wave", (0.0, 1.0, 1.0), (40.0, 30.0, 20.0), torque=WAVE, steps=4),
-        SLOW,  # the solver finds the matrix of such steps singular
+        scaled(case_scene(4), 1e-8),  # the solver finds the matrix of such steps singular
     ],
     ids=["skipped periods", "overflow", "far too long", "fast torque", "singular at first"],
 )
@@ -144,9 +142,7 @@ def test_rounding_that_grew_is_no_more_than_eight_a_step(share: float, grew: boo
     assert orders._is_grown_rounding(scene, found) == grew
 
 
-def test_larger_errors_than_those_of_a_textbook_are_no_miss(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_larger_errors_than_those_of_a_textbook_are_no_miss(monkeypatch: Patch) -> None:
     """A right program may need more halvings than the limit on steps allows."""
 
     def coarse(self: Program, finer: Scene, *rest: Any, **named: Any) -> Trajectory:
@@ -162,9 +158,7 @@ def test_larger_errors_than_those_of_a_textbook_are_no_miss(
         assert _order(scene, "two-term").state == state
 
 
-def test_a_motion_whose_conditioning_is_unknown_is_not_judged(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_motion_whose_conditioning_is_unknown_is_not_judged(monkeypatch: Patch) -> None:
     def refuse(*_: object) -> Never:
         raise InputError("too many nodes")
 

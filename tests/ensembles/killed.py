@@ -100,11 +100,9 @@ def _start(path: Path, store: Path, executor: str = "here") -> "subprocess.Popen
     command = [sys.executable, "-m", "pyharness", "sweep", str(path), "--out", str(store)]
     # A process group of its own, so that its workers are killed with it.
     return subprocess.Popen(
-        [*command, "--executor", executor],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        [*command, "--executor", executor], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,
-    )
+    )  # fmt: skip
 
 
 def _finish(path: Path, store: Path, executor: str) -> None:

@@ -44,6 +44,17 @@ def _whole(sweep: Sweep) -> dict[str, Any]:
     return found
 
 
+def _grid(sweep: Sweep) -> list[Array]:
+    """Return tilt, c/b and b/a of all points of the sweep `torque`."""
+    axes = [axis.coordinates() for axis in sweep.axes[3:]]
+    return [each.ravel() for each in np.meshgrid(*axes, indexing="ij")]
+
+
+def _axes(sweep: Sweep, *fields: str) -> list[Array]:
+    found = {axis.field: axis.coordinates() for axis in sweep.axes}
+    return [found[field] for field in fields]
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", draw.PICTURES)
 def test_every_sweep_has_its_picture(
@@ -92,8 +103,7 @@ def test_bodies_of_the_thesis_have_their_place_in_the_square() -> None:
 def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "torque", 6)
     found = _whole(sweep)["flips"][0]
-    tilts, up, across = (axis.coordinates() for axis in sweep.axes[3:])
-    tilt, c_b, b_a = (each.ravel() for each in np.meshgrid(tilts, up, across, indexing="ij"))
+    tilt, c_b, b_a = _grid(sweep)
     times = flip_times(_bodies(b_a, c_b), _starts(tilt))
     # The trajectory begins half way between two flips.
     expected = np.floor(50.0 / times + 0.5)
@@ -105,8 +115,7 @@ def test_flips_without_torque_are_those_of_the_closed_form(tmp_path: Path) -> No
 def test_torque_along_the_middle_axis_holds_nobody(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "torque", 6)
     found = _whole(sweep)["flips"]
-    tilts, up, across = (axis.coordinates() for axis in sweep.axes[3:])
-    tilt, c_b, b_a = (each.ravel() for each in np.meshgrid(tilts, up, across, indexing="ij"))
+    tilt, c_b, b_a = _grid(sweep)
     for place in (0, 1, 2):
         torque = sweep.axes[1].coordinates()[place]
         times = _first_flip(_bodies(b_a, c_b), tilt, torque)
@@ -124,10 +133,8 @@ def test_sample_of_the_estimate_shares_what_loads_share() -> None:
 
 
 def _bodies(b_a: Array, c_b: Array) -> Array:
-    parts = np.ones_like(b_a), b_a, b_a * c_b
-    found: Array = np.stack(
-        [parts[1] + parts[2], parts[0] + parts[2], parts[0] + parts[1]], axis=1
-    ) / (1.0 + b_a[:, None])
+    c = b_a * c_b
+    found: Array = np.stack([b_a + c, 1.0 + c, 1.0 + b_a], axis=1) / (1.0 + b_a[:, None])
     return found
 
 
@@ -159,12 +166,9 @@ def _first_flip(bodies: Array, tilt: Array, torque: float) -> Array:
             low, high = np.where(above, middle, low), np.where(above, high, middle)
     # The upper end is a root of omega2 squared: a substitution makes the integrand smooth.
     nodes, weights = np.polynomial.legendre.leggauss(400)
-    u = 0.5 * (nodes + 1.0)
-    values = [
-        0.5 * w * 2.0 * at * low / np.sqrt(np.maximum(square(low * (1.0 - at * at)), 1e-300))
-        for at, w in zip(u, weights, strict=True)
-    ]
-    total: Array = np.sum(values, axis=0)
+    total = np.zeros_like(tilt)
+    for at, w in zip(0.5 * (nodes + 1.0), weights, strict=True):
+        total += w * at * low / np.sqrt(np.maximum(square(low * (1.0 - at * at)), 1e-300))
     return total
 
 
@@ -173,10 +177,7 @@ def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "stops", 41)
     found = _whole(sweep)
     stopped = found["status"] == Statuses.STOPPED
-    steps, constants = (
-        next(axis for axis in sweep.axes if axis.field == field).coordinates()
-        for field in ("step_size", "lipschitz")
-    )
+    steps, constants = _axes(sweep, "step_size", "lipschitz")
     scenes = case_scenes(sweep)
     assert [scene.name for scene in scenes] == ["Case 2", "Case 3", "Case 4", "Case 5"]
     for i, scene in enumerate(scenes):
@@ -204,10 +205,7 @@ def test_corrected_program_stops_where_it_is_predicted(tmp_path: Path) -> None:
 def test_collocation_diverges_where_a_wobble_grows(tmp_path: Path) -> None:
     sweep = _coarse(tmp_path, "collocation", 25)
     found = _whole(sweep)
-    steps, sizes = (
-        next(axis for axis in sweep.axes if axis.field == field).coordinates()
-        for field in ("step_size", "omega.magnitude")
-    )
+    steps, sizes = _axes(sweep, "step_size", "omega.magnitude")
     line = tenfold(sweep.scene.euler_coefficients, sweep.scene.omega, sizes, 10.0)
     changed = ~(found["drift"][..., 0] < 1.0)
     for program, listing in ((0, 1), (1, 0), (1, 1)):

@@ -5,12 +5,10 @@ from pathlib import Path
 import pytest
 
 from pyharness.ensembles.chunk import solve_points
-from pyharness.ensembles.sweep import points
 from pyharness.ensembles.sweep_file import read_sweep
-from tests.ensembles.sweeps import TILT, text, written
+from tests.ensembles.sweeps import TILT, axis, every, text, written
 
-TORQUE = '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.0, 0.3, 0.7]'
-RATE = '[[axis]]\nfield = "torque.rate.2"\nvalues = [0.0, 0.1]'
+TORQUE, RATE = axis("torque.constant.1", [0.0, 0.3, 0.7]), axis("torque.rate.2", [0.0, 0.1])
 TIME = '[[axis]]\nfield = "t_end"\nfrom = 0.5\nto = 40.0\ncount = 4'
 
 
@@ -22,10 +20,10 @@ def test_chunks_change_no_bit(axes: tuple[str, ...], method: str, tmp_path: Path
         axes = tuple(each for each in axes if each != TIME)
     solve = f'[solve]\nmethod = "{method}"'
     sweep = read_sweep(written(tmp_path, text(*axes, solve)))
-    every = points(tuple(slice(0, n) for n in sweep.shape))
-    whole = solve_points(sweep, every)
+    places = every(sweep)
+    whole = solve_points(sweep, places)
     for size in (1, 2, 3, 7, 64):
         for first in range(0, sweep.n_scenes, size):
-            part = solve_points(sweep, [each[first : first + size] for each in every])
+            part = solve_points(sweep, [each[first : first + size] for each in places])
             for name, values in part.items():
                 assert values.tobytes() == whole[name][first : first + size].tobytes()

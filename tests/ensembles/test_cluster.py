@@ -25,12 +25,10 @@ SRUN = 'for task in 1 2 3; do "$@" & done; wait'
 def run(folder: Path, text: str, **more: str) -> None:
     """Run the text of a script in a folder, in which the commands of a cluster are found."""
     commands = {
-        "srun": SRUN,
-        "hostname": "echo 127.0.0.1",
-        "python": f'exec {sys.executable} "$@"',
+        "srun": SRUN, "hostname": "echo 127.0.0.1", "python": f'exec {sys.executable} "$@"',
         "pyharness": f'exec {sys.executable} -m pyharness "$@"',
         "dask": f'exec {sys.executable} -m dask "$@"',
-    }
+    }  # fmt: skip
     places = folder / "bin"
     places.mkdir(exist_ok=True)
     for name, content in commands.items():

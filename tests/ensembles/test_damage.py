@@ -1,5 +1,6 @@
 """Damaged stores: one line names the damage, and a repair restores the same bytes."""
 
+import itertools
 import json
 import os
 import random
@@ -54,28 +55,14 @@ def flip(path: Path, at: int = -1, bit: int = 0) -> None:
     path.write_bytes(content)
 
 
-def truncate(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-1])
+def replaced(make: Callable[[Path], object]) -> Callable[[Path], None]:
+    """Return a damage: something else is made in place of a file."""
 
+    def damage(path: Path) -> None:
+        path.unlink()
+        make(path)
 
-def replace_by_folder(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
-    (path / "letter").write_text("dear")
-
-
-def replace_by_link(path: Path, target: str) -> None:
-    path.unlink()
-    path.symlink_to(target)
-
-
-def replace_by_pipe(path: Path) -> None:
-    path.unlink()
-    os.mkfifo(path)
-
-
-def enlarge(path: Path) -> None:
-    os.truncate(path, 1 << 40)
+    return damage
 
 
 def swap(one: Path, other: Path) -> None:
@@ -86,16 +73,16 @@ def swap(one: Path, other: Path) -> None:
 
 DAMAGES: dict[str, Callable[[Path], object]] = {
     "flipped bit": flip,
-    "truncated": truncate,
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:-1]),
     "empty": lambda path: path.write_bytes(b""),
     "garbage": lambda path: path.write_bytes(os.urandom(50)),
     "longer": lambda path: path.write_bytes(path.read_bytes() + b"\0"),
     "missing": Path.unlink,
-    "folder": replace_by_folder,
-    "pipe": replace_by_pipe,
-    "/dev/zero": lambda path: replace_by_link(path, "/dev/zero"),
-    "link to itself": lambda path: replace_by_link(path, path.name),
-    "a terabyte": enlarge,
+    "folder": replaced(lambda path: (path / "letter").mkdir(parents=True)),
+    "pipe": replaced(os.mkfifo),
+    "/dev/zero": replaced(lambda path: path.symlink_to("/dev/zero")),
+    "link to itself": replaced(lambda path: path.symlink_to(path.name)),
+    "a terabyte": lambda path: os.truncate(path, 1 << 40),
 }
 
 
@@ -143,9 +130,16 @@ def test_chunk_of_another_sweep_is_seen(intact: Path, store: Path, tmp_path: Pat
         run_sweep(other, str(tmp_path / "other"))
 
 
-@pytest.mark.parametrize("name", DAMAGES)
+METADATA = ("zarr.json", "end/zarr.json", "tilt/c/0", "component/c/0", "checksums/metadata")
+
+
+# The fast third has each file and each damage.
 @pytest.mark.parametrize(
-    "file", ["zarr.json", "end/zarr.json", "tilt/c/0", "component/c/0", "checksums/metadata"]
+    ("file", "name"),
+    [
+        pytest.param(*pair, marks=pytest.mark.campaign if number % 3 else ())
+        for number, pair in enumerate(itertools.product(METADATA, DAMAGES))
+    ],
 )
 def test_damaged_metadata_are_one_line_and_are_repaired(
     name: str, file: str, sweep: Sweep, store: Path, intact: Path
@@ -238,7 +232,13 @@ def _damaged_at_random(store: Path, draw: random.Random) -> str:
     return f"{kind}: {path.relative_to(store)}, {other.relative_to(store)}"
 
 
-@pytest.mark.parametrize("seed", range(int(os.environ.get("PYHARNESS_DAMAGES", "60"))))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=pytest.mark.campaign if seed >= 15 else ())
+        for seed in range(int(os.environ.get("PYHARNESS_DAMAGES", "60")))
+    ],
+)
 def test_no_damage_is_believed(
     seed: int, sweep: Sweep, store: Path, intact: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

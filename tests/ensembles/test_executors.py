@@ -22,6 +22,7 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from tests.ensembles.sweeps import PROGRAM, files, quick_and_slow, written
 
+Patch = pytest.MonkeyPatch
 distributed = pytest.importorskip("distributed")
 
 
@@ -72,7 +73,7 @@ def test_killed_worker_of_dask_costs_its_chunks_and_nothing_else(
 
 
 @pytest.mark.campaign
-def test_processes_are_started_once(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processes_are_started_once(sweep: Sweep, monkeypatch: Patch) -> None:
     by_pool, started = executors._by_pool, []
 
     def counted(sweep: Sweep, chunks: list[int], workers: int) -> Any:
@@ -104,9 +105,7 @@ def test_killed_process_costs_its_chunks_and_nothing_else(sweep: Sweep) -> None:
             assert values.tobytes() == arrays[name].tobytes()
 
 
-def test_chunks_whose_processes_die_are_tried_three_times(
-    sweep: Sweep, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chunks_whose_processes_die_are_tried_three_times(sweep: Sweep, monkeypatch: Patch) -> None:
     """Three deaths in a row end the sweep; a chunk in between shows that there is memory enough."""
     started: list[int] = []
     done = iter([1, 0, 2, 0, 0])
@@ -129,9 +128,7 @@ def test_chunks_whose_processes_die_are_tried_three_times(
 
 
 @pytest.mark.campaign
-def test_a_chunk_at_work_does_not_outlive_its_sweep(
-    sweep: Sweep, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_chunk_at_work_does_not_outlive_its_sweep(sweep: Sweep, monkeypatch: Patch) -> None:
     monkeypatch.setattr(executors, "solve_chunk", quick_and_slow)
     before = set(multiprocessing.active_children())
     with engine("processes", 2) as own:

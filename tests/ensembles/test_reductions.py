@@ -20,7 +20,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
 from tests.ensembles.claims import CLAIMS
-from tests.ensembles.sweeps import BASE, PROGRAM, TILT, text, written
+from tests.ensembles.sweeps import BASE, PROGRAM, TILT, axis, text, written
 
 SAMPLES = 400
 
@@ -87,15 +87,15 @@ def test_attitudes_are_those_of_single_scenes(tmp_path: Path, torque: str) -> No
         assert np.abs(found["end"][i] - rows.omega[-1]).max() < 1e-9
         matrices = rows.rotation().as_matrix()
         first = Rotation.from_quat(_START, scalar_first=True).as_matrix()
-        for axis, name in enumerate(_AXES):
-            cosines = matrices[:, :, axis] @ first[:, axis]
+        for n, name in enumerate(_AXES):
+            cosines = matrices[:, :, n] @ first[:, n]
             tilts = np.arccos(np.clip(cosines, -1.0, 1.0))
             assert found[name][i] == pytest.approx(tilts.max(), abs=1e-6)
             assert found[f"error-{name}"][i] == pytest.approx(tilts[-1], abs=1e-6)
             passed = np.diff(np.concatenate([[1.0], np.sign(cosines)])) != 0
             assert found[f"flips-{name}"][i] == passed.sum()
             assert found[f"time-{name}"][i] == pytest.approx(10.0 * (tilts > 1.0).mean())
-            cosine = matrices[-1, :, axis] @ towards / np.linalg.norm(towards)
+            cosine = matrices[-1, :, n] @ towards / np.linalg.norm(towards)
             assert found[f"to-{name}"][i] == pytest.approx(np.arccos(cosine), abs=1e-6)
     assert found["middle"].max() > 1.5
     assert found["flips-middle"].max() > 0
@@ -103,9 +103,8 @@ def test_attitudes_are_those_of_single_scenes(tmp_path: Path, torque: str) -> No
 
 
 def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) -> None:
-    axis = '[[axis]]\nfield = "attitude.1"\nvalues = [0.0, 0.5, 2.0]'
     top = 'reductions = ["attitude", {name = "pointing-error", towards = [0, 0, 1]}, "status"]'
-    sweep, found = _found(tmp_path, text(axis, top=top))
+    sweep, found = _found(tmp_path, text(axis("attitude.1", [0.0, 0.5, 2.0]), top=top))
     for i, x in enumerate((0.0, 0.5, 2.0)):
         rows = solve(replace(sweep.scene, attitude=(1.0, x, 0.0, 0.0)), 10.0, attitude=True)
         assert rows.attitude is not None
@@ -117,8 +116,8 @@ def test_initial_attitudes_may_vary_where_a_quantity_needs_them(tmp_path: Path) 
 @pytest.mark.campaign
 def test_error_and_drift_are_those_of_the_method(tmp_path: Path) -> None:
     top = 'reductions = ["drift", "error", {name = "error", samples = 4, as = "on-the-way"}]'
-    axis = '[[axis]]\nfield = "method"\nvalues = ["rk4", "improved-euler", "rk45"]'
-    sweep = read_sweep(written(tmp_path, text(axis, TILT, top=top, scene=_COARSE)))
+    methods = axis("method", ["rk4", "improved-euler", "rk45"])
+    sweep = read_sweep(written(tmp_path, text(methods, TILT, top=top, scene=_COARSE)))
     found = [solve_chunk(sweep, chunk) for chunk in range(sweep.n_chunks)]
     errors = [each["error"].max() for each in found]
     assert errors[1] > 10.0 * errors[0] > 100.0 * errors[2] > 0.0
@@ -136,8 +135,7 @@ _COARSE = BASE.replace("0.1", "0.2").replace("100", "50") + "[solve]\ntolerance 
 
 
 def test_growth_is_that_of_the_middle_axis(tmp_path: Path) -> None:
-    axis = '[[axis]]\nfield = "t_end"\nvalues = [10.0, 15.0]'
-    _, found = _found(tmp_path, text(axis, top='reductions = ["growth"]'))
+    _, found = _found(tmp_path, text(axis("t_end", [10.0, 15.0]), top='reductions = ["growth"]'))
     logarithms = found["growth"] * [10.0, 15.0]
     # In the long run a perturbation grows with the rate sqrt((I2 - I1) (I3 - I2) / (I1 I3)).
     assert np.diff(logarithms) / 5.0 == pytest.approx(3.0**-0.5, rel=1e-3)
@@ -152,11 +150,8 @@ def test_programs_stop_where_they_stop_alone(tmp_path: Path) -> None:
         listing = listing_of("runge-kutta", names[sweep.box(chunk)[0].start], "adopted")
         for sample in (0, 5, 11):
             for number, step_size in enumerate((0.01, 0.02)):
-                omega = (
-                    sweep.axes[1].coordinates()[sample],
-                    case_scene(3).omega[1],
-                    sweep.axes[2].coordinates()[sample],
-                )
+                first, third = (sweep.axes[n].coordinates()[sample] for n in (1, 2))
+                omega = first, case_scene(3).omega[1], third
                 scene = Scene("", omega, moments=case_scene(3).moments, step_size=step_size)
                 alone = run_program(scene, listing)
                 at = (0, sample, number)
@@ -173,17 +168,14 @@ def test_programs_stop_where_they_stop_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "axis",
-    [
-        '[[axis]]\nfield = "lipschitz"\nfrom = 0.5\nto = 500.0\ncount = 5\nspacing = "log"',
-        '[[axis]]\nfield = "body.moments.1"\nvalues = [1.0, 1e-300]',
-        '[[axis]]\nfield = "torque.constant.1"\nvalues = [0.0, 2.0]',
-        '[[axis]]\nfield = "steps"\nvalues = [10, 20]',
-        '[[axis]]\nfield = "torque.rate.1"\nvalues = [0.0, 1.0]',
-    ],
-)
-def test_programs_side_by_side_have_the_bits_of_single_runs(axis: str, tmp_path: Path) -> None:
-    sweep = read_sweep(written(tmp_path, PROGRAM + axis))
+    ("field", "values"),
+    [("lipschitz", [0.5, 3.0, 500.0]), ("body.moments.1", [1.0, 1e-300]),
+     ("torque.constant.1", [0.0, 2.0]), ("steps", [10, 20]), ("torque.rate.1", [0.0, 1.0])],
+)  # fmt: skip
+def test_programs_side_by_side_have_the_bits_of_single_runs(
+    field: str, values: list[float], tmp_path: Path
+) -> None:
+    sweep = read_sweep(written(tmp_path, PROGRAM + axis(field, values)))
     kinds = set()
     for chunk in range(sweep.n_chunks):
         for _, batch in batches(sweep, points(sweep.box(chunk))):
@@ -206,20 +198,12 @@ def test_programs_side_by_side_have_the_bits_of_single_runs(axis: str, tmp_path:
 
 def test_overflow_has_its_time(tmp_path: Path) -> None:
     scene = """
-[scene.body]
-coefficients = [1.0, 1.0, 1.0]
-[scene.initial]
-omega = [1.0, 1.0, 1.0]
-[scene.run]
-steps = 500
-[solve]
-program = "two-term"
-listing = "corrected"
+scene = { body.coefficients = [1.0, 1.0, 1.0], initial.omega = [1.0, 1.0, 1.0], run.steps = 500 }
+solve = { program = "two-term", listing = "corrected" }
 """
-    axis = '[[axis]]\nfield = "omega.1"\nvalues = [1.0, 2.0]'
-    steps = '[[axis]]\nfield = "step_size"\nvalues = [0.001, 0.02]'
+    axes = axis("omega.1", [1.0, 2.0]), axis("step_size", [0.001, 0.02])
     top = 'reductions = ["overflow-time", "status"]'
-    _, found = _found(tmp_path, text(axis, steps, top=top, scene=scene))
+    _, found = _found(tmp_path, text(*axes, top=top, scene=scene))
     overflown = found["status"] == Statuses.OVERFLOW
     assert overflown.tolist() == [[False, True], [False, True]]
     assert (np.isfinite(found["overflow-time"]) == overflown).all()
@@ -230,9 +214,8 @@ listing = "corrected"
 
 def test_claims_are_asked_by_name(tmp_path: Path) -> None:
     top = 'reductions = [{name = "claim", id = "stays"}]'
-    axis = '[[axis]]\nfield = "omega.2"\nvalues = [0.0, 1.0, 5.0]'
-    other = '[[axis]]\nfield = "omega.1"\nvalues = [0.0, 0.5]'
-    _, found = _found(tmp_path, text(axis, other, top=top))
+    axes = axis("omega.2", [0.0, 1.0, 5.0]), axis("omega.1", [0.0, 0.5])
+    _, found = _found(tmp_path, text(*axes, top=top))
     judged = found["claim-stays"]
     assert judged.dtype == np.int8
     assert judged[:, 0].tolist() == [2, 1, 1]
@@ -252,8 +235,7 @@ def test_error_is_relative_to_the_largest_component_up_to_there(tmp_path: Path) 
         "[scene.run]", "[scene.torque]\nconstant = [0.1, -0.2, 0.3]\n[scene.run]"
     )
     top = 'reductions = ["end", {name = "error", samples = 4, as = "on-the-way"}]'
-    axis = '[[axis]]\nfield = "method"\nvalues = ["improved-euler"]'
-    _, found = _found(tmp_path, text(axis, top=top, scene=scene))
+    _, found = _found(tmp_path, text(axis("method", ["improved-euler"]), top=top, scene=scene))
     torque = TorqueLaw((0.1, -0.2, 0.3))
     body = Scene("", (0.0, 1e-3, 0.0), moments=(1, 2, 3), torque=torque, step_size=0.2, steps=50)
     times = [2.5, 5.0, 7.5, 10.0]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, read_scene, solve, torques
 from pyharness.ensembles.batches import batches
@@ -16,11 +17,10 @@ from pyharness.ensembles.executors import EXECUTORS
 from pyharness.ensembles.forecast import places_of_a_chunk
 from pyharness.ensembles.run import swept
 from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep import Sweep, points, spread
+from pyharness.ensembles.sweep import Sweep, spread
 from pyharness.ensembles.sweep_file import read_sweep
-from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
-from tests.ensembles.sweeps import written
+from tests.ensembles.sweeps import axis, every, written
 
 SCENE = """
 [scene.body]
@@ -45,11 +45,6 @@ rate = 0.7
 """
 
 
-def axis(field: str, values: list[float]) -> str:
-    """Return a table [[axis]] with these values."""
-    return f'[[axis]]\nfield = "{field}"\nvalues = {values}\n'
-
-
 def text(*axes: str, scene: str = SCENE, solver: str = "") -> str:
     """Return a sweep file that stores omega at the end and the status."""
     head = 'reductions = ["end", "status"]\n'
@@ -58,7 +53,7 @@ def text(*axes: str, scene: str = SCENE, solver: str = "") -> str:
 
 def ends(sweep: Sweep) -> Any:
     """Return omega at the end for all scenes, and check that all were solved."""
-    found = solve_points(sweep, points(tuple(slice(0, n) for n in sweep.shape)))
+    found = solve_points(sweep, every(sweep))
     assert (found["status"] == Statuses.COMPLETE).all()
     return found["end"]
 
@@ -113,8 +108,7 @@ def test_constants_and_omega_on_one_grid(tmp_path: Path) -> None:
         for j, a in enumerate((0.0, 1.0)):
             one = scene_of(omega=(x, 1.0, 0.8), torque=torque_of(a=a))
             assert np.abs(found[i, j] - solve(one, 2.0, attitude=True).omega[0]).max() < 1e-10
-    counts = [len(members) for members, _ in batches(sweep, points((slice(0, 3), slice(0, 2))))]
-    assert counts == [3, 3]
+    assert [len(members) for members, _ in batches(sweep, every(sweep))] == [3, 3]
 
 
 @pytest.mark.parametrize("inertia", ["", "inertia = [4.0, 3.0, 2.5]\n"])
@@ -133,7 +127,7 @@ def test_term_has_the_inertia_of_the_varied_body(inertia: str, tmp_path: Path) -
 
 def test_constant_that_is_not_allowed_refuses_its_scenes_alone(tmp_path: Path) -> None:
     sweep = read_sweep(written(tmp_path, text(axis("torque.constants.k", [-1.0, 0.3]))))
-    found = solve_points(sweep, points((slice(0, 2),)))
+    found = solve_points(sweep, every(sweep))
     assert found["status"].tolist() == [Statuses.REFUSED, Statuses.COMPLETE]
     assert np.isnan(found["end"][0]).all()
     assert np.isfinite(found["end"][1]).all()
@@ -143,22 +137,17 @@ def test_constant_that_is_not_allowed_refuses_its_scenes_alone(tmp_path: Path) -
 def test_attitudes_are_relative_to_the_start(constant: float, tmp_path: Path) -> None:
     content = text(axis("torque.constants.m", [constant]), axis("attitude.2", [0.6, -0.5]))
     sweep = read_sweep(written(tmp_path, content))
-    ((_, batch),) = batches(sweep, points((slice(0, 1), slice(0, 2))))
+    ((_, batch),) = batches(sweep, every(sweep))
     start = np.array([[0.5, 0.5, x, 0.5] for x in (0.6, -0.5)])
     attitudes = replace(batch, attitude=True).attitudes(1)[:, 0]
     for one, attitude in zip(start, attitudes, strict=True):
         scene = scene_of(attitude=one, torque=torque_of(m=constant))
         path = solve(scene, 2.0, attitude=True)
         assert path.attitude is not None
-        (before, after) = (_matrix(q) for q in (one, path.attitude[0]))
-        assert before.T @ after == pytest.approx(_matrix(attitude), abs=1e-9)
-
-
-def _matrix(q: Any) -> Any:
-    w, v = q[0], np.array(q[1:])
-    cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    size = w * w + v @ v
-    return ((w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross) / size
+        before, after, turned = Rotation.from_quat(
+            [one, path.attitude[0], attitude], scalar_first=True
+        ).as_matrix()
+        assert before.T @ after == pytest.approx(turned, abs=1e-9)
 
 
 OMEGA = axis("omega.1", [0.2])
@@ -170,8 +159,7 @@ def test_store_has_the_torque_and_refuses_another(tmp_path: Path) -> None:
     scene.write_text(SCENE.replace("scene.", ""))
     content = text(OMEGA, scene='[scene]\nfile = "damped.toml"')
     store = tmp_path / "store"
-    sweep = read_sweep(written(tmp_path, content))
-    with swept(sweep, str(store), EXECUTORS[0]):
+    with swept(read_sweep(written(tmp_path, content)), str(store), EXECUTORS[0]):
         pass
     attributes = json.loads((store / "zarr.json").read_text())["attributes"]
     again = tmp_path / "again.toml"
@@ -193,14 +181,13 @@ def test_scenes_solved_one_by_one_refuse_what_they_can_not_solve(tmp_path: Path)
     for solver in ("", 'method = "dop853"'):
         content = text(axis("attitude.0", [1.0, 0.0]), scene=scene, solver=solver)
         sweep = read_sweep(written(tmp_path, content))
-        batch: Batch
-        ((_, batch),) = batches(sweep, points((slice(0, 2),)))
+        ((_, batch),) = batches(sweep, every(sweep))
         assert batch.status.tolist() == [Statuses.COMPLETE, Statuses.REFUSED]
 
 
 def test_forecast_keeps_constants_that_every_scene_has_of_its_own(tmp_path: Path) -> None:
     drawn = (
-        '[[axis]]\nfield = "{}"\ndraw = "uniform"\nfrom = 0.1\nto = 1.0\ncount = 900\nseed = 1\n'
+        '[[axis]]\nfield = "{}"\ndraw = "uniform"\nfrom = 0.1\nto = 1.0\nseed = 1\ncount = 900\n'
     )
     fields = "torque.constants.k", "omega.1"
     sweep = read_sweep(written(tmp_path, text(*map(drawn.format, fields))))

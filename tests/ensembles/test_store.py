@@ -10,8 +10,8 @@ import time
 import tracemalloc
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,8 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from tests.ensembles.killed import ATTITUDE, OMEGA, kill_and_resume
 from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
+
+Patch = pytest.MonkeyPatch
 
 
 @pytest.mark.campaign
@@ -71,23 +73,17 @@ def test_draws_and_results_do_not_depend_on_the_chunks(tmp_path: Path) -> None:
     for chunk in (20, 7, 1000):
         content = PROGRAM.replace("chunk = 20", f"chunk = {chunk}")
         sweep = read_sweep(written(tmp_path, content))
-        with opened_after(sweep, tmp_path / str(chunk)) as found_store:
-            found.append(
-                {name: found_store.array(name)[...] for name in ("end", "stop-step", "error")}
-            )
+        run_sweep(sweep, str(tmp_path / str(chunk)))
+        with opened(sweep, str(tmp_path / str(chunk))) as there:
+            found.append({name: there.array(name)[...] for name in ("end", "stop-step", "error")})
     for other in found[1:]:
         for name, values in found[0].items():
             assert values.tobytes() == other[name].tobytes()
 
 
-def opened_after(sweep: Any, path: Path) -> Any:
-    run_sweep(sweep, str(path))
-    return opened(sweep, str(path))
-
-
 @pytest.mark.campaign
 def test_disk_that_fills_ends_in_a_line_and_a_store_that_resumes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: Patch
 ) -> None:
     from zarr.storage import _local  # noqa: PLC2701
 
@@ -153,17 +149,14 @@ def test_store_of_another_sweep_stays_as_it_was(tmp_path: Path) -> None:
 
 def test_two_sweeps_do_not_write_to_one_store(tmp_path: Path) -> None:
     sweep = read_sweep(written(tmp_path, text(TILT)))
-    with (
-        opened(sweep, str(tmp_path / "store")),
-        pytest.raises(InputError, match="--out"),
-    ):
-        run_sweep(sweep, str(tmp_path / "store"))
-    assert run_sweep(sweep, str(tmp_path / "store")).computed == 1
-    assert run_sweep(sweep, str(tmp_path / "store")).computed == 0
+    path = str(tmp_path / "store")
+    with opened(sweep, path), pytest.raises(InputError, match="--out"):
+        run_sweep(sweep, path)
+    assert [run_sweep(sweep, path).computed for _ in range(2)] == [1, 0]
 
 
 def test_store_that_another_process_makes_meanwhile_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: Patch
 ) -> None:
     sweep = read_sweep(written(tmp_path, text(TILT)))
     make, folder = store_layout.filled, tmp_path / "store"
@@ -200,7 +193,7 @@ def test_sweeps_that_start_at_once_leave_one_at_work(tmp_path: Path) -> None:
 
 
 @pytest.mark.campaign
-def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: Patch) -> None:
     axis = TILT.replace("count = 6", "count = 100000")
     sweep = read_sweep(written(tmp_path, text(axis, top='chunk = 1\nreductions = ["end"]')))
     write, read = store.Store.write, store.Store.read
@@ -222,19 +215,7 @@ def test_forecast_has_the_time_of_files(tmp_path: Path, monkeypatch: pytest.Monk
     assert [each.name for each in tmp_path.iterdir()] == ["sweep.toml"]
 
 
-@dataclass(frozen=True)
-class Disk:
-    """The numbers of a file system that `os.statvfs` returns."""
-
-    f_frsize: int
-    f_bavail: int
-    f_files: int
-    f_favail: int
-
-
-def test_file_of_the_longest_axis_is_within_its_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_of_the_longest_axis_is_within_its_limit(tmp_path: Path, monkeypatch: Patch) -> None:
     """Zstandard adds at most 1/256 to what it can't compress; a larger file is an error in a line.
 
     The limit of the file is compared as the metadata are written, and as they are read.
@@ -247,7 +228,7 @@ def test_file_of_the_longest_axis_is_within_its_limit(
 
 
 def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: Patch
 ) -> None:
     long = "\n".join(
         f'[[axis]]\nfield = "omega.{axis}"\nfrom = 1.0\nto = 2.0\ncount = 100000'
@@ -260,10 +241,10 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
     # Each chunk has four files, and each of them takes a block of the disk.
     top = 'chunk = 1\nreductions = ["end", "status", "growth"]'
     small = read_sweep(written(tmp_path, text(TILT.replace("count = 6", "count = 1000"), top=top)))
-    disk = Disk(f_frsize=4096, f_bavail=4000, f_files=10, f_favail=4000)
+    disk = {"f_frsize": 4096, "f_bavail": 4000, "f_files": 10, "f_favail": 4000}
     assert check_size(small, str(tmp_path), 1, 1000)[0] == 4000 * 4096
     for spare, words in (("f_bavail", "16.4 MB, and 16.4 MB are free"), ("f_favail", "4000 files")):
-        full = replace(disk, **{spare: 3999})
+        full = SimpleNamespace(**{**disk, spare: 3999})
         monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
         with pytest.raises(InputError, match=words):
             run_sweep(small, str(tmp_path / "store"))
@@ -275,9 +256,7 @@ def test_what_neither_disk_nor_memory_holds_is_refused_at_once(
 
 
 @pytest.mark.campaign
-def test_memory_is_refused_where_the_half_of_it_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_is_refused_where_the_half_of_it_ends(tmp_path: Path, monkeypatch: Patch) -> None:
     sweep = read_sweep(written(tmp_path, text(TILT)))
     estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
     assert estimate is not None

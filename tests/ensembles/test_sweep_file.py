@@ -11,7 +11,7 @@ from pyharness.ensembles.batches import batches
 from pyharness.ensembles.sweep import points, spread
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.scene_file import case_scene
-from tests.ensembles.sweeps import BASE, PROGRAM, SQUARE, TILT, text, written
+from tests.ensembles.sweeps import BASE, PROGRAM, SQUARE, TILT, axis, every, text, written
 
 
 def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None:
@@ -44,22 +44,18 @@ values = ["adopted", "do-variable"]
 def test_words_along_one_dimension_go_together(tmp_path: Path) -> None:
     """The four-term program has no DO variable, so a grid of the two dimensions is refused."""
     sweep = read_sweep(written(tmp_path, READINGS))
-    where = points(tuple(slice(0, n) for n in sweep.shape))
-    listings = [batch.listing for _, batch in batches(sweep, where)]
-    assert [(each.program, set(each.readings)) for each in listings if each] == [
-        ("four-term", set()),
-        ("runge-kutta", {"do-variable"}),
-    ]
+    listings = [batch.listing for _, batch in batches(sweep, every(sweep))]
+    found = [(each.program, *each.readings) for each in listings if each]
+    assert found == [("four-term",), ("runge-kutta", "do-variable")]
 
 
 def test_height_and_longitude_go_over_the_sphere(tmp_path: Path) -> None:
     axes = (
-        '[[axis]]\nfield = "height"\nvalues = [-1.0, 0.6]',
-        f'[[axis]]\nfield = "longitude"\nvalues = [0.0, {np.pi / 2.0}]',
-        '[[axis]]\nfield = "omega.magnitude"\nvalues = [10.0]',
-    )
+        axis("height", [-1.0, 0.6]), axis("longitude", [0.0, np.pi / 2.0]),
+        axis("omega.magnitude", [10.0]),
+    )  # fmt: skip
     sweep = read_sweep(written(tmp_path, text(*axes)))
-    ((_, batch),) = batches(sweep, points(tuple(slice(0, n) for n in sweep.shape)))
+    ((_, batch),) = batches(sweep, every(sweep))
     wanted = [[0.0, 0.0, -10.0], [0.0, 0.0, -10.0], [8.0, 0.0, 6.0], [0.0, 8.0, 6.0]]
     assert np.abs(batch.omega0 - wanted).max() < 1e-14
 
@@ -74,19 +70,17 @@ def test_sample_reaches_the_ends_of_any_grid(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("how", ["uniform", "log-uniform", "normal", "sphere"])
 def test_draws_are_what_they_are_called(how: str) -> None:
-    table = {"field": "tilt", "draw": how, "count": 20_000, "seed": 3}
+    table = {"field": "tilt", "draw": how, "count": 20_000}
     more = {"normal": {"mean": 2.0, "deviation": 0.5}, "sphere": {}}.get(how, {"from": 1, "to": 4})
-    values = axis_of({**table, **more}, 1).coordinates()
-    again = axis_of({**table, **more}, 2).coordinates()
-    other = axis_of({**table, **more, "seed": 4}, 1).coordinates()
+    values, again, other = (
+        axis_of({**table, **more, "seed": seed}, n).coordinates()
+        for seed, n in ((3, 1), (3, 2), (4, 1))
+    )
     assert (values == again).all()
     assert (values != other).any()
     expected = {
-        "uniform": 2.5,
-        "log-uniform": 3.0 / np.log(4.0),
-        "normal": 2.0,
-        "sphere": np.pi / 2.0,
-    }
+        "uniform": 2.5, "log-uniform": 3.0 / np.log(4.0), "normal": 2.0, "sphere": np.pi / 2.0,
+    }  # fmt: skip
     assert abs(values.mean() - expected[how]) < 0.05
 
 
@@ -106,22 +100,17 @@ def test_every_body_of_the_square_is_real_and_as_asked(tmp_path: Path) -> None:
 
 
 def test_fields_reach_the_scenes(tmp_path: Path) -> None:
-    axes = [
-        '[[axis]]\nfield = "body.ratio.1"\nvalues = [0.5, 0.25]',
-        '[[axis]]\nfield = "torque.constant.2"\nvalues = [0.0, 3.0]',
-        '[[axis]]\nfield = "omega.magnitude"\nvalues = [2.0]',
-        '[[axis]]\nfield = "t_end"\nvalues = [1.0, -2.0]',
-        '[[axis]]\nfield = "tolerance"\nvalues = [1e-6, 1e-9]',
-    ]
+    axes = (
+        axis("body.ratio.1", [0.5, 0.25]), axis("torque.constant.2", [0.0, 3.0]),
+        axis("omega.magnitude", [2.0]), axis("t_end", [1.0, -2.0]), axis("tolerance", [1e-6, 1e-9]),
+    )  # fmt: skip
     sweep = read_sweep(written(tmp_path, text(*axes)))
     found = list(batches(sweep, points(sweep.box(0))))
     assert [batch.solver.tolerance for _, batch in found] == [1e-9, 1e-6]
     batch = found[0][1]
     assert len(batch.omega0) == 8
-    assert sorted({tuple(row) for row in batch.arrays["moments"].tolist()}) == [
-        (0.75, 2, 3),
-        (1.5, 2, 3),
-    ]
+    moments = {tuple(row) for row in batch.arrays["moments"].tolist()}
+    assert moments == {(0.75, 2, 3), (1.5, 2, 3)}
     assert sorted(set(batch.arrays["torque_constant"][:, 1])) == [0.0, 3.0]
     assert (batch.omega0 == [0.0, 2.0, 0.0]).all()
     assert sorted(set(batch.t_end)) == [-2.0, 1.0]
@@ -147,11 +136,8 @@ def test_sweep_of_the_documents_is_one() -> None:
 @pytest.mark.parametrize("more", ["", "draw = 'uniform'\nseed = 1\n"])
 @pytest.mark.parametrize("ends", [(-1.7e308, 1.7e308), (1.7e308, -1.7e308)])
 def test_axis_may_span_the_whole_range_of_numbers(ends: tuple[float, float], more: str) -> None:
-    """The difference of the ends overflows."""
-    spread = [f"from = {ends[0]}", f"to = {ends[1]}", "count = 5"]
-    table = "\n".join(["field = 'omega.1'", *spread, more])
-    axis = axis_of(tomllib.loads(table), 1)
-    values = axis.coordinates()
+    table = f"field = 'omega.1'\nfrom = {ends[0]}\nto = {ends[1]}\ncount = 5\n{more}"
+    values = axis_of(tomllib.loads(table), 1).coordinates()
     assert np.abs(values).max() <= 1.7e308
     if not more:
         assert (values[0], values[-1]) == ends

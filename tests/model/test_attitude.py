@@ -1,5 +1,6 @@
 """Attitudes as given and as printed; full inertia matrices."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,15 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from pyharness import (
-    Scene,
-    TorqueLaw,
-    prepare,
-    principal,
-    read_scene,
-    solve,
-    solve_many,
-)
+from pyharness import Scene, TorqueLaw, prepare, principal, read_scene, solve, solve_many
 from pyharness.model.attitude import angles, matrices, of_angles, product
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
@@ -55,10 +48,10 @@ def test_poles_keep_their_digits(sequence: str, pole: float, beside: float) -> N
 
 def test_product_is_hamiltons() -> None:
     p, q = _random(2)
-    both = Rotation.from_quat(p[[1, 2, 3, 0]]) * Rotation.from_quat(q[[1, 2, 3, 0]])
+    turns = (Rotation.from_quat(each, scalar_first=True) for each in (p, q))
+    both = math.prod(turns, start=Rotation.identity()).as_quat(scalar_first=True)
     found = np.array(product(tuple(p), tuple(q)))
-    assert min(abs(found - both.as_quat()[[3, 0, 1, 2]]).max(),
-               abs(found + both.as_quat()[[3, 0, 1, 2]]).max()) < 1e-15  # fmt: skip
+    assert min(abs(found - both).max(), abs(found + both).max()) < 1e-15
 
 
 def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
@@ -75,9 +68,8 @@ def test_attitude_is_divided_by_its_length(tmp_path: Path) -> None:
 
 
 def test_inertia_near_the_end_of_numbers_has_its_moments() -> None:
-    scene = Scene(
-        "", (1.0, 2.0, 3.0), inertia=((1.0, 0.1, 0.0), (0.1, 1.0, 0.0), (0.0, 0.0, 1e308))
-    )
+    inertia = (1.0, 0.1, 0.0), (0.1, 1.0, 0.0), (0.0, 0.0, 1e308)
+    scene = Scene("", (1.0, 2.0, 3.0), inertia=inertia)
     assert principal(scene)[0].moments == (0.9, 1.1, 1e308)
 
 
@@ -116,15 +108,9 @@ def test_rounding_alone_may_make_inertia_unsymmetric() -> None:
     Scene("", (1, 2, 3), inertia=((2.0, 0.0, 0.0), (1.8e-12, 2.0, 0.0), (0.0, 0.0, 2.0)))
 
 
-def test_impossible_inertia_is_told() -> None:
-    thin = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 3.0))
-    assert Scene("", (0.0, 0.0, 1.0), inertia=thin).is_impossible
-    assert not Scene("", (0.0, 0.0, 1.0), inertia=TILTED).is_impossible
-
-
 def test_principal_axes_are_a_right_handed_frame() -> None:
     generator = np.random.default_rng(8)
-    for _ in range(200):
+    for _ in range(30):
         turn = Rotation.from_quat(generator.normal(size=4)).as_matrix()
         moments = generator.uniform(1.0, 2.0, 3)
         matrix = turn @ np.diag(moments) @ turn.T
@@ -152,6 +138,5 @@ def test_a_rotation_of_scipy_is_an_attitude_everywhere() -> None:
         np.testing.assert_array_equal(batch.attitude, same.attitude)
         many = solver.many(starts, 1.0, given)[1]
         np.testing.assert_array_equal(many, solver.many(starts, 1.0, numbers)[1])
-    np.testing.assert_array_equal(
-        solver(starts[0], 1.0, turns[1])[1], solver(starts[0], 1.0, rows[1])[1]
-    )
+    one, other = (solver(starts[0], 1.0, given)[1] for given in (turns[1], rows[1]))
+    np.testing.assert_array_equal(one, other)

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,13 +22,17 @@ ROOT = Path(__file__).parent.parent.parent
 LIBRARIES = ("gfortran", "quadmath", "flang", "FortranRuntime", "ifcore", "imf")
 
 
+def _run(*command: str | Path, **more: Any) -> "subprocess.CompletedProcess[str]":
+    words = [str(each) for each in command]
+    return subprocess.run(words, capture_output=True, text=True, check=False, **more)
+
+
 @pytest.mark.external
 @pytest.mark.skipif("-fcheck" in (build().flags or ""), reason="run-time checks have messages")
 def test_extension_needs_no_fortran_library_at_run_time() -> None:
     on_mac = sys.platform == "darwin"
-    command = ["otool", "-L"] if on_mac else ["readelf", "-d"]
-    command.append(extension.extension().__file__ or "")
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    command = ("otool", "-L") if on_mac else ("readelf", "-d")
+    done = _run(*command, extension.extension().__file__ or "")
     lines = done.stdout.splitlines()[1:]
     needed = "\n".join(line for line in lines if on_mac or "NEEDED" in line)
     assert "lib" in needed
@@ -58,18 +63,16 @@ def test_kind_that_f2py_would_guess_fails_the_build(tmp_path: Path) -> None:
     for text, code in ((good, 0), (bad, 1)):
         source = tmp_path / "x.f90"
         source.write_text(text)
-        command = [sys.executable, str(script), "m", str(tmp_path), str(source)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = _run(sys.executable, script, "m", tmp_path, source)
         assert done.returncode == code, done.stderr
         assert ("is mapped to C" in done.stderr) == bool(code)
 
 
-def _hook(*folders: Path) -> subprocess.CompletedProcess[str]:
+def _hook(*folders: Path) -> "subprocess.CompletedProcess[str]":
     """Run the build backend's hook for an editable install, with these folders on the path."""
     code = "import build_backend as b; print(b.get_requires_for_build_editable())"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders))}
-    command = [sys.executable, "-c", code]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    return _run(sys.executable, "-c", code, env=environment)
 
 
 @pytest.mark.campaign
@@ -126,10 +129,8 @@ def test_arithmetic_that_can_not_be_tested_is_no_fault(
 @pytest.mark.parametrize("variable", ["CFLAGS", "FFLAGS"])
 def test_a_build_with_such_flags_is_refused_in_one_line(variable: str, tmp_path: Path) -> None:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        ["meson", "setup", str(tmp_path / "build"), str(ROOT)], cwd=tmp_path, check=False,
-        env=os.environ | {"PATH": path, variable: "-Ofast"}, capture_output=True, text=True,
-    )  # fmt: skip
+    environment = os.environ | {"PATH": path, variable: "-Ofast"}
+    done = _run("meson", "setup", tmp_path / "build", ROOT, cwd=tmp_path, env=environment)
     assert done.returncode == 1
     (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
     assert "-Ofast" in line.partition("' removes or reorders operations")[0]
@@ -146,10 +147,7 @@ def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) 
             (tools / tool).symlink_to(found)
     here = Path(sys.executable).parent
     environment = {"PATH": f"{here}{os.pathsep}{tools}", "HOME": os.environ.get("HOME", "/")}
-    command = ["meson", "setup", str(tmp_path / "build"), str(ROOT)]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    done = _run("meson", "setup", tmp_path / "build", ROOT, cwd=tmp_path, env=environment)
     assert done.returncode == 1
     (line,) = (each for each in done.stdout.splitlines() if "ERROR" in each)
     assert "no Fortran compiler is found: install one" in line
@@ -160,12 +158,10 @@ def test_a_build_without_a_fortran_compiler_says_so_in_one_line(tmp_path: Path) 
 @pytest.mark.skipif(not (ROOT / ".ci/setup").exists(), reason="needs a checkout")
 @pytest.mark.parametrize(
     ("python", "compiler", "words"),
-    [
-        (sys.executable, "gfortran", "apt-get install gfortran"),
-        (sys.executable, "no-such-fortran", "no Fortran compiler 'no-such-fortran'"),
-        ("no-such-python", "gfortran", "there is no 'no-such-python'"),
-    ],
-)
+    [(sys.executable, "gfortran", "apt-get install gfortran"),
+     (sys.executable, "no-such-fortran", "no Fortran compiler 'no-such-fortran'"),
+     ("no-such-python", "gfortran", "there is no 'no-such-python'")],
+)  # fmt: skip
 def test_setup_that_can_not_go_on_says_what_to_do(
     python: str, compiler: str, words: str, tmp_path: Path
 ) -> None:
@@ -176,10 +172,7 @@ def test_setup_that_can_not_go_on_says_what_to_do(
     for tool in ("sh", "id", "mkdir", "rm", "grep", "tail", "env"):
         (tools / tool).symlink_to(shutil.which(tool) or "")
     environment = {"PATH": str(tools), "INSTALL": "no", "HOME": os.environ.get("HOME", "/")}
-    command = [str(ROOT / ".ci/setup"), python, compiler]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    done = _run(ROOT / ".ci/setup", python, compiler, cwd=tmp_path, env=environment)
     assert done.returncode == 1
     assert words in done.stderr
     assert "meson" not in done.stderr

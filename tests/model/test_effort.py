@@ -158,6 +158,5 @@ def test_refusal_comes_back_from_another_process() -> None:
     """An error that can't be unpickled leaves a pool waiting for ever."""
     known = TimedError("exceeded its work limit at t = {time} s", 2.5)
     back = pickle.loads(pickle.dumps(known))
-    assert (str(back), back.time, str(back.slower(2.0))) == (
-        "exceeded its work limit at t = 2.5 s", 2.5, "exceeded its work limit at t = 5 s",
-    )  # fmt: skip
+    assert (str(back), back.time) == ("exceeded its work limit at t = 2.5 s", 2.5)
+    assert str(back.slower(2.0)) == "exceeded its work limit at t = 5 s"

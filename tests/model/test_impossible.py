@@ -8,26 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import (
-    ImpossibleBodyWarning,
-    Scene,
-    case_scene,
-    compare_programs,
-    read_scene,
-    run_program,
-    solve,
-    subset,
-)
+from pyharness import ImpossibleBodyWarning, Scene, compare_programs, read_scene, solve, subset
 from pyharness.cli.main import main
 from pyharness.model.impossible import breaks_triangle
+from pyharness.model.scene_file import case_scene
+from pyharness.original.programs import run_program
 
 IMPOSSIBLE = (200.0, 10.0, 20.0)
-BODY = "[body]\nmoments = [200.0, 10.0, 20.0]\n[initial]\nomega = [1.0, 2.0, 3.0]\n"
 
 
 def _file(folder: Path) -> Path:
     path = folder / "scene.toml"
-    path.write_text(BODY)
+    path.write_text("body.moments = [200.0, 10.0, 20.0]\ninitial.omega = [1.0, 2.0, 3.0]\n")
     return path
 
 

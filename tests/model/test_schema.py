@@ -28,7 +28,7 @@ from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
 from pyharness.scenes.moderate import draw_moderate
-from tests.ensembles.sweeps import TILT, text, written
+from tests.ensembles.sweeps import TILT, files, text, written
 from tests.ports import engine
 
 ROOT = Path(__file__).parent.parent.parent
@@ -62,15 +62,13 @@ def sweep_store(folder: Path) -> Reader:
     return Reader(store / "zarr.json", lambda: run_sweep(sweep, str(store)))
 
 
-def sweep_file(folder: Path) -> Reader:
-    path = Path(written(folder, "schema = 1\n" + text(TILT)))
-    return Reader(path, lambda: read_sweep(path), may_lack=True)
+def in_toml(content: str, read: Callable[[Path], object]) -> Callable[[Path], Reader]:
+    def made(folder: Path) -> Reader:
+        path = folder / "x.toml"
+        path.write_text(content)
+        return Reader(path, lambda: read(path), may_lack=True)
 
-
-def scene_file(folder: Path) -> Reader:
-    path = folder / "scene.toml"
-    path.write_text(scene_text(case_scene(3)))
-    return Reader(path, lambda: read_scene(path), may_lack=True)
+    return made
 
 
 class _Archive(Reader):
@@ -90,12 +88,6 @@ def trajectory_file(folder: Path) -> Reader:
     return _Archive(path, lambda: load(path))
 
 
-def external_file(folder: Path) -> Reader:
-    path = folder / "problem.toml"
-    path.write_text("schema = 1\n" + EXTERNAL.read_text())
-    return Reader(path, lambda: read_problem(path), may_lack=True)
-
-
 def vector_file(folder: Path) -> Reader:
     path = Path(shutil.copy(OURS, folder / "vectors.json"))
     return Reader(path, lambda: answers(path))
@@ -106,16 +98,13 @@ def golden_record(folder: Path) -> Reader:
     return Reader(path, lambda: read_record(folder))
 
 
-def edition(folder: Path) -> Reader:
-    path = folder / MARK
-    path.write_text(json.dumps({"schema": SCHEMAS["edition"], "files": {"index.html": 3}}))
-    return Reader(path, lambda: check_tree(str(folder), MARK, "--out"))
+def listed(kind: str, mark: str, *option: str) -> Callable[[Path], Reader]:
+    def made(folder: Path) -> Reader:
+        path = folder / mark
+        path.write_text(json.dumps({"schema": SCHEMAS[kind], "files": {"LICENSE": 3}}))
+        return Reader(path, lambda: check_tree(str(folder), mark, *option))
 
-
-def data_package(folder: Path) -> Reader:
-    path = folder / PACKAGE_MARK
-    path.write_text(json.dumps({"schema": SCHEMAS["data package"], "files": {"LICENSE": None}}))
-    return Reader(path, lambda: check_tree(str(folder), PACKAGE_MARK, "--data", "data package"))
+    return made
 
 
 def _request(folder: Path, line: bytes, command: list[str], field: str) -> Reader:
@@ -124,10 +113,7 @@ def _request(folder: Path, line: bytes, command: list[str], field: str) -> Reade
     path.write_bytes(line + b"\n")
 
     def read() -> None:
-        with path.open("rb") as asked:
-            found = subprocess.run(
-                command, stdin=asked, capture_output=True, text=True, check=False
-            )
+        found = subprocess.run(command, input=path.read_text(), capture_output=True, text=True)
         if found.returncode:
             assert found.stderr.count("\n") == 1, found.stderr
             raise InputError(found.stderr)
@@ -149,17 +135,15 @@ def integrator_request(folder: Path) -> Reader:
 
 FILES: dict[str, Callable[[Path], Reader]] = {
     "sweep store": sweep_store,
-    "sweep file": sweep_file,
-    "scene file": scene_file,
+    "sweep file": in_toml("schema = 1\n" + text(TILT), read_sweep),
+    "scene file": in_toml(scene_text(case_scene(3)), read_scene),
     "trajectory file": trajectory_file,
-    "external file": external_file,
-    "vector file": vector_file,
-    "golden record": golden_record,
-    "edition": edition,
-    "data package": data_package,
-    "port request": port_request,
-    "integrator request": integrator_request,
-}
+    "external file": in_toml("schema = 1\n" + EXTERNAL.read_text(), read_problem),
+    "vector file": vector_file, "golden record": golden_record,
+    "edition": listed("edition", MARK, "--out"),
+    "data package": listed("data package", PACKAGE_MARK, "--data", "data package"),
+    "port request": port_request, "integrator request": integrator_request,
+}  # fmt: skip
 
 
 def test_every_kind_is_tried() -> None:
@@ -185,13 +169,12 @@ def test_another_schema_is_refused_in_a_line(kind: str, tmp_path: Path) -> None:
         if number is None and reader.may_lack:
             reader.read()
             continue
-        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        before = files(tmp_path)
         words = rf"schema.*; this (version|port|integrator) reads schema {known} of an? {kind}"
         with pytest.raises(InputError, match=words) as caught:
             reader.read()
         assert "\n" not in str(caught.value)
-        after = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-        assert after == before
+        assert files(tmp_path) == before
 
 
 def test_numbers_are_those_of_the_document() -> None:

@@ -12,19 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import (
-    InputError,
-    Listing,
-    Scene,
-    TorqueLaw,
-    case_scene,
-    prepare,
-    read_scene,
-    solve,
-    subset,
-)
+from pyharness import Scene, TorqueLaw, case_scene, prepare, read_scene, solve, subset
 from pyharness.methods.registry import METHODS
 from pyharness.methods.report import trajectory_report
+from pyharness.model.errors import InputError
+from pyharness.model.listing import Listing
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
@@ -32,14 +24,8 @@ from pyharness.original import compiled
 from pyharness.views.json import json_text
 from pyharness.views.render import render
 
-PLAIN = Scene(
-    "brick",
-    (0.5, 1.0, 2.0),
-    moments=(40.0, 30.0, 20.0),
-    torque=TorqueLaw((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (((1.0, 0.0, 0.5), 4.0),)),
-    step_size=0.5,
-    steps=7,
-)
+LAW = TorqueLaw((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (((1.0, 0.0, 0.5), 4.0),))
+PLAIN = Scene("brick", (0.5, 1.0, 2.0), (40.0, 30.0, 20.0), torque=LAW, step_size=0.5, steps=7)
 
 # Each pair converts three numbers, and one number, to another form of the same value.
 FORMS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
@@ -82,11 +68,9 @@ SAME_WORDS: list[tuple[str, Callable[[], object]]] = [
     ("[initial]\nomega = [1, 2, true]", lambda: Scene("", [1, 2, True], (3, 2, 1))),
     ("[run]\nsteps = 0", lambda: Scene("", (1, 2, 3), (3, 2, 1), steps=0)),
     ("[torque]\nrate = [0, inf, 0]", lambda: TorqueLaw(rate=(0, np.inf, 0))),
-    (
-        "[torque]\nsines = [{ amplitude = [1, 2], frequency = 3 }]",
-        lambda: TorqueLaw(sines=[((1, 2), 3)]),
-    ),
-]
+    ("[torque]\nsines = [{ amplitude = [1, 2], frequency = 3 }]",
+     lambda: TorqueLaw(sines=[((1, 2), 3)])),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "call"), SAME_WORDS, ids=range(len(SAME_WORDS)))

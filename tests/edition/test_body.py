@@ -1,5 +1,6 @@
 """The page of a tumbling body without a browser: closed form, digits, addresses, commands."""
 
+import html
 import json
 import math
 import random
@@ -14,13 +15,13 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, case_scene, solve
-from pyharness.cli.main import main
 from pyharness.edition.body import AGREEMENT, PROGRAM, SPEEDS, context, data, moments_of_box
 from pyharness.edition.bundle import bundle
 from pyharness.model.extension import extension
 from pyharness.theory.flips import flip_times
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
 from tests.attitude_errors import largest_error
+from tests.conftest import Printed
 from tests.exact_attitude import exact
 from tests.ports import WEB, run_javascript
 from tests.scenes.free_motions import KINDS, Motion, draw
@@ -62,16 +63,12 @@ def _drawn(count: int) -> list[Motion]:
 
 
 def _differences(motions: list[Motion], folder: Path = BODY) -> list[float]:
-    """Return the largest difference between JavaScript and Fortran of each motion.
-
-    Omega is compared relative to its largest component.
-    """
+    """Return the largest difference of each motion, that of omega relative to its largest."""
     answers = ask(MOTIONS, [(moments, omega, time) for moments, omega, _, time in motions], folder)
     found = []
     for (moments, omega, attitude, time), answer in zip(motions, answers, strict=True):
-        rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
-            moments, omega, attitude, [time]
-        )
+        solution = extension().torque_free_attitude_solution(moments, omega, attitude, [time])
+        rows, attitudes, n_rows, status = solution
         assert (n_rows, status) == (1, 0)
         largest = max(*map(abs, omega), *np.abs(rows[:, 0])) or 1.0
         turned = np.abs(np.array(answer["attitude"], float) - attitudes[:, 0]).max()
@@ -81,10 +78,7 @@ def _differences(motions: list[Motion], folder: Path = BODY) -> list[float]:
 
 
 def test_the_closed_form_is_that_of_fortran_to_a_few_units_in_the_last_place() -> None:
-    """Test 600 motions of ten kinds, and some near the separatrix.
-
-    The bound depends neither on the time nor on the error amplification.
-    """
+    """The bound depends neither on the time nor on the error amplification."""
     found = _differences(_drawn(60))
     assert len(found) > 600
     assert max(found) <= AGREEMENT
@@ -163,18 +157,14 @@ def test_flips_are_those_of_the_theory() -> None:
     });"""
     bodies = [each for each in data()["bodies"] if each["id"] in ("case-3", "case-4", "racket")]
     for each, (times, middle, flip) in zip(bodies, ask(body, bodies), strict=True):
-        assert flip == pytest.approx(
-            float(flip_times(each["moments"], each["omega"])[0]), rel=1e-14
-        )
+        due = float(flip_times(each["moments"], each["omega"])[0])
+        assert flip == pytest.approx(due, rel=1e-14)
         assert np.diff(times) == pytest.approx([flip, flip], rel=1e-12)
         assert np.abs(middle).max() < 1e-12 * max(map(abs, each["omega"]))
 
 
 def test_digits_are_what_the_amplification_leaves() -> None:
-    """Compare with differences of the Fortran method, and with the amplification of `solve`.
-
-    That of `solve` is the largest from any earlier time, and the page has that from time 0.
-    """
+    """That of `solve` is the largest from any earlier time, and the page has that from time 0."""
     body = """return given.map(([moments, omega, time]) =>
       D.amplification(moments, omega)(time));"""
     given = [(each["moments"], each["omega"]) for each in data()["bodies"]]
@@ -185,11 +175,9 @@ def test_digits_are_what_the_amplification_leaves() -> None:
         step = 2.0**-40 * size
         for axis in range(-1, 3):
             beside = [w + step * (axis == n) for n, w in enumerate(omega)]
-            row, attitude, _, _ = extension().torque_free_attitude_solution(
-                moments, beside, IDENTITY, [time]
-            )
-            rows.append(row[:, 0])
-            turned.append(attitude[:, 0])
+            found_ = extension().torque_free_attitude_solution(moments, beside, IDENTITY, [time])
+            rows.append(found_[0][:, 0])
+            turned.append(found_[1][:, 0])
         growth = np.abs(np.array(rows[1:]) - rows[0]).sum(axis=0).max() / step
         angle = 2.0 * np.linalg.norm(np.array(turned[1:]) - turned[0], axis=1).sum() * size / step
         assert found["growth"] == pytest.approx(max(1.0, growth), rel=0.1)
@@ -225,40 +213,39 @@ def test_an_address_restores_its_state() -> None:
     assert default["moments"] == list(context()["first"].moments)
 
 
-@pytest.mark.sampled
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ("body=brick", "body: unknown 'brick'; allowed: racket, cube, case-2, case-3, case-4"),
-        ("body", "body: unknown ''; allowed: racket"),
-        ("moments=1,2", "moments: 2 numbers; allowed: three, as in 40,30,20"),
-        ("moments=1,2,x", "moments: 'x' where a number belongs"),
-        ("moments=1,2,4", "moments: 1 + 2 is less than 4; each moment is at most the sum"),
-        ("moments=0,1,1", "moments: 0; allowed: numbers from 0.000001 to 1000000"),
-        ("moments=1,1,1e7", "moments: 10000000; allowed: numbers from"),
-        ("moments=1,1,-1", "moments: -1; allowed: numbers from"),
-        ("omega0=1,2,1e999", "omega0: '1e999' is not finite; allowed: finite numbers"),
-        ("omega0=1,2,1e-12", "omega0: 1e-12; allowed: 0, or numbers from 1e-9 to 1000"),
-        ("omega0=0x10,1,1", "omega0: '0x10' where a number belongs"),
-        ("omega0=1;2;3", "omega0: 1 numbers; allowed: three"),
-        ("time=-1", "time: -1; allowed: a number from 0 to 1000000"),
-        ("time=1000001", "time: 1000001; allowed: a number from 0 to 1000000"),
-        ("time=", "time: '' where a number belongs"),
-        ("spin=3", "unknown word 'spin'; allowed: body, moments, omega0, time"),
-        ("%zz=%", "unknown word '%zz'"),
-        ("time=" + "9" * 500 + "x", "time: '99999"),
-    ],
-)
-def test_what_an_address_has_wrong_is_told_in_a_line(words: str, told: str) -> None:
-    body = (
-        "const found = S.stateFrom(data, given); return [S.fragmentOf(data, found.state), found];"
-    )
-    fragment, found = ask(body, words)
-    assert len(found["problems"]) == 1
-    assert found["problems"][0].startswith(told)
-    assert "\n" not in found["problems"][0]
-    assert len(found["problems"][0]) < 240
-    assert fragment == "body=racket"
+# What is wrong in an address, and the beginning of the line that says so.
+_WRONG = {
+    "body=brick": "body: unknown 'brick'; allowed: racket, cube, case-2, case-3, case-4",
+    "body": "body: unknown ''; allowed: racket",
+    "moments=1,2": "moments: 2 numbers; allowed: three, as in 40,30,20",
+    "moments=1,2,x": "moments: 'x' where a number belongs",
+    "moments=1,2,4": "moments: 1 + 2 is less than 4; each moment is at most the sum",
+    "moments=0,1,1": "moments: 0; allowed: numbers from 0.000001 to 1000000",
+    "moments=1,1,1e7": "moments: 10000000; allowed: numbers from",
+    "moments=1,1,-1": "moments: -1; allowed: numbers from",
+    "omega0=1,2,1e999": "omega0: '1e999' is not finite; allowed: finite numbers",
+    "omega0=1,2,1e-12": "omega0: 1e-12; allowed: 0, or numbers from 1e-9 to 1000",
+    "omega0=0x10,1,1": "omega0: '0x10' where a number belongs",
+    "omega0=1;2;3": "omega0: 1 numbers; allowed: three",
+    "time=-1": "time: -1; allowed: a number from 0 to 1000000",
+    "time=1000001": "time: 1000001; allowed: a number from 0 to 1000000",
+    "time=": "time: '' where a number belongs",
+    "spin=3": "unknown word 'spin'; allowed: body, moments, omega0, time",
+    "%zz=%": "unknown word '%zz'",
+    "time=" + "9" * 500 + "x": "time: '99999",
+}
+
+
+def test_what_an_address_has_wrong_is_told_in_a_line() -> None:
+    body = """return given.map((words) => {
+      const { state, problems } = S.stateFrom(data, words);
+      return [S.fragmentOf(data, state), problems];
+    });"""
+    for told, (fragment, (problem,)) in zip(_WRONG.values(), ask(body, list(_WRONG)), strict=True):
+        assert problem.startswith(told)
+        assert "\n" not in problem
+        assert len(problem) < 240
+        assert fragment == "body=racket"
 
 
 def test_every_allowed_body_has_a_motion() -> None:
@@ -267,10 +254,8 @@ def test_every_allowed_body_has_a_motion() -> None:
     # 0.01 + 0.06 is less than 0.07 in floats.
     motions = [([0.01, 0.06, 0.07], [1.0, 2.0, 3.0], 1.0)]
     for _ in range(400):
-        moments = [
-            10.0 ** source.choice((-6, -3, 0, 5.5)) * source.uniform(1, 1.1) for _ in range(3)
-        ]
-        moments.sort()
+        sizes = (10.0 ** source.choice((-6, -3, 0, 5.5)) for _ in range(3))
+        moments = sorted(size * source.uniform(1, 1.1) for size in sizes)
         moments[0] = max(moments[0], 1e-6)
         moments[2] = min(moments[2], moments[0] + moments[1])
         omega = [source.choice((0.0, 1e-9, -1e-9, 1.0, 1000.0, -1000.0)) for _ in range(3)]
@@ -290,9 +275,7 @@ def test_every_allowed_body_has_a_motion() -> None:
         assert after == pytest.approx(energy, rel=1e-11), (moments, omega, time)
 
 
-def test_the_command_computes_what_the_page_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_agrees(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, printed: Printed) -> None:
     monkeypatch.chdir(tmp_path)
     states = [
         "", "body=case-4&time=1000000", "body=case-3&time=0", "body=cube&time=12.5",
@@ -302,30 +285,25 @@ def test_the_command_computes_what_the_page_shows(
       const { state } = S.stateFrom(data, words);
       return [S.commandOf(data, state), C.torqueFree(state.moments, state.omega0).at(state.time)];
     });"""
-    for words, (asked, shown) in zip(states, ask(body, states), strict=True):
+    for asked, shown in ask(body, states):
         (tmp_path / "body.toml").write_text(asked["file"])
         assert ("--scene body.toml" in asked["command"]) == (asked["file"] != "")
-        command = asked["command"].removeprefix("pyharness ").split()
-        assert main([*command, "--format", "json"]) == 0, words
-        trajectory = json.loads(capsys.readouterr().out)["trajectory"]
+        command = asked["command"].removeprefix("pyharness ")
+        trajectory = json.loads(printed(f"{command} --format json"))["trajectory"]
         assert np.abs(np.array(trajectory["omega"][0][-3:]) - shown["omega"]).max() < 1e-13
         assert np.abs(np.array(trajectory["attitude"][0]) - shown["attitude"]).max() <= AGREEMENT
 
 
 def test_the_program_prints_what_the_page_has(built_site: dict[str, bytes]) -> None:
-    import html
-
-    page = built_site["body.html"].decode()
-    shown = {
-        name: html.unescape(re.findall(f'<code id="{name}">(.*?)</code>', page, re.DOTALL)[0])
+    page = html.unescape(built_site["body.html"].decode())
+    program, output = (
+        re.findall(f'<code id="{name}">(.*?)</code>', page, re.DOTALL)[0]
         for name in ("program", "output")
-    }
-    assert shown["program"] == PROGRAM
-    assert len([line for line in PROGRAM.splitlines() if line]) == 5
-    done = subprocess.run(
-        [sys.executable, "-c", shown["program"]], capture_output=True, text=True, check=True
     )
-    assert shown["output"] == done.stdout
+    assert program == PROGRAM
+    assert len([line for line in PROGRAM.splitlines() if line]) == 5
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert output == done.stdout.decode()
 
 
 def test_the_data_are_those_of_the_cases() -> None:
@@ -342,16 +320,18 @@ def test_the_data_are_those_of_the_cases() -> None:
     racket = given["bodies"][0]
     assert np.argmax(np.abs(racket["omega"])) == np.argsort(racket["moments"])[1] == 1
     assert 1 in SPEEDS
+    # The scripts are small: readers see them.
+    assert len(bundle(BODY / "body.js")) < 42_000
+    for file in (*BODY.glob("*.js"), *(WEB / "laboratory").glob("*.js")):
+        assert len(file.read_text().splitlines()) < 300, file.name
 
 
 def test_the_page_without_script_has_picture_and_numbers(built_site: dict[str, bytes]) -> None:
     page = " ".join(built_site["body.html"].decode().split())
     assert built_site["figures/body.svg"].startswith(b"<?xml")
-    numbers = np.genfromtxt(
-        built_site["figures/body.csv"].decode().splitlines(), delimiter=",", skip_header=1
-    )
-    scene = context()["first"]
-    flip = context()["flip"]
+    rows = built_site["figures/body.csv"].decode().splitlines()
+    numbers = np.genfromtxt(rows, delimiter=",", skip_header=1)
+    scene, flip = (context()[name] for name in ("first", "flip"))
     assert f"every {flip:.2f} s" in page
     assert f"every {float(flip_times((40, 30, 20), (0, 1, 10))[0]):.3f} s" in page
     assert f"less than {AGREEMENT} of" in page
@@ -360,9 +340,3 @@ def test_the_page_without_script_has_picture_and_numbers(built_site: dict[str, b
     assert (np.diff(np.sign(numbers[:, 2])) != 0).sum() == 3
     found = solve(scene, [float(numbers[100, 0])], "closed-form")
     assert found.omega[0] == pytest.approx(numbers[100, 1:4], rel=1e-12)
-
-
-def test_the_script_is_small() -> None:
-    assert len(bundle(BODY / "body.js")) < 42_000
-    for file in BODY.glob("*.js"):
-        assert len(file.read_text().splitlines()) < 300, file.name

@@ -25,23 +25,17 @@ def test_bibtex_cites_the_edition_and_the_thesis() -> None:
         assert entry.count("{") == entry.count("}")
         assert not set(entry) & set("&%$#_~^\\")  # which BibTeX would not take as they are
         assert entry.isascii()
-    found = _fields(edition)
-    assert found["version"] == codemeta()["version"]
-    assert found["year"] == release_date()[:4]
+    found, cited, work = _fields(edition), _fields(thesis), facts("account")["work"]
+    assert (found["version"], found["year"]) == (codemeta()["version"], release_date()[:4])
     assert text_digest() in found["note"]
     assert data_identifier() in found["note"]
-    assert _fields(thesis)["author"] == "Jacobs, Richard"
-    assert facts("account")["work"]["author"] == "Richard Jacobs"
-    assert (_fields(thesis)["year"], _fields(thesis)["month"]) == ("1982", "3")
-    work = facts("account")["work"]
-    assert work["published"] == "March 1982"
-    assert "AFWAL" in _fields(thesis)["institution"]
-    assert f"submitted in {work['submitted']}" in _fields(thesis)["note"]
+    assert (cited["author"], work["author"]) == ("Jacobs, Richard", "Richard Jacobs")
+    assert (cited["year"], cited["month"], work["published"]) == ("1982", "3", "March 1982")
+    assert "AFWAL" in cited["institution"]
+    assert f"submitted in {work['submitted']}" in cited["note"]
 
 
-def test_the_date_is_that_of_the_publication_if_there_is_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_date_is_that_of_a_publication(monkeypatch: pytest.MonkeyPatch) -> None:
     assert release_date() == str(codemeta()["copyrightYear"])
     published = {**codemeta(), "datePublished": "2031-05-06"}
     monkeypatch.setattr(citation, "codemeta", lambda: published)

@@ -20,10 +20,6 @@ def view_of(program: str, number: int) -> decks.CardView:
     return view
 
 
-def shown(view: decks.CardView) -> str:
-    return "".join(run.text for run in view.card)
-
-
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_page_has_48_cards_but_the_last(program: str) -> None:
     sheets = decks.sheets(program)
@@ -48,38 +44,29 @@ def test_a_note_is_shown_once_for_its_range_of_cards(program: str) -> None:
     assert sorted(shown_notes) == sorted(wanted)
     for view in views:
         assert {each.entry["id"] for each in view.notes} == set(find(program, view.number).entries)
-        assert [each.kind for each in view.notes] == sorted(
-            [each.kind for each in view.notes], key=decks._ORDER.index
-        )
+        kinds = [each.kind for each in view.notes]
+        assert kinds == sorted(kinds, key=decks._ORDER.index)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_notes_are_numbered_by_their_first_cards(
-    built_site: dict[str, bytes], program: str
-) -> None:
+def test_notes_are_numbered_by_first_cards(built_site: dict[str, bytes], program: str) -> None:
     found = decks.notes(program)
     assert [each.number for each in found] == list(range(1, len(found) + 1))
     firsts = [numbers(each.cards)[0] for each in found]
     assert firsts == sorted(firsts)
     anchors = pages(built_site)[f"listing/{program}.html"].anchors
-    assert [each for each in anchors if each.startswith("note-")] == [
-        f"note-{each.number}" for each in found
-    ]
+    shown = [each for each in anchors if each.startswith("note-")]
+    assert shown == [f"note-{each.number}" for each in found]
 
 
 def test_conjectured_cards_are_in_brackets_and_no_other() -> None:
-    bracketed = {
-        (program, view.number): shown(view)
-        for program in PROGRAMS
-        for view in decks.card_views(program)
-        if re.match(r" *\[.*\]$", shown(view))
-    }
-    lost = {
-        (program, number)
-        for program in PROGRAMS
-        for number, card in deck(program).cards.items()
-        if card.lost
-    }
+    bracketed, lost = {}, set()
+    for program in PROGRAMS:
+        lost |= {(program, number) for number, card in deck(program).cards.items() if card.lost}
+        for view in decks.card_views(program):
+            text = "".join(run.text for run in view.card)
+            if re.match(r" *\[.*\]$", text):
+                bracketed[program, view.number] = text
     assert set(bracketed) == lost
     # The statement stays in column 7; the C of a comment has no blank before it.
     assert bracketed["four-term", 970] == "     [A(4,1)=1.]"
@@ -113,16 +100,12 @@ def test_the_scan_has_one_three_or_six_blanks_before_a_statement() -> None:
             usual, count = found.most_common(1)[0]
             assert usual in (1, 3, 6), (program, sheet.number)
             assert count > 0.8 * found.total(), (program, sheet.number, found)
-
-
-def test_the_witness_has_the_lines_of_the_tables() -> None:
     named = {name: text for text, name in expected_lines() if ":" in name}
     assert {name: tight(line) for name, line in witness_lines().items()} == named
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_corrected_cards_differ_where_a_defect_is_corrected(program: str) -> None:
-    """Each switch of a defect is named beside the cards that its correction changes."""
     changed = {}
     for view in decks.card_views(program):
         corrected = view.corrected
@@ -161,8 +144,6 @@ def test_side_by_side_of_three_cards() -> None:
 
 
 def test_the_corrected_statement_is_that_of_the_port() -> None:
-    """Where a branch of the port has a correction, it is the corrected card in today's Fortran."""
-
     def plain(text: str) -> str:
         return re.sub(r"_wp\b|(?<![\d.])0(?=\.\d)|(?<=\d\.)0\b", "", tight(text))
 
@@ -183,7 +164,9 @@ def test_the_corrected_statement_is_that_of_the_port() -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_page_says_how_to_cite_a_card(built_site: dict[str, bytes], program: str) -> None:
+    assert f"text {text_digest()}" in built_site["listing/index.html"].decode()
     text = " ".join(built_site[f"listing/{program}.html"].decode().split())
+    assert set(re.findall(r"text [0-9a-f]{12}\b", text)) == {f"text {text_digest()}"}
     cited = f"{program} deck, card {{0}}; in: pyharness"
     assert cited.format("N") in text
     for number in deck(program).cards:
@@ -192,18 +175,18 @@ def test_a_page_says_how_to_cite_a_card(built_site: dict[str, bytes], program: s
 
 
 def test_every_card_but_comments_is_compared_once() -> None:
-    found = Counter(
-        cell.card
-        for operation in parallel_decks.operations()
-        for row in operation.aligned
-        for cell in row.cells.values()
-        if cell
-    )
-    wanted = {
-        card for program in PROGRAMS for card in deck(program).cards.values() if not card.is_comment
-    }
-    assert set(found) == wanted
-    assert set(found.values()) == {1}
+    rows = (row for operation in parallel_decks.operations() for row in operation.aligned)
+    found = Counter(cell.card for row in rows for cell in row.cells.values() if cell)
+    cards = (card for program in PROGRAMS for card in deck(program).cards.values())
+    assert found == dict.fromkeys((card for card in cards if not card.is_comment), 1)
+    # A row names no difference only if its cards agree; continuation marks are not compared.
+    for operation in parallel_decks.operations():
+        for row in operation.aligned:
+            cells = [each for each in row.cells.values() if each]
+            texts = {(tight(each.card.text[:5]), tight(each.card.text[6:])) for each in cells}
+            assert bool(row.differences) == (len(texts) > 1), cells
+            for cell in cells:
+                assert tight("".join(run.text for run in cell.runs)) == tight(cell.card.text)
 
 
 def test_the_apparatus_explains_its_kinds(built_site: dict[str, bytes]) -> None:
@@ -215,17 +198,11 @@ def test_the_apparatus_explains_its_kinds(built_site: dict[str, bytes]) -> None:
 
 def compared(program: str, number: int) -> tuple[dict[str, list[str]], list[str]]:
     """Return the marked parts of each deck in the row of a card, and the kinds of differences."""
-    for operation in parallel_decks.operations():
-        for row in operation.aligned:
-            cell = row.cells[program]
-            if cell and cell.card.number == number:
-                parts = {
-                    name: [run.text for run in each.runs if run.entry]
-                    for name, each in row.cells.items()
-                    if each
-                }
-                return parts, row.differences
-    raise AssertionError(number)
+    rows = (row for operation in parallel_decks.operations() for row in operation.aligned)
+    (row,) = (row for row in rows if (cell := row.cells[program]) and cell.card.number == number)
+    cells = {name: each.runs for name, each in row.cells.items() if each}
+    marked = {name: [run.text for run in runs if run.entry] for name, runs in cells.items()}
+    return marked, row.differences
 
 
 @pytest.mark.parametrize(
@@ -233,38 +210,22 @@ def compared(program: str, number: int) -> tuple[dict[str, list[str]], list[str]
     [
         ("two-term", 150, {"two-term": [], "four-term": [], "runge-kutta": []}, []),
         (
-            "two-term",
-            400,
-            {"two-term": ["A1"], "four-term": ["A1"], "runge-kutta": ["A"]},
+            "two-term", 400, {"two-term": ["A1"], "four-term": ["A1"], "runge-kutta": ["A"]},
             ["name"],
         ),
         (
-            "four-term",
-            2260,
+            "four-term", 2260,
             {"two-term": ["100"], "four-term": ["100"], "runge-kutta": ["300"]},
             ["statement number"],
         ),
         (
-            "two-term",
-            710,
-            {"two-term": ["/", "3."], "four-term": ["*", ".2"]},
+            "two-term", 710, {"two-term": ["/", "3."], "four-term": ["*", ".2"]},
             ["number", "operator"],
         ),
         ("runge-kutta", 860, {"runge-kutta": []}, []),
     ],
-)
+)  # fmt: skip
 def test_what_differs_is_marked_and_named(
     program: str, number: int, parts: dict[str, list[str]], kinds: list[str]
 ) -> None:
     assert compared(program, number) == (parts, kinds)
-
-
-def test_cards_with_different_text_have_a_difference() -> None:
-    """A row names no difference only if its cards agree; continuation marks are not compared."""
-    for operation in parallel_decks.operations():
-        for row in operation.aligned:
-            cells = [each for each in row.cells.values() if each]
-            texts = {(tight(each.card.text[:5]), tight(each.card.text[6:])) for each in cells}
-            assert bool(row.differences) == (len(texts) > 1), cells
-            for cell in cells:
-                assert tight("".join(run.text for run in cell.runs)) == tight(cell.card.text)

@@ -467,7 +467,7 @@ def test_damaged_file_is_refused_or_has_the_same_bits(tmp_path: Path) -> None:
     path = tmp_path / "found.npz"
     draw = random.Random(3)
     refused = []
-    for number in range(300):
+    for number in range(150):
         damaged = bytearray(content)
         place = draw.randrange(len(content))
         if number % 3:
@@ -481,7 +481,7 @@ def test_damaged_file_is_refused_or_has_the_same_bits(tmp_path: Path) -> None:
             refused.append(str(refusal))
         else:  # dates and other facts of the archive that are not used
             check_same(found, saved)
-    assert len(refused) > 250
+    assert len(refused) > 120
     assert "\n" not in "".join(refused)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import cos, sin
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,10 +30,6 @@ GLOSSARY = re.findall(r"^\| (.*?) \|", (DOCS / "glossary.md").read_text(), re.MU
 TERMS = {term for row in GLOSSARY for term in row.split(", ")}
 
 
-def _titles(text: str) -> list[str]:
-    return re.findall(r"^## (Exercise \d: .*)$", text, re.MULTILINE)
-
-
 def _commands(text: str) -> list[str]:
     blocks = "\n".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
     prose = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
@@ -41,8 +38,9 @@ def _commands(text: str) -> list[str]:
 
 
 def test_notes_have_the_exercises_of_the_lesson() -> None:
-    assert len(_titles(LESSON)) == 6
-    assert _titles(NOTES) == _titles(LESSON)
+    titles, again = (re.findall(r"^## (Exercise \d: .*)$", x, re.M) for x in (LESSON, NOTES))
+    assert len(titles) == 6
+    assert titles == again
     for number in range(1, 7):
         assert f"*Exercise {number}.*" in HINTS
         assert f"\n| {number} | `pyharness" in CHECKS
@@ -108,29 +106,22 @@ def test_commands_run(
 
 
 ORIGINAL = Listing.original("runge-kutta")
+Changes = Sequence[tuple[str, str, str]]
 MINUS_A = ("800", "R1+A", "R1-A")
 U1_FOR_U3 = ("800", "U3(J)", "U1(J)")
 FIFTHS = ("1180", "DT/6.", "DT/5.")
 WEIGHTS = ("1180", "KF(1)+2.*(KF(2)+KF(3))+KF(4)", "2.*(KF(1)+KF(4))+KF(2)+KF(3)")
 I2_30 = ("200", "40.", "30.")
 I3_20 = ("210", "40.", "20.")
-BASE = [
-    (str(card + 10 * k), f"=U{k + 1}(J)", f"=UU{k + 1}") for card in (860, 1040) for k in range(3)
-]
-BASE_OF_V = [
-    (str(card + 10 * k), f"=V{k + 1}(J)", f"=VV{k + 1}") for card in (890, 1070) for k in range(3)
-]
+BASE, BASE_OF_V = (
+    [(str(n + 10 * k), f"={x}{k + 1}(J)", f"={x * 2}{k + 1}") for n in cards for k in range(3)]
+    for x, cards in (("U", (860, 1040)), ("V", (890, 1070)))
+)
 RESET = "\n".join(f"      {name}{k}(1)={name}{k}(4)" for name in "UV" for k in (1, 2, 3))
 
 
-def _page(
-    deck: str, changes: Sequence[tuple[str, str, str]], added: Mapping[str, str] = {}
-) -> list[list[str]]:
-    """Change cards of a deck as a student does, and return the words of each line of its page.
-
-    A change is a card, and an old and a new text. `added` has the text to insert after a card, by
-    the number of the card.
-    """
+def _page(deck: str, changes: Changes, added: Mapping[str, str] = {}) -> list[list[str]]:
+    """Change cards (old and new text), add text after cards, and return the words of each line."""
     lines = deck.splitlines()
 
     def index_of(card: str) -> int:
@@ -147,18 +138,8 @@ def _page(
     return [line.split() for line in run_deck("\n".join(lines) + "\n").page.splitlines()]
 
 
-def _last_line(
-    case: int,
-    changes: Sequence[tuple[str, str, str]],
-    end: str = "",
-    listing: Listing = ORIGINAL,
-) -> list[str]:
-    """Return the words of the last line that a changed Runge-Kutta deck prints.
-
-    `end` is inserted after card 1530.
-    """
-    deck = deck_text(listing, case_scene(case), "gfortran")
-    return _page(deck, changes, {"1530": end} if end else {})[-1]
+def _last_line(case: int, *given: Any, listing: Listing = ORIGINAL) -> list[str]:
+    return _page(deck_text(listing, case_scene(case), "gfortran"), *given)[-1]
 
 
 @pytest.mark.sampled
@@ -166,26 +147,19 @@ def _last_line(
 @pytest.mark.parametrize(
     ("case", "changes", "end", "first", "step"),
     [
-        (1, [], "", "3.5000", "100"),
-        (1, [MINUS_A], "", "3.5000", "100"),
-        (1, [U1_FOR_U3], "", "3.5000", "100"),
-        (1, [FIFTHS], "", "4.0000", "100"),
-        (1, [WEIGHTS], "", "3.5000", "100"),
-        (1, [I2_30], "", "2.6210", "100"),
-        (1, [I2_30, MINUS_A], "", "3.4844", "100"),
-        (1, [I2_30, U1_FOR_U3], "", "2.6946", "100"),
-        (1, [I2_30, FIFTHS], "", "2.9451", "100"),
-        (1, [I2_30, WEIGHTS], "", "2.6184", "100"),
-        (2, [], "", "1.1631", "25"),
-        (2, BASE, "", "0.9538", "25"),
-        (2, BASE, RESET, "0.6052", "13"),
-        (2, [*BASE, *BASE_OF_V], RESET, "0.9996", "32"),
+        (1, [], "", "3.5000", "100"), (1, [MINUS_A], "", "3.5000", "100"),
+        (1, [U1_FOR_U3], "", "3.5000", "100"), (1, [FIFTHS], "", "4.0000", "100"),
+        (1, [WEIGHTS], "", "3.5000", "100"), (1, [I2_30], "", "2.6210", "100"),
+        (1, [I2_30, MINUS_A], "", "3.4844", "100"), (1, [I2_30, U1_FOR_U3], "", "2.6946", "100"),
+        (1, [I2_30, FIFTHS], "", "2.9451", "100"), (1, [I2_30, WEIGHTS], "", "2.6184", "100"),
+        (2, [], "", "1.1631", "25"), (2, BASE, "", "0.9538", "25"),
+        (2, BASE, RESET, "0.6052", "13"), (2, [*BASE, *BASE_OF_V], RESET, "0.9996", "32"),
     ],
-)
-def test_changed_decks_print_what_lesson_and_notes_say(
-    case: int, changes: Sequence[tuple[str, str, str]], end: str, first: str, step: str
+)  # fmt: skip
+def test_changed_decks_are_told(
+    case: int, changes: Changes, end: str, first: str, step: str
 ) -> None:
-    found = _last_line(case, changes, end)
+    found = _last_line(case, changes, {"1530": end} if end else {})
     assert (found[0], found[3]) == (first, step)
     told = {"0.9538": "be much closer", "0.9996": "stops at step 32"}.get(first, first)
     assert told in LESSON + NOTES

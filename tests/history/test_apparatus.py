@@ -29,7 +29,7 @@ def test_entries_rest_on_grounds_that_are_no_witnesses() -> None:
 def test_with_one_mass_whichever_case_2_stops_at_step_26() -> None:
     def step(scene: Scene, listing: Listing) -> int | None:
         stop = run_program(scene, listing).stop
-        return stop and stop.step
+        return stop.step if stop else None
 
     printed, mended = Listing.original("runge-kutta"), subset("runge-kutta", fix=["three-masses"])
     assert (step(case_scene(2), printed), step(case_scene(2), mended)) == (25, 26)
@@ -46,9 +46,7 @@ def test_with_one_mass_whichever_case_2_stops_at_step_26() -> None:
         (["x3-reads-acl2", "dt-accumulates"], "with dt-accumulates by 2 ACL1 - ACL2", (2.0, -1.0)),
     ],
 )
-def test_x3_on_acl2_gives_the_acceleration_that_is_told(
-    kept: list[str], told: str, weights: tuple[float, float]
-) -> None:
+def test_x3_on_acl2_is_as_told(kept: list[str], told: str, weights: tuple[float, float]) -> None:
     """A sphere at rest, so that V1 is the acceleration times the time."""
     scene = replace(case_scene(1), omega=(0.0, 0.0, 0.0), step_size=1e-4, steps=10000)
     scene = replace(scene, torque=case_scene(2).torque)
@@ -130,10 +128,7 @@ def test_our_names_of_the_torques_decide_which_names_are_unused() -> None:
         ]
     assert unused == {"four-term": [[], ["N"]], "runge-kutta": [["M"], ["N"]]}
     assert entry("unused-torques")["certainty"] == entry("torque-names")["certainty"] == "probable"
-
-
-def test_a_normalization_needs_no_emendation() -> None:
-    """In the scan both decks set, divide and print variables of one name, so that none is unset."""
+    # In the scan both decks set, divide and print variables of one name, so that none is unset.
     named = [c for c in chosen(()) if any(d.entry == "torque-names" for d in c.differences)]
     assert len(named) == 14
     for card in named:

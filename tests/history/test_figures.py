@@ -135,10 +135,7 @@ def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFin
         # The lines differ without colour: no two share marker and width.
         looks = {(each.get_marker(), each.get_linewidth()) for each in axes.lines}
         assert len(looks) == len(axes.lines) == 6
-
-
-def test_limit_of_figure_7_is_twice_a_slow_sine(found: dict[str, FigureFinding]) -> None:
-    """2 y(t/2) - y(0) exceeds the sine, as V.2 saw."""
+    # 2 y(t/2) - y(0) exceeds the sine, as V.2 saw.
     t, *omega = _rows(found["figure-07"], "limit").T
     limit = [2.0 * np.sin(2.5 * t), 2.0 * np.cos(2.5 * t) - 1.0, np.full_like(t, 10.0)]
     np.testing.assert_allclose(omega, limit, atol=1e-12)

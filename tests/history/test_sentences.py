@@ -101,25 +101,21 @@ def test_command_is_one_and_ends_well(command: str, printed: Printed) -> None:
 
 
 @pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
-def test_every_sentence_of_the_thesis_has_its_quote() -> None:
+def test_every_sentence_has_its_quote_and_its_letters() -> None:
     found = _sentences_of(THESIS.read_text())
     assert len(found) == len(SENTENCES)
     for text, sentence in zip(found, SENTENCES, strict=True):
         assert sentence.quote in text
-
-
-@pytest.mark.skipif(not THESIS.exists(), reason="the text of the thesis is not beside the project")
-def test_every_sentence_has_the_letters_of_the_thesis_in_its_order() -> None:
-    """Letter for letter: only blanks and signs are ours, and nothing but formulas is skipped."""
+    # Only blanks and signs are ours, and nothing but formulas is skipped.
     thesis = THESIS.read_text()
-    found = _letters(thesis[thesis.index("## SECTION V\n") : thesis.index("## REFERENCES\n")])
+    letters = _letters(thesis[thesis.index("## SECTION V\n") : thesis.index("## REFERENCES\n")])
     at = 0
     for each in SENTENCES:
         for line in each.text.split("\n"):
-            start = found.find(_letters(line), at)
+            start = letters.find(_letters(line), at)
             assert start >= 0, line
             # Between two sentences are at most headings and the captions of the figures.
-            assert start - at <= 200, found[at:start]
+            assert start - at <= 200, letters[at:start]
             at = start + len(_letters(line))
 
 

@@ -90,14 +90,11 @@ def test_document_is_valid(schema: Any) -> None:
 @pytest.mark.parametrize(
     ("ours", "other"),
     [
-        ("lem", "lemma"),
-        (' locus="value"', ""),
-        ('<lem cert="high">', '<lem cert="certain">'),
-        ("<listWit>", "<listWit><p>none</p>"),
-        ('method="parallel-segmentation" ', ""),
+        ("lem", "lemma"), (' locus="value"', ""), ('<lem cert="high">', '<lem cert="certain">'),
+        ("<listWit>", "<listWit><p>none</p>"), ('method="parallel-segmentation" ', ""),
         ('unit="line"', 'line="line"'),
     ],
-)
+)  # fmt: skip
 def test_document_with_a_mistake_is_refused(ours: str, other: str, schema: Any) -> None:
     assert ours in TEXT
     assert not schema.validate(etree.fromstring(TEXT.replace(ours, other).encode()))

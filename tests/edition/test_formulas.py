@@ -13,7 +13,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.original.cards import deck, numbers
 
 FORMULAS: list[dict[str, Any]] = facts("formulas")["formula"]
-THESIS = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
+THESIS = Path(__file__).parents[3] / "shared/thesis/thesis.txt"
 VELOCITY = entry("translational-block")["cards"]  # the cards of the translational velocity
 
 
@@ -22,12 +22,7 @@ def _first_to_last(number: str) -> list[str]:
     return [str(n) for n in range(int(first), int(last) + 1)] if last else [number]
 
 
-BY_NUMBER = {
-    number: each
-    for each in FORMULAS
-    if "number" in each
-    for number in _first_to_last(each["number"])
-}
+BY_NUMBER = {n: each for each in FORMULAS for n in _first_to_last(each.get("number", "")) if n}
 
 
 def _cards(formula: dict[str, Any], program: str) -> set[int]:
@@ -39,15 +34,12 @@ def _omega(program: str, found: set[int]) -> set[int]:
     return found - set(numbers(VELOCITY[program]))
 
 
-def test_every_numbered_equation_of_these_sections_is_there_once() -> None:
+def test_equations_are_there_once_and_their_cards_are_no_comments() -> None:
     listed = [n for each in FORMULAS for n in _first_to_last(each.get("number", "")) if n]
     assert listed == [*map(str, range(5, 35)), "34a", "35", "36", "36a"]
     sections = [each["where"][: each["where"].index(".")] for each in FORMULAS]
     assert sections == sorted(sections, key=["II", "III", "IV"].index)
     assert list(formulas()) == ["II", "III", "IV"]
-
-
-def test_every_card_exists_and_is_no_comment() -> None:
     for each in FORMULAS:
         assert set(each.get("cards", {})) <= set(PROGRAMS)
         for program in each.get("cards", {}):
@@ -63,9 +55,7 @@ def test_every_card_exists_and_is_no_comment() -> None:
 
 @pytest.mark.parametrize(("number", "letter"), [("16", "F"), ("17", "G"), ("18", "H")])
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_rates_of_change_are_all_the_cards_that_compute_them(
-    number: str, letter: str, program: str
-) -> None:
+def test_rates_are_all_the_cards_that_compute_them(number: str, letter: str, program: str) -> None:
     assigned = re.compile(rf"K?{letter}(\d|\([LI]\))=[MR]\d\+")
     computing = {n for n, card in deck(program).cards.items() if assigned.match(card.text[6:])}
     assert computing == _cards(BY_NUMBER[number], program) != set()
@@ -110,23 +100,18 @@ def test_cards_are_those_under_the_citation_of_the_port(program: str) -> None:
 def test_coefficients_are_on_the_cards_that_the_port_cites() -> None:
     text = (shipped("fortran/original") / "deck.fypp").read_text()
     ranges = r"Two-term (\S+), four-term (\S+), Runge-Kutta (\S+)\."
-    told = re.findall(rf"of equations 13-15\. {ranges}", text)
-    assert len(told) == 1
-    for program, cards in zip(("two-term", "four-term", "runge-kutta"), told[0], strict=True):
+    (told,) = re.findall(rf"of equations 13-15\. {ranges}", text)
+    for program, cards in zip(PROGRAMS, told, strict=True):
         assert set(numbers(cards)) <= _cards(BY_NUMBER["13"], program)
 
 
 def test_cards_are_those_of_the_collation() -> None:
-    """Every card that the collation sets against an equation or step is with that formula."""
     steps = {each["where"]: each for each in FORMULAS if re.match(r"IV\.2 [a-i]$", each["where"])}
+    known = BY_NUMBER | steps
     compared = 0
     for row in facts("cards/collation")["row"]:
         text = row.get("text", "")
-        named = {number: BY_NUMBER[number] for number in _cited(text)}
-        named |= {
-            place: steps[place] for place in re.findall(r"IV\.2 [a-i]", text) if place in steps
-        }
-        for place, formula in named.items():
+        for place in {*_cited(text), *({*re.findall(r"IV\.2 [a-i]", text)} & steps.keys())}:
             # What the row says of the other method is about another formula of the same row.
             own = set(PROGRAMS)
             if place in ("19", "31"):
@@ -135,12 +120,9 @@ def test_cards_are_those_of_the_collation() -> None:
                 own = {"two-term", "four-term"}
             for program in own:
                 cards = _omega(program, set(numbers(row["cards"].get(program, ""))))
-                alike = {"16", "17", "18"}
-                if place in alike:
-                    together = set().union(*(_cards(BY_NUMBER[n], program) for n in alike))
-                    assert cards <= together, (row["what"], place, program)
-                else:
-                    assert cards <= _cards(formula, program), (row["what"], place, program)
+                alike = ("16", "17", "18") if place in ("16", "17", "18") else (place,)
+                together = set().union(*(_cards(known[each], program) for each in alike))
+                assert cards <= together, (row["what"], place, program)
                 compared += len(cards)
     assert compared > 100
 

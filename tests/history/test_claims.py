@@ -25,6 +25,7 @@ from pyharness.views.render import render
 from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims
+_LARGER = "larger error of collocation over that of Runge-Kutta"
 SILENT = ("i2-euler-symmetric", "i2-lagrange")  # judged by their sources
 ROOT = Path(__file__).parents[2]
 THESIS = ROOT.parent / "shared/thesis/thesis.txt"
@@ -118,9 +119,6 @@ def test_programs_and_methods_disagree_about_the_conclusion(judged: Judged) -> N
     assert methods.superior(lab, [7], [2]).verdict == FALSE
 
 
-_LARGER = "larger error of collocation over that of Runge-Kutta"
-
-
 def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None:
     lab, found = Laboratory(False), judgement("abstract-superior")
     for case in range(2, 8):
@@ -133,7 +131,6 @@ def test_ratio_to_runge_kutta_is_that_of_the_worse_collocation_program() -> None
 
 
 def test_kinds_are_counted_apart_and_judged_as_what_they_are(judged: Judged) -> None:
-    """The article has the counts."""
     table = kinds_table([*judged.values()])
     assert [row[0] for row in table.rows] == [*KINDS]
     assert sum(row[1] for row in table.rows) == len(judged)

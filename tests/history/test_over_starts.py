@@ -101,9 +101,7 @@ def test_solutions_are_those_of_the_reference() -> None:
         found = bench.solution(case) if case == 5 else bench.solution(case)[0]
         assert found.shape == (100, 3)
         assert np.abs(found - one.solution(case)).max() < 1e-11
-
-
-def test_runs_end_by_the_stop_test_unless_told_otherwise() -> None:
+    # Runs end by the stop test unless told otherwise.
     bench = over_starts.Starts(Laboratory(True), np.array(STARTS[:2]))
     stopped = bench.error("runge-kutta", 2)
     assert np.array_equal(stopped, bench.error("runge-kutta", 2, True))

@@ -14,7 +14,7 @@ from pyharness.truth.reference import reference
 
 _ROUNDING = 4e-15  # of a result, for each unit of error amplification
 # An estimate may be below the error, but not by more than this factor.
-_ESTIMATE = 0.01
+_ESTIMATE = 0.1
 
 
 @dataclass(frozen=True, eq=False)

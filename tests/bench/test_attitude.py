@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.bench import compiled_peers, measure, peers
+from pyharness.bench import compiled_peers, peers
 from pyharness.bench.contenders import SceneContender, own
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
@@ -127,13 +127,7 @@ def test_loads_are_all_cases_from_the_axes_of_space() -> None:
     assert (drawn.kinds, drawn.horizon, drawn.turns) == (bare.kinds, bare.horizon, bare.turns)
 
 
-@pytest.fixture
-def _hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "_ROUNDS", 1)
-    monkeypatch.setattr(measure, "_BATCH", 1e-5)
-
-
-@pytest.mark.usefixtures("_hurried")
+@pytest.mark.usefixtures("hurried")
 @pytest.mark.parametrize("scene", ["--case 4 --horizon 1", "--random 1 --seed f"])
 def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture) -> None:
     command = ["bench", "--attitude", *scene.split(), "--peers", "none"]

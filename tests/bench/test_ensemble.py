@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.bench import ensemble_growth
 from pyharness.bench import ensemble_measure as measuring
 from pyharness.bench.contenders import Contender
 from pyharness.bench.ensemble_contenders import (
@@ -35,15 +34,6 @@ Capture = pytest.CaptureFixture[str]
 # Settings that give an error of 1e-8.
 SETTINGS = {"tolerance": 1e-9, "steps": 400.0, "none": 1.0}
 BODIES = 70  # more than a block, and not a multiple of its size
-
-
-@pytest.fixture
-def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measuring, "ROUNDS", 1)
-    monkeypatch.setattr(measuring, "SAMPLE", 20)
-    monkeypatch.setattr(measuring, "_BATCH", 0.0)
-    monkeypatch.setattr(ensemble_growth, "_ROUNDS", 1)
-    monkeypatch.setattr(ensemble_growth, "_BATCH", 0.0)
 
 
 ALL = (*own_ensembles(), *ensemble_peers())

@@ -198,9 +198,7 @@ def _refuses(scene: Scene) -> Maker:
 
 
 @pytest.fixture
-def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "_ROUNDS", 2)
-    monkeypatch.setattr(bench, "_BATCH", 1e-5)
+def few_steps(hurried: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "_LARGEST_STEPS", 64)
 
 
@@ -209,7 +207,7 @@ def right() -> Array:
     return np.array(reference(SHORT.scene, [3.0], precise=True).omega[0])
 
 
-@pytest.mark.usefixtures("hurried")
+@pytest.mark.usefixtures("few_steps")
 def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
     def answer(setting: float) -> End:
         if setting > 1e-4:
@@ -241,7 +239,7 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.usefixtures("hurried")
+@pytest.mark.usefixtures("few_steps")
 def test_every_contender_of_ours_meets_its_order_or_tolerance_and_counts() -> None:
     """Check every contender on Case 3, which has a closed form and suits every method."""
     others = [each for each in peers() if each.package == "scipy"][:2]
@@ -328,7 +326,7 @@ ONLY = ["bench", "--case", "4", "--methods", "auto,rk4", "--peers", "none"]
 
 
 @pytest.mark.campaign
-@pytest.mark.usefixtures("hurried")
+@pytest.mark.usefixtures("few_steps")
 def test_verb_writes_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     assert main([*ONLY, "--horizon", "1", "--format", "json"]) == 0
     captured = capsys.readouterr()

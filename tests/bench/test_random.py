@@ -138,9 +138,9 @@ def test_every_form_has_the_spreads() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.usefixtures("hurried")
 def test_verb_gives_rows_and_spreads(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("_ROUNDS", 1), ("_BATCH", 1e-5), ("_LARGEST_STEPS", 256)):
-        monkeypatch.setattr(bench, name, value)
+    monkeypatch.setattr(bench, "_LARGEST_STEPS", 256)
     few = ["--methods", "auto,rk4", "--peers", "none"]
     command = ["bench", "--random", "2", "--seed", SEED, *few]
     assert main([*command, "--format", "json"]) == 0

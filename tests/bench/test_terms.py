@@ -185,12 +185,8 @@ def test_the_report_has_times_ratios_and_preparation() -> None:
 
 
 @pytest.fixture
-def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measuring, "ROUNDS", 1)
+def few_scenes(hurried: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measuring, "SAMPLE", 5)
-    monkeypatch.setattr(measuring, "_BATCH", 0.0)
-    monkeypatch.setattr(bench, "_ROUNDS", 1)
-    monkeypatch.setattr(bench, "_BATCH", 0.0)
     monkeypatch.setattr(term_loads, "HORIZONS", (2.0, 4.0))
     monkeypatch.setattr(term_loads, "term_scenes", lambda: TWO)
 
@@ -198,7 +194,7 @@ def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
 COMMAND = ["bench", "--terms", "--bodies", "9", "--seed", "1", "--peers"]
 
 
-@pytest.mark.usefixtures("hurried")
+@pytest.mark.usefixtures("few_scenes")
 def test_json_and_csv(capsys: Capture) -> None:
     assert main([*COMMAND, "scipy", "--format", "json"]) == 0
     record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
@@ -217,7 +213,7 @@ def test_json_and_csv(capsys: Capture) -> None:
     assert {row["method"] for row in written} == {"auto", "taylor"}
 
 
-@pytest.mark.usefixtures("hurried")
+@pytest.mark.usefixtures("few_scenes")
 def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr(Contender, "is_installed", property(lambda each: not each.package))
     assert main([*COMMAND, "heyoka"]) == 2

@@ -18,8 +18,7 @@ from tests.campaigns.mutations.tree import PLACE, ROOT, Processes, Tree
 # Random draws of `verify` follow a seed; with the seed of the week the score would change weekly.
 SEED = "mutations"
 # Excluded are tests of this very tool, of pages, which are not changed and take long, of a browser,
-# which takes more address space than a trial has, and of run times, where a failure under load means
-# nothing.
+# which takes more address space than a trial has, and of run times, which say nothing under load.
 NOT_HERE = ("tests/campaigns/mutations/", "tests/edition/", "tests/browser/", "tests/bench/")
 # The files that most mutations need are recorded first, so that an interrupted recording is useful.
 FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")

@@ -17,14 +17,12 @@ from pyharness.model import pipes
 from pyharness.model.errors import printable
 from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
+from tests.ensembles.sweeps import axis
 
 Capture = pytest.CaptureFixture[str]
 
 BODY = "[body]\nmoments = [3.0, 2.0, 1.0]\n[initial]\nomega = [0.0, 1.0, 1.0]\n"
-SWEEP = (
-    "[scene]\ncase = 3\n[[axis]]\nfield = 'omega.1'\nfrom = 1.0\nto = 2.0\ncount = 2\n"
-    "[solve]\nt_end = 1.0\n"
-)
+SWEEP = "[scene]\ncase = 3\n[solve]\nt_end = 1.0\n" + axis("omega.1", [1.0, 2.0])
 # Every option that reads a file, with FILE in place of its name.
 READERS = (
     "run --method auto --scene FILE", "plan --scene FILE", "compare --scene FILE",
@@ -72,13 +70,7 @@ def test_reader_takes_files_and_pipes_up_to_its_limit() -> None:
     with pytest.raises(InputError, match="9 bytes"):
         read_input("file", "it", 9, "a file")
     assert read_input("/dev/null", "it", 9, "a file") == b""
-    reader, writer = os.pipe()
-    try:
-        os.write(writer, b"content")
-        os.close(writer)
-        assert read_input(f"/dev/fd/{reader}", "it", 9, "a file") == b"content"
-    finally:
-        os.close(reader)
+    assert read_input(f"/dev/fd/{_piped('content')}", "it", 9, "a file") == b"content"
     with pytest.raises(InputError, match="null"):
         read_input("a\0b", "it", 9, "a file")
 
@@ -183,6 +175,5 @@ def test_large_quaternion_is_normalised(capsys: Capture) -> None:
     assert main(command.split()) == 0
     told = capsys.readouterr()
     assert "attitude(0) = (0.5, 0.5, -0.5, 0.5)" in told.out
-    assert told.err == (
-        "pyharness: warning: the attitude has a norm above 1.79769e+308; it was normalised\n"
-    )
+    told_so = "the attitude has a norm above 1.79769e+308; it was normalised"
+    assert told.err == f"pyharness: warning: {told_so}\n"

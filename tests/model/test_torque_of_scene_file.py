@@ -32,13 +32,12 @@ def test_scene_with_expressions_is_restored_from_its_text(
 ) -> None:
     table = {"expression": TEXTS, "constants": constants}
     scene = scene_of(BODY | {"torque": table}, "damped")
-    assert isinstance(scene.torque, StateTorque)
     again = restored(scene, tmp_path)
     assert again == scene
     assert repr(again) == repr(scene)
-    state = 0.5, (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)
-    assert isinstance(again.torque, StateTorque)
-    assert repr(again.torque.at(*state)) == repr(scene.torque.at(*state))
+    both: list[Any] = [again.torque, scene.torque]
+    first, second = (repr(each.at(0.5, (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0))) for each in both)
+    assert first == second
     assert scene_text(again) == scene_text(scene)
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import csv
-import importlib
 import io
 import json
 import re
@@ -23,15 +22,11 @@ from pyharness.edition.data_package import data_package
 from pyharness.edition.decks import TITLES
 from pyharness.edition.machine_bundle import outcomes_table
 from pyharness.edition.report import package_report
+from pyharness.history import identifiers
 from pyharness.history.ablation import entries
 from pyharness.history.claims.report import KINDS
 from pyharness.history.figures import plans
-from pyharness.history.identifiers import (
-    content_identifier,
-    data_identifier,
-    directory_identifier,
-    source_files,
-)
+from pyharness.history.identifiers import content_identifier, directory_identifier
 from pyharness.history.listing_output import fits, read_page
 from pyharness.history.printed_page import main as judge
 from pyharness.history.printed_page import stored_fits
@@ -53,8 +48,13 @@ SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
 @pytest.fixture(scope="module")
 def package() -> Package:
-    """Return the files of the data package by path."""
     return data_package()
+
+
+def _write(package: Package, folder: Path) -> None:
+    for path, content in package.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
 
 
 def _json(package: Package, path: str) -> Any:
@@ -67,9 +67,7 @@ def _rows(package: Package, path: str) -> list[dict[str, str]]:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_a_deck_is_made_of_the_table_alone(
-    package: Package, program: str, printed: Printed
-) -> None:
+def test_a_deck_is_made_of_its_table(package: Package, program: str, printed: Printed) -> None:
     rows = _rows(package, f"cards/{program}.csv")
     lines = [f"{row['text']:72} {int(row['card']):7d}\n" for row in rows]
     assert printed(f"deck --program {program}") == "".join(lines)
@@ -77,23 +75,20 @@ def test_a_deck_is_made_of_the_table_alone(
 
 @pytest.mark.campaign
 def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: Printed) -> None:
-    """The counts of the last table of `pyharness claims`, from `claims.json`."""
     found = _json(package, "claims.json")["claims"]
     table = printed("claims").partition("Number of verdicts by kind")[2].splitlines()
-    heads = ["yes", "in part", "no", "FALSE", "n/t", "?"]
     verdicts = [
         "reproduced", "reproduced in part", "not reproduced", "false", "not testable", "undecided",
     ]  # fmt: skip
-    assert [*KINDS] == [kind for kind in KINDS if any(row.startswith(kind) for row in table)]
-    assert not {each[state] for each in found for state in ("original", "corrected")} - {*verdicts}
+    states = ("original", "corrected")
+    assert {each[state] for each in found for state in states} <= {*verdicts}
     for kind in KINDS:
         of_kind = [each for each in found if each["kind"] == kind]
-        told = []
-        for verdict in verdicts:
-            pair = [sum(each[state] == verdict for each in of_kind)
-                    for state in ("original", "corrected")]  # fmt: skip
-            told.append("-" if pair == [0, 0] else f"{pair[0]} / {pair[1]}")
-        assert len(told) == len(heads)
+        pairs = [
+            [sum(each[state] == verdict for each in of_kind) for state in states]
+            for verdict in verdicts
+        ]
+        told = ["{} / {}".format(*pair) if any(pair) else "-" for pair in pairs]
         (row,) = (line for line in table if line.startswith(kind))
         assert row.split() == " ".join([kind, str(len(of_kind)), *told]).split()
 
@@ -109,26 +104,25 @@ def test_outputs_of_verbs_are_in_the_package(package: Package, printed: Printed)
 
 
 def test_figures_and_pages_are_those_of_the_documents(package: Package) -> None:
-    assert {f"figures/{each.stem}.csv" for each in plans()} == {
-        path for path in package if path.startswith("figures/")
-    }
+    figures = {path for path in package if path.startswith("figures/")}
+    assert figures == {f"figures/{each.stem}.csv" for each in plans()}
     for name in ("figure-07", "figure-09", "figure-11-corrected"):
-        stored = (ROOT / f"docs/figures/{name}.csv").read_bytes()
-        assert package[f"figures/{name}.csv"] == stored
-    machine = {f"machine/{file.name}": file for file in (ROOT / "docs/machine").iterdir()}
+        assert package[f"figures/{name}.csv"] == (ROOT / f"docs/figures/{name}.csv").read_bytes()
+    machine = list((ROOT / "docs/machine").iterdir())
     assert len(machine) == 6
-    for path, file in machine.items():
-        assert package[path] == file.read_bytes()
+    for file in machine:
+        assert package[f"machine/{file.name}"] == file.read_bytes()
 
 
 def test_identifiers_are_those_of_the_files(package: Package) -> None:
     mark = _json(package, PACKAGE_MARK)
-    assert (mark["text"], mark["data"]) == (text_digest(), data_identifier())
+    assert (mark["text"], mark["data"]) == (text_digest(), identifiers.data_identifier())
     assert {*mark["files"]} == {*package} - {PACKAGE_MARK}
     for path, identifier in mark["files"].items():
         assert identifier == (None if path == MANIFEST else content_identifier(package[path]))
     sources = {row["path"]: row["swhid"] for row in _rows(package, "sources.csv")}
-    assert sources == {path: content_identifier(each) for path, each in source_files().items()}
+    files = identifiers.source_files()
+    assert sources == {path: content_identifier(each) for path, each in files.items()}
     for program in PROGRAMS:
         of_file = sources[f"pyharness/data/cards/{program}.toml"]
         cards = _rows(package, f"cards/{program}.csv")
@@ -137,6 +131,9 @@ def test_identifiers_are_those_of_the_files(package: Package) -> None:
     record = json.loads(render(package_report("there", package), "json"))
     Draft202012Validator(schema_of("edition")).validate(record)
     assert record["identifiers"]["package"] == directory_identifier(package)
+    assert sum(map(len, package.values())) < 3e6
+    listed = re.findall(r"^\| (\S+\.\S+|LICENSE) \|", package["README.md"].decode(), re.MULTILINE)
+    assert sorted(listed) == sorted({*package} - {"README.md"})
 
 
 def test_manifest_has_the_checksums(package: Package, tmp_path: Path) -> None:
@@ -146,18 +143,14 @@ def test_manifest_has_the_checksums(package: Package, tmp_path: Path) -> None:
         assert checksum == sha256(package[path]).hexdigest()
     if shutil.which("sha256sum") is None:
         return
-    for path, content in package.items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_bytes(content)
+    _write(package, tmp_path)
     check = ["sha256sum", "-c", "--strict", "--quiet", MANIFEST]
-    assert subprocess.run(check, cwd=tmp_path, check=False).returncode == 0
+    subprocess.run(check, cwd=tmp_path, check=True)
     (tmp_path / "claims.json").write_text("{}")
-    done = subprocess.run(check, cwd=tmp_path, capture_output=True, check=False)
-    assert done.returncode != 0
+    assert subprocess.run(check, cwd=tmp_path, capture_output=True, check=False).returncode != 0
 
 
 def test_the_crate_describes_every_file(package: Package) -> None:
-    """The rules of RO-Crate 1.1 for the root, the files and the references."""
     crate = _json(package, CRATE)
     assert crate["@context"] == "https://w3id.org/ro/crate/1.1/context"
     graph = {each["@id"]: each for each in crate["@graph"]}
@@ -191,11 +184,6 @@ def test_the_crate_describes_every_file(package: Package) -> None:
             check(value)
 
 
-def test_the_readme_lists_every_file(package: Package) -> None:
-    listed = re.findall(r"^\| (\S+\.\S+|LICENSE) \|", package["README.md"].decode(), re.MULTILINE)
-    assert sorted(listed) == sorted({*package} - {"README.md"})
-
-
 @pytest.mark.campaign
 def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
     """Another process with other settings writes the same bytes, and without optional packages."""
@@ -212,9 +200,8 @@ def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
              "PYTHONHASHSEED": "7", "LC_ALL": "C"},
         cwd="/", capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert done.stdout.splitlines() == [
-        f"{sha256(each).hexdigest()} {path}" for path, each in package.items()
-    ]
+    told = [f"{sha256(each).hexdigest()} {path}" for path, each in package.items()]
+    assert done.stdout.splitlines() == told
     for path, content in package.items():
         assert str(ROOT).encode() not in content, path
         assert b"\r" not in content, path
@@ -223,10 +210,7 @@ def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
 
 def _judged(package: Package, folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     """Run the script of the package on a printed page, with Python's standard library alone."""
-    for path, content in package.items():
-        if path.startswith("machine/"):
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_bytes(content)
+    _write({path: each for path, each in package.items() if path.startswith("machine/")}, folder)
     # As a printer prints it: with a banner, carriage control and a job log.
     printed = "1JACOBS\n\n" + text.replace("\n", "  \n") + "\n 12.30.07.LGO.\n"
     (folder / "printed.txt").write_text(printed)
@@ -239,10 +223,7 @@ def _judged(package: Package, folder: Path, text: str) -> subprocess.CompletedPr
 @pytest.mark.sampled
 @pytest.mark.parametrize("altered", [False, True])
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_the_script_judges_a_page_like_the_command(
-    package: Package, tmp_path: Path, program: str, altered: bool
-) -> None:
-    """The script and `verify` count the same numbers and differences, for every stored page."""
+def test_the_script_judges(package: Package, tmp_path: Path, program: str, altered: bool) -> None:
     case = facts("cases")["published"][program]
     text = package[f"machine/{program}-case-{case}-cdc48.txt"].decode()
     if altered:
@@ -253,9 +234,8 @@ def test_the_script_judges_a_page_like_the_command(
     stored = stored_fits(lines_of_page, tmp_path / "machine")
     by_the_verb = fits(lines_of_page, PROGRAMS, [case])
     assert {*stored} == {*by_the_verb}
-    assert [len(each.differences) for each in stored] == sorted(
-        len(each.differences) for each in by_the_verb
-    )
+    counts = sorted(len(each.differences) for each in by_the_verb)
+    assert [len(each.differences) for each in stored] == counts
     assert stored[0].is_whole != altered
     assert done.returncode == int(altered), done.stderr
     for each in stored:
@@ -264,14 +244,17 @@ def test_the_script_judges_a_page_like_the_command(
     assert (f"printed so by {program}, case {case}, original, in cdc48\n" in done.stdout) != altered
 
 
-@pytest.mark.parametrize("text", ["", "1.0 2.0\n", "1 2 3 4 5 6 7 8\n"])
-def test_the_script_refuses_what_is_no_page(package: Package, tmp_path: Path, text: str) -> None:
-    done = _judged(package, tmp_path, text)
+def test_the_script_refuses_what_is_no_page(
+    package: Package, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    done = _judged(package, tmp_path, "")
     assert (done.returncode, done.stdout) == (2, "")
-    assert "it has no page with the moments, torques and columns" in done.stderr
-
-
-def test_the_script_tells_a_wrong_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = "it has no page with the moments, torques and columns"
+    assert told in done.stderr
+    for text in ("1.0 2.0\n", "1 2 3 4 5 6 7 8\n"):
+        (tmp_path / "printed.txt").write_text(text)
+        assert judge([str(tmp_path / "printed.txt")], tmp_path / "machine") == 2
+        assert told in capsys.readouterr().err
     assert judge([], tmp_path) == 2
     assert "usage: python judge.py FILE" in capsys.readouterr().err
     assert judge([str(tmp_path / "missing.txt")], tmp_path) == 2
@@ -307,14 +290,9 @@ def test_every_page_is_listed_with_its_runs(package: Package) -> None:
     assert outcomes_table() in readme
 
 
-def test_the_package_is_small(package: Package) -> None:
-    assert sum(map(len, package.values())) < 3e6
-
-
 def _replace(monkeypatch: pytest.MonkeyPatch, made: Callable[..., Any]) -> None:
     """Replace the function that makes the package, where the verb finds it."""
-    module = importlib.import_module("pyharness.edition.data_package")
-    monkeypatch.setattr(module, "data_package", made)
+    monkeypatch.setattr(sys.modules[data_package.__module__], "data_package", made)
 
 
 def test_the_command_writes_the_package(
@@ -343,15 +321,12 @@ def test_the_examples_of_the_guide_run(
 ) -> None:
     pytest.importorskip("pandas")
     text = GUIDE.read_text()
-    blocks = _blocks("Read the tables")
-    for path in ("cards/two-term.csv", "claims.json"):
-        file = tmp_path / "package" / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(package[path])
+    section = text.partition("## Read the tables\n")[2].partition("\n## ")[0]
+    _write(package, tmp_path / "package")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     told = []
-    for block in blocks:
+    for block in re.findall(r"```py\n(.*?)```", section, re.DOTALL):
         buffer = io.StringIO()
         with contextlib.redirect_stdout(buffer):
             exec(block, names)
@@ -370,14 +345,6 @@ def test_the_examples_of_the_guide_run(
         assert any(PurePath(path).match(each) for each in patterns), path
 
 
-def _blocks(heading: str) -> list[str]:
-    """Return the blocks of Python in a section of the guide."""
-    (section,) = re.findall(
-        rf"^## {heading}\n(.*?)^## ", GUIDE.read_text(), re.DOTALL | re.MULTILINE
-    )
-    return re.findall(r"```py\n(.*?)```", section, re.DOTALL)
-
-
 def _in_the_article(letter: str) -> list[list[str]]:
     """Return the cells of a table of the article, with its numbers as Python writes them."""
     before = ARTICLE.read_text().partition(f"*Table {letter}.")[0].rstrip().split("\n\n")[-1]
@@ -394,14 +361,8 @@ def _plain(cell: str) -> str:
 
 
 def _computed(package: Package, folder: Path) -> dict[str, list[list[str]]]:
-    """Return the tables that the code of the guide computes, by letter, from the package alone.
-
-    The code runs in a process with Python's standard library alone, in a folder with the package
-    alone.
-    """
-    for path, content in package.items():
-        (folder / "package" / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / "package" / path).write_bytes(content)
+    """Return the tables, by letter, that the code of the guide computes with Python alone."""
+    _write(package, folder / "package")
     code = (GUIDE.parent / "article_tables.py").read_text()
     code += "import sys\nassert not {'pyharness', 'numpy', 'pandas'} & {*sys.modules}\n"
     # -S leaves site-packages out of the path, -I the settings of the user and PYTHONPATH.
@@ -416,42 +377,34 @@ def _computed(package: Package, folder: Path) -> dict[str, list[list[str]]]:
     return found
 
 
-def test_three_tables_of_the_article_follow_from_the_package_alone(
-    package: Package, tmp_path: Path
-) -> None:
+_ALTERED = (
+    ("runs/runs.csv", "stage-base,100,complete,,", "stage-base,9,stopped,9,U1", "B"),
+    ("runs/case-5.csv", "e-kutta,stage-base,50,0.5,", "e-kutta,stage-base,50,0.5,1", "B"),
+    ("runs/case-3.csv", "reference,,50,0.5,", "reference,,50,0.5,9", "C"),
+    ("runs/runs.csv", "stopped,25,V2", "stopped,26,V2", "C"),
+    ("claims.json", '"original": "reproduced"', '"original": "undecided"', "D"),
+)
+
+
+def test_tables_of_the_article_follow_from_the_package(package: Package, tmp_path: Path) -> None:
+    """The comparison can fail: a package with one changed number has another table."""
     found = _computed(package, tmp_path)
     assert [len(rows) for rows in found.values()] == [14, 7, 5]
-    for letter, rows in found.items():
-        assert rows == _in_the_article(letter), letter
-
-
-@pytest.mark.parametrize(
-    ("letter", "path", "before", "after"),
-    [
-        ("B", "runs/runs.csv", "stage-base,100,complete,,", "stage-base,9,stopped,9,U1"),
-        ("B", "runs/case-5.csv", "e-kutta,stage-base,50,0.5,", "e-kutta,stage-base,50,0.5,1"),
-        ("C", "runs/case-3.csv", "reference,,50,0.5,", "reference,,50,0.5,9"),
-        ("C", "runs/runs.csv", "stopped,25,V2", "stopped,26,V2"),
-        ("D", "claims.json", '"original": "reproduced"', '"original": "undecided"'),
-    ],
-)  # fmt: skip
-def test_an_altered_number_changes_a_table(
-    package: Package, tmp_path: Path, letter: str, path: str, before: str, after: str
-) -> None:
-    """The comparison with the article can fail: a package with one changed number differs."""
-    text = package[path].decode()
-    assert before in text
-    altered = {**package, path: text.replace(before, after, 1).encode()}
-    found = _computed(altered, tmp_path)
-    differing = [each for each, rows in found.items() if rows != _in_the_article(each)]
-    assert differing == [letter]
+    wanted = {letter: _in_the_article(letter) for letter in found}
+    assert found == wanted
+    for path, before, after, letter in _ALTERED:
+        text = package[path].decode()
+        assert before in text
+        (tmp_path / "package" / path).write_text(text.replace(before, after, 1))
+        altered = _computed({}, tmp_path)
+        assert [each for each, rows in altered.items() if rows != wanted[each]] == [letter]
+        (tmp_path / "package" / path).write_bytes(package[path])
 
 
 @pytest.mark.parametrize("name", ["edition.json", "manifest-sha256.txt", "thesis.txt"])
 def test_a_folder_that_is_no_package_is_refused_before_any_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    """Neither the pages of the edition nor another kind of package is replaced."""
     _replace(monkeypatch, lambda progress: pytest.fail("worked"))
     (tmp_path / name).write_text(json.dumps({"schema": 1, "files": {}}))
     assert main(["edition", "--data", str(tmp_path)]) == 2

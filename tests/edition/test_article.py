@@ -70,7 +70,6 @@ WORDS = (
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, Any]:
-    """Return the values of the article, computed once."""
     return values()
 
 
@@ -93,13 +92,6 @@ def _explained(text: str) -> str:
 
 
 @pytest.mark.claims
-def test_the_article_is_that_of_today(found: dict[str, Any]) -> None:
-    """Compare the files; `python -m docs.article.build` writes them."""
-    for name, text in built(found).items():
-        assert text == (HERE / name).read_text(), name
-
-
-@pytest.mark.claims
 def test_every_value_is_a_text_that_the_template_uses(found: dict[str, Any]) -> None:
     told = dict(_leaves(found))
     assert all(isinstance(each, str) and each for each in told.values())
@@ -108,6 +100,9 @@ def test_every_value_is_a_text_that_the_template_uses(found: dict[str, Any]) -> 
     # Each fault has the same fields, and so has each limit.
     unused = {name for name in set(told) - named if not name.startswith(("faults.", "limits."))}
     assert unused == set()
+    # `python -m docs.article.build` writes the files.
+    for name, text in built(found).items():
+        assert text == (HERE / name).read_text(), name
 
 
 def test_fields_of_the_template_are_names_alone() -> None:
@@ -131,17 +126,13 @@ def test_no_number_of_the_template_is_written_by_hand() -> None:
     assert not re.findall(rf".{{0,30}}{WORDS}.{{0,30}}", left, re.IGNORECASE)
 
 
-def test_every_exception_is_needed() -> None:
+def test_every_exception_is_needed_and_a_number_without_a_source_is_found() -> None:
+    for line in ("It is 25.", "Of 58 statements", "twelve runs", "1.7e-7 rad/s"):
+        assert re.search(rf"\d|{WORDS}", _explained(line))
     text = re.sub(r"\{\{.*?\}\}", "", TEMPLATE)
     assert [each for each in FORMULAS if each not in text] == []
     assert [each for each in NAMES if not re.search(each, text)] == []
     assert [each for each in COUNTS if each not in text] == []
-
-
-@pytest.mark.parametrize("line", ["It is 25.", "Of 58 statements", "twelve runs", "1.7e-7 rad/s"])
-def test_a_number_without_a_source_is_found(line: str) -> None:
-    left = _explained(line)
-    assert re.search(rf"\d|{WORDS}", left)
 
 
 def test_another_value_gives_another_text(found: dict[str, Any]) -> None:
@@ -149,18 +140,8 @@ def test_another_value_gives_another_text(found: dict[str, Any]) -> None:
     text = built(found | {"stop": stop})
     assert "at step 99 of Case 2" in text[ARTICLE]
     assert "at step 99 of Case 2" in text[METADATA]
-
-
-def test_a_missing_value_is_an_error() -> None:
     with pytest.raises(UndefinedError, match="no attribute 'step'"):
         rendered("{{ stop.step }}", {"stop": {}})
-
-
-def test_length_is_that_of_an_article() -> None:
-    """Count the words of the text and the captions, without tables, code and references."""
-    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", TEXT.partition("## References")[0], flags=re.DOTALL)
-    text = re.sub(r"^(?:\||!\[).*$", "", text, flags=re.MULTILINE)
-    assert 2700 <= len(re.sub(r"\$[^$]*\$", "x", text).split()) <= 3300
 
 
 def test_lines_are_short_and_formulas_whole() -> None:
@@ -172,18 +153,19 @@ def test_lines_are_short_and_formulas_whole() -> None:
     assert wrapped(text).startswith("- a `b c` word")
     assert "\n  word" in wrapped(text)
     assert "\n- d\n\n| xxx" in wrapped(text)
+    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", TEXT.partition("## References")[0], flags=re.DOTALL)
+    text = re.sub(r"^(?:\||!\[).*$", "", text, flags=re.MULTILINE)
+    assert 2700 <= len(re.sub(r"\$[^$]*\$", "x", text).split()) <= 3300
 
 
+@pytest.mark.claims
 def test_the_conclusion_is_false_of_the_methods_under_every_alternative() -> None:
     judged = judgement("vi-superior")
     assert {each.corrected for each in judged.survivals} == {"false"} == {judged.corrected.verdict}
     (changed,) = (each for each in judged.survivals if not each.survives)
     assert changed.assumption.startswith("omega(0)")
     assert changed.original == "reproduced in part"
-
-
-@pytest.mark.claims
-def test_what_is_said_of_statements_that_are_not_reproduced() -> None:
+    # Statements that are not reproduced.
     results = [each for each in judgements() if each.claim["kind"] == "result"]
     by_verdict = {
         verdict: [each.claim["id"] for each in results if each.original.verdict == verdict]
@@ -234,10 +216,9 @@ def test_metadata_have_the_form_of_the_journal_and_the_facts_of_the_project() ->
         "journal",
     ]  # fmt: skip
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    assert [each["name"] for each in record["authors"]] == [
-        each["name"] for each in citation["authors"]
-    ]
-    assert citation["references"][0]["title"] in record["title"] == f"[Re] {_original(citation)}"
+    authors = [each["name"] for each in citation["authors"]]
+    assert [each["name"] for each in record["authors"]] == authors
+    assert record["title"] == f"[Re] {citation['references'][0]['title']}"
     assert TEXT.startswith(f"# {record['title']}\n\n{record['authors'][0]['name']}\n")
     assert record["abstract"] == abstract_of(TEXT)
     assert record["keywords"].startswith(", ".join(citation["keywords"]))
@@ -245,13 +226,7 @@ def test_metadata_have_the_form_of_the_journal_and_the_facts_of_the_project() ->
     assert project["keywords"] == citation["keywords"]
     assert f"**Keywords:** {', '.join(project['keywords'])}" in " ".join(TEXT.split())
     assert (HERE / record["bibliography"]).is_file()
-    marks = (HERE / METADATA).read_text().count("# TO DECIDE:")
-    assert marks == 5
-
-
-def _original(citation: Mapping[str, Any]) -> str:
-    title: str = citation["references"][0]["title"]
-    return title
+    assert (HERE / METADATA).read_text().count("# TO DECIDE:") == 5
 
 
 def test_every_reference_is_cited_and_no_identifier_is_invented() -> None:
@@ -262,9 +237,7 @@ def test_every_reference_is_cited_and_no_identifier_is_invented() -> None:
     for name in names:
         assert name in " ".join(text.split()), name
     assert "doi" not in bibliography
-
-
-def test_its_commands_are_verbs() -> None:
+    # The commands are verbs.
     (block,) = re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
     verbs = re.findall(r"^pyharness (\w+)", block, re.MULTILINE)
     assert len(verbs) == 9

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from pyharness import events as events
     from pyharness import torques as torques
-    from pyharness.compare.comparison import Comparison, compare_programs
-    from pyharness.compare.method_comparison import compare_methods
+    from pyharness.checks.compare.comparison import Comparison, compare_programs
+    from pyharness.checks.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.dynamics.trajectory_reader import load
     from pyharness.methods.compiled_call import get_include

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.compare.comparison import Comparison, ProgramFinding, compare_programs
+from pyharness.checks.compare.comparison import Comparison, ProgramFinding, compare_programs
 from pyharness.edition import ledger, story
 from pyharness.edition.decks import TITLES
 from pyharness.edition.package_runs import FAULTS_CASE

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.bench.contenders import Maker
-from pyharness.compare.candidates import End, Ready, plain
+from pyharness.checks.compare.candidates import End, Ready, plain
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 
-from pyharness.compare.candidates import (
+from pyharness.checks.compare.candidates import (
     Candidate,
     Ready,
     attitude_candidate,

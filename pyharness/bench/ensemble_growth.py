@@ -15,7 +15,7 @@ from pyharness.bench.ensemble_contenders import (
     own_ensembles,
 )
 from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
-from pyharness.compare.timing import seconds
+from pyharness.checks.compare.timing import seconds
 from pyharness.methods.prepared import prepare
 from pyharness.model.progress import Progress, no_progress
 

@@ -20,7 +20,7 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleMaker,
 )
 from pyharness.bench.loop import Call, Say, timed
-from pyharness.compare.timing import Clock, batch_seconds, silenced
+from pyharness.checks.compare.timing import Clock, batch_seconds, silenced
 from pyharness.methods.plan import FINEST
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError

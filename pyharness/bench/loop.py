@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from pyharness.compare.timing import SLOW, Clock, seconds
+from pyharness.checks.compare.timing import SLOW, Clock, seconds
 from pyharness.model.progress import Progress
 
 _Row = TypeVar("_Row")
@@ -42,7 +42,7 @@ def timed(
 ) -> Iterator[_Row]:
     """Yield the rows of the calls that `calls` prepares for each task.
 
-    The last four parameters are those of `pyharness.compare.timing.seconds`.
+    The last four parameters are those of `pyharness.checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

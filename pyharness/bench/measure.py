@@ -16,8 +16,8 @@ import numpy as np
 
 from pyharness.bench.contenders import Maker, SceneContender
 from pyharness.bench.loop import Call, Say, timed
-from pyharness.compare.candidates import End, Ready, not_finite
-from pyharness.compare.timing import Clock, ended_after, silenced
+from pyharness.checks.compare.candidates import End, Ready, not_finite
+from pyharness.checks.compare.timing import Clock, ended_after, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress

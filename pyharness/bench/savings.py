@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.compare.timing import seconds
+from pyharness.checks.compare.timing import seconds
 from pyharness.methods.prepared import prepare
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.check import BITS, Attempt, Check, Name
+from pyharness.checks.compare.agreement import differences, distance
 from pyharness.checks.selection import Selection
-from pyharness.compare.agreement import differences, distance
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene

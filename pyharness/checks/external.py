@@ -15,8 +15,12 @@ from typing import TypeVar
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name, may_hold, selected
+from pyharness.checks.compare.candidates import (
+    method_candidate,
+    prepared_candidate,
+    program_candidate,
+)
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
-from pyharness.compare.candidates import method_candidate, prepared_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY
 from pyharness.methods.solve import finest

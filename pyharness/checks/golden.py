@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.compare.agreement import ulps
+from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.selection import RECORD, Selection
-from pyharness.compare.agreement import ulps
-from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.basis import Basis

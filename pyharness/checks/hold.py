@@ -13,6 +13,13 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.compare.candidates import (
+    Candidate,
+    End,
+    method_candidate,
+    prepared_candidate,
+    unstopped,
+)
 from pyharness.checks.judge import (
     MOST,
     MethodRun,
@@ -26,13 +33,6 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.stress import LISTINGS, named
 from pyharness.checks.tolerances import affordable
-from pyharness.compare.candidates import (
-    Candidate,
-    End,
-    method_candidate,
-    prepared_candidate,
-    unstopped,
-)
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name
-from pyharness.compare.candidates import Candidate, End, method_candidate
+from pyharness.checks.compare.candidates import Candidate, End, method_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis

@@ -11,6 +11,12 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import BITS, Attempt, Check, Name
+from pyharness.checks.compare.agreement import ulps
+from pyharness.checks.compare.candidates import (
+    attitude_candidate,
+    method_candidate,
+    prepared_candidate,
+)
 from pyharness.checks.judge import (
     AS_STATED,
     MethodRun,
@@ -22,8 +28,6 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.selection import Selection
 from pyharness.checks.tolerances import FEW_DIGITS, OF_CASES, of_case
-from pyharness.compare.agreement import ulps
-from pyharness.compare.candidates import attitude_candidate, method_candidate, prepared_candidate
 from pyharness.methods.problem import closed_form, normalized
 from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest

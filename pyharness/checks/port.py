@@ -16,9 +16,9 @@ import numpy as np
 
 from pyharness.checks.cells import of_cell
 from pyharness.checks.check import BITS, Check, Name, selected
+from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess, refuse_other
 from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
-from pyharness.compare.agreement import ulps
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import counted
 from pyharness.model.scene import Scene

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name, Sample
+from pyharness.checks.compare.candidates import prepared_candidate
 from pyharness.checks.judge import (
     IF_CALM,
     Answer,
@@ -29,7 +30,6 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.methods import START, run_of_call, run_of_solve
 from pyharness.checks.selection import Selection
-from pyharness.compare.candidates import prepared_candidate
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest

@@ -9,8 +9,8 @@ from functools import partial
 
 from pyharness.checks.cells import of_cell
 from pyharness.checks.check import BITS, Attempt, Check, Name
+from pyharness.checks.compare.agreement import differences, distance
 from pyharness.checks.selection import Selection
-from pyharness.compare.agreement import differences, distance
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene

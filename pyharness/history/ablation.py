@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from pyharness.compare.agreement import accuracy
+from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from pyharness.compare.agreement import accuracy
+from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene

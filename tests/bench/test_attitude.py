@@ -13,8 +13,8 @@ from pyharness.bench.contenders import SceneContender, own
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
 from pyharness.bench.scores import groups
+from pyharness.checks.compare.candidates import End
 from pyharness.cli.main import main
-from pyharness.compare.candidates import End
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene

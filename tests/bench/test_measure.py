@@ -29,9 +29,9 @@ from pyharness.bench.peers import peers
 from pyharness.bench.pictures import draw_slopes
 from pyharness.bench.report import bench_report, ratio
 from pyharness.bench.scores import Score, groups, means, scores, yardstick
+from pyharness.checks.compare.candidates import End, Ready, not_finite
 from pyharness.cli.main import main
 from pyharness.cli.verbs.bench import chosen
-from pyharness.compare.candidates import End, Ready, not_finite
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene

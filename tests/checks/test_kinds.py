@@ -19,6 +19,7 @@ import pytest
 
 from pyharness.checks import cells as verify_programs
 from pyharness.checks.check import BITS, Check, Name, selected
+from pyharness.checks.compare.orders import Order, State
 from pyharness.checks.golden import mathematics, read_record, recorded, update
 from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
@@ -28,7 +29,6 @@ from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli.main import main
-from pyharness.compare.orders import Order, State
 from pyharness.methods import problem
 from pyharness.methods.registry import METHODS
 from pyharness.model.facts import facts

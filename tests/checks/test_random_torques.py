@@ -12,9 +12,9 @@ import pytest
 from pyharness.checks import judge
 from pyharness.checks import random_torques as room
 from pyharness.checks.check import Check, made
+from pyharness.checks.compare import candidates
 from pyharness.checks.random_torques import random_torques
 from pyharness.checks.selection import Selection
-from pyharness.compare import candidates
 from pyharness.dynamics import system
 from pyharness.methods import many_recorded, recorded, solve
 from pyharness.model import arrays

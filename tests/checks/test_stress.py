@@ -14,9 +14,9 @@ import pytest
 
 from pyharness.checks import hold as truth
 from pyharness.checks.check import BITS, Check, Name
+from pyharness.checks.compare.candidates import End
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
-from pyharness.compare.candidates import End
 from pyharness.dynamics.scene_reader import read_scene
 from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene
@@ -134,7 +134,7 @@ def test_a_failure_is_told_in_every_form(
     def late(scene: Scene, times: Sequence[float], *rest: Any, **more: Any) -> Trajectory:
         return solve(scene, [t * (1.0 + 1e-9) for t in times], *rest, **more)
 
-    monkeypatch.setattr("pyharness.compare.candidates.solve", late)
+    monkeypatch.setattr("pyharness.checks.compare.candidates.solve", late)
     only = "separatrix/closed-form/flip-1e-02"
     code, text = _run(capsys, "--only", only)
     assert code == 1

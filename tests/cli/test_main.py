@@ -230,7 +230,7 @@ def test_pipe_is_written_to_and_not_replaced(printed: Printed, tmp_path: Path) -
 
 
 def test_unexpected_difference_is_exit_code_1(capsys: Capture, monkeypatch: Patch) -> None:
-    monkeypatch.setattr("pyharness.compare.comparison.differences", lambda *_: ["omega"])
+    monkeypatch.setattr("pyharness.checks.compare.comparison.differences", lambda *_: ["omega"])
     assert main(["compare", "--case", "3", "--program", "two-term"]) == 1
     shown = capsys.readouterr().out
     assert "UNEXPECTED: two-term original: Fortran and twin differ in omega" in shown
@@ -342,7 +342,7 @@ def test_rooms_are_entered_only_when_needed(tmp_path: Path) -> None:
     code = (
         "import sys; from pyharness.cli.main import main; "
         "main(['run', '--case', '3', '--program', 'four-term', '--out', sys.argv[1]]); "
-        "print([m for m in ('scipy', 'matplotlib', 'decimal', 'pyharness.compare.comparison')"
+        "print([m for m in ('scipy', 'matplotlib', 'decimal', 'pyharness.checks.compare.comparison')"
         " if m in sys.modules])"
     )
     assert _python("-c", code, str(tmp_path / "x")).stdout == "[]\n"

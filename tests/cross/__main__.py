@@ -40,7 +40,7 @@ CALLING = (
     "tests/methods",
     *(f"tests/model/test_{name}.py" for name in ("attitude", "conversions", "effort", "values")),
     "tests/original",
-    "tests/compare/test_candidates.py",
+    "tests/checks/compare/test_candidates.py",
     "tests/checks/test_motions.py::test_bounds_hold",
     "tests/checks/test_stress.py::test_bounds_hold",
     # The build with traps calls its kernels through Python, so that they have no address.

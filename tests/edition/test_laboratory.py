@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene, run_program
+from pyharness.checks.compare.agreement import differences
 from pyharness.checks.port_protocol import requested_scene
-from pyharness.compare.agreement import differences
 from pyharness.edition.laboratory import MOST_STEPS, context, data
 from pyharness.history.limits import limit_solution
 from pyharness.methods.solve import solve

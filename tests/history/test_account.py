@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pyharness.compare.orders import measured_order
+from pyharness.checks.compare.orders import measured_order
 from pyharness.history.ablation import entries, entry
 from pyharness.history.claims.laboratory import Assumptions, Laboratory
 from pyharness.history.claims.ledger import claim, claims, outcome

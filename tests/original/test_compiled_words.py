@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from pyharness import run_program
-from pyharness.compare.agreement import differences
-from pyharness.compare.comparison import compare_programs
+from pyharness.checks.compare.agreement import differences
+from pyharness.checks.compare.comparison import compare_programs
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, REFUSED, extension
 from pyharness.model.listing import PROGRAMS, Listing

@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pyharness.checks.compare.agreement import differences
+from pyharness.checks.compare.orders import Order, measured_order
 from pyharness.checks.port_protocol import read_answer, request
 from pyharness.cli.main import main
-from pyharness.compare.agreement import differences
-from pyharness.compare.orders import Order, measured_order
 from pyharness.edition.laboratory import data
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.scene_file import case_numbers, case_scene

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.compare.agreement import differences, distance
-from pyharness.compare.orders import measured_order
+from pyharness.checks.compare.agreement import differences, distance
+from pyharness.checks.compare.orders import measured_order
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable, switches
 from pyharness.model.scene import Scene

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pyharness import run_program
-from pyharness.compare.agreement import differences
+from pyharness.checks.compare.agreement import differences
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene

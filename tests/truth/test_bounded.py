@@ -14,7 +14,7 @@ from jsonschema import Draft202012Validator
 from pyharness import Scene, case_scene, solve
 from pyharness.bench import measure as bench
 from pyharness.checks import judge
-from pyharness.compare import comparison, method_comparison
+from pyharness.checks.compare import comparison, method_comparison
 from pyharness.methods import registry
 from pyharness.methods.reference_bound import trajectory_bound
 from pyharness.model.attitude import angle_between

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.check import Check, Name
+from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.drift import CHANGE, Drift, drift_of, growth_power, long_motion
 from pyharness.checks.integrators.problem import (
     LEVELS,
@@ -25,7 +26,6 @@ from pyharness.checks.integrators.problem import (
 from pyharness.checks.integrators.protocol import Motion, read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER, UNKNOWN, Finding, recognised
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
-from pyharness.compare.orders import ORDER_SLACK
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array

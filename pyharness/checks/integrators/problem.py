@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
+from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import Fault, State, motions
 from pyharness.checks.integrators.protocol import Motion, request
-from pyharness.compare.orders import ORDER_SLACK
 from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array

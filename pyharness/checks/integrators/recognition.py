@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.drift import drift_of
 from pyharness.checks.integrators.faults import OUTPUTS, Fault, State, as_output
 from pyharness.checks.integrators.problem import Judged, convergence, errors_between
-from pyharness.compare.orders import ORDER_SLACK
 
 # A motion is that of a known fault if it explains all but this part of the error, and if the rest
 # falls at least with this power of the step size or tolerance.

@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 
 from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
+from pyharness.checks.compare.candidates import unstopped
 from pyharness.checks.hold import OURS, apart, run_method, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.compare.candidates import unstopped
 from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
 from pyharness.model.errors import InputError

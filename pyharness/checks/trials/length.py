@@ -13,10 +13,10 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import BITS, Attempt, Check, Name
+from pyharness.checks.compare.candidates import method_candidate, prepared_candidate, unstopped
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.compare.candidates import method_candidate, prepared_candidate, unstopped
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import METHODS
 from pyharness.model.basis import Basis

@@ -8,11 +8,11 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
+from pyharness.checks.compare.candidates import End, not_finite
 from pyharness.checks.hold import ALL, check_all, check_methods, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.compare.candidates import End, not_finite
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError

@@ -8,9 +8,9 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.compare.candidates import unstopped
 from pyharness.checks.divergence import DOUBLING, Runner, divergence, smallest_divergent
 from pyharness.checks.stress import LISTINGS, Trial, named
-from pyharness.compare.candidates import unstopped
 from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import FIXED_STEP

@@ -13,9 +13,9 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import BITS, Check, may_hold
+from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.compare.candidates import method_candidate, program_candidate
 from pyharness.methods.prepared import prepare
 from pyharness.methods.registry import METHODS
 from pyharness.methods.solver import PREPARED, Solver

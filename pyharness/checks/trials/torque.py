@@ -11,6 +11,12 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.compare.candidates import (
+    Candidate,
+    method_candidate,
+    prepared_candidate,
+    unstopped,
+)
 from pyharness.checks.hold import (
     apart,
     check_methods,
@@ -22,7 +28,6 @@ from pyharness.checks.hold import (
 from pyharness.checks.judge import AMPLIFIED, Truth, by_end, judge
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.compare.candidates import Candidate, method_candidate, prepared_candidate, unstopped
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw

@@ -3,10 +3,10 @@
 import argparse
 from collections.abc import Sequence
 
+from pyharness.checks.compare.comparison import compare_programs, listings_for
+from pyharness.checks.compare.method_comparison import compare_methods
+from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
-from pyharness.compare.comparison import compare_programs, listings_for
-from pyharness.compare.method_comparison import compare_methods
-from pyharness.compare.report import comparison_report
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of

@@ -19,8 +19,8 @@ from unittest.mock import patch
 import numpy as np
 
 from pyharness import ImpossibleBodyWarning, InputError, prepare, read_scene, solve
+from pyharness.checks.compare.agreement import differences
 from pyharness.cli.main import main
-from pyharness.compare.agreement import differences
 from pyharness.model.extension import ENDS
 from pyharness.model.listing import names_of, subset
 from pyharness.model.trajectory import WITH_ALL_ROWS

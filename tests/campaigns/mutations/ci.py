@@ -22,9 +22,9 @@ PLANTED = (
         "tests/methods/test_closed_form.py::test_any_top_at_any_time",
     ),
     (
-        "pyharness/compare/agreement.py",
+        "pyharness/checks/compare/agreement.py",
         "mutmut remove unary ops 1: return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))",
-        "tests/compare/test_comparison.py::test_ulps_count_representable_values",
+        "tests/checks/compare/test_comparison.py::test_ulps_count_representable_values",
     ),
     (
         "web/programs/linear-solver.js",

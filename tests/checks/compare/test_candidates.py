@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
-from pyharness.compare.candidates import method_candidate, prepared_candidate, program_candidate
+from pyharness.checks.compare.candidates import (
+    method_candidate,
+    prepared_candidate,
+    program_candidate,
+)
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.original.programs import IMPLEMENTATIONS
 

@@ -13,10 +13,10 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.compare.agreement import Accuracy, accuracy, differences, distance
-from pyharness.compare.candidates import method_candidate, program_candidate
-from pyharness.compare.orders import Order, measured_order
-from pyharness.compare.timing import seconds as timed
+from pyharness.checks.compare.agreement import Accuracy, accuracy, differences, distance
+from pyharness.checks.compare.candidates import method_candidate, program_candidate
+from pyharness.checks.compare.orders import Order, measured_order
+from pyharness.checks.compare.timing import seconds as timed
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.registry import (
     METHODS,

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from pyharness.compare.agreement import Accuracy
-from pyharness.compare.comparison import Comparison, MethodFinding, ProgramFinding
+from pyharness.checks.compare.agreement import Accuracy
+from pyharness.checks.compare.comparison import Comparison, MethodFinding, ProgramFinding
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -69,7 +69,7 @@ def comparison_report(comparison: Comparison) -> Report:
     tables.append([_methods(comparison)])
 
     def draw() -> Picture:
-        from pyharness.compare.picture import comparison_picture
+        from pyharness.checks.compare.picture import comparison_picture
 
         return comparison_picture(comparison)
 

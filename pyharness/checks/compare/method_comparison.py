@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pyharness.compare.comparison import Comparison, method_finding
+from pyharness.checks.compare.comparison import Comparison, method_finding
 from pyharness.methods.registry import (
     METHODS,
     SCIPY_METHODS,

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, case_scene, compare_methods, read_scene, torques
+from pyharness.checks.compare.agreement import accuracy
+from pyharness.checks.compare.comparison import Comparison
+from pyharness.checks.compare.picture import comparison_picture
+from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.cli.main import main
-from pyharness.compare.agreement import accuracy
-from pyharness.compare.comparison import Comparison
-from pyharness.compare.picture import comparison_picture
-from pyharness.compare.report import comparison_report, verdict
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.model.expressions import parsed
 from pyharness.truth.reference import reference

@@ -8,10 +8,10 @@ from typing import Any, Never
 import numpy as np
 import pytest
 
-from pyharness.compare import orders
-from pyharness.compare.comparison import compare_programs
-from pyharness.compare.orders import Order, measured_order, order_of
-from pyharness.compare.report import comparison_report
+from pyharness.checks.compare import orders
+from pyharness.checks.compare.comparison import compare_programs
+from pyharness.checks.compare.orders import Order, measured_order, order_of
+from pyharness.checks.compare.report import comparison_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pyharness.compare.agreement import Accuracy
-from pyharness.compare.comparison import Comparison
+from pyharness.checks.compare.agreement import Accuracy
+from pyharness.checks.compare.comparison import Comparison
 from pyharness.methods.report import mark_end
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.scene_report import heading

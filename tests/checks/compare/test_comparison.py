@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
-from pyharness.compare import comparison as room
-from pyharness.compare.agreement import accuracy, differences, distance, ulps
-from pyharness.compare.comparison import compare_programs, listings_for
-from pyharness.compare.picture import comparison_picture
-from pyharness.compare.report import comparison_report, verdict
+from pyharness.checks.compare import comparison as room
+from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
+from pyharness.checks.compare.comparison import compare_programs, listings_for
+from pyharness.checks.compare.picture import comparison_picture
+from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.methods.registry import SCIPY_METHODS
 from pyharness.methods.report import trajectory_report
 from pyharness.model.attitude import product

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from docs.atlas.maps import region_panels, thinned, values_of
+from pyharness.checks.theory.regions import regions
+from pyharness.checks.theory.rotations import rates
 from pyharness.ensembles.store import Store
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
-from pyharness.theory.regions import regions
-from pyharness.theory.rotations import rates
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from docs.atlas.maps import region_panels, thinned, values_of
+from pyharness.checks.theory.regions import regions
+from pyharness.checks.theory.rotations import rates
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Sweep
@@ -17,8 +19,6 @@ from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array
-from pyharness.theory.regions import regions
-from pyharness.theory.rotations import rates
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

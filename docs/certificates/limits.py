@@ -10,7 +10,7 @@ from pyharness.model.basis import MARKS, Basis
 
 
 def limits() -> list[Basis]:
-    """Return each basis that a module of `pyharness.checks` or `pyharness.theory` defines, once.
+    """Return each basis that a module of `pyharness.checks` or `pyharness.checks.theory` defines, once.
 
     They are sorted by their marks, from proved to measured, and then by the limited quantities.
     """

@@ -1,6 +1,6 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
-`pyharness.theory.amplification` derives the same from the schemes alone, exactly, so that limits
+`pyharness.checks.theory.amplification` derives the same from the schemes alone, exactly, so that limits
 allow only for rounding. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
@@ -10,6 +10,16 @@ from fractions import Fraction
 
 import numpy as np
 
+from pyharness.checks.theory.amplification import (
+    NEAREST,
+    amplification,
+    boundary,
+    weight_of_squares,
+)
+from pyharness.checks.theory.collocation_matrices import points, solver_roundings
+from pyharness.checks.theory.conditioning import ROUNDING
+from pyharness.checks.theory.rational import Exact
+from pyharness.checks.theory.schemes import Numbers, runge_kutta_punched, spacing
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, Triple
@@ -18,11 +28,6 @@ from pyharness.model.trajectory import Array
 from pyharness.original import collocation
 from pyharness.original.equations import omega_rate
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.theory.amplification import NEAREST, amplification, boundary, weight_of_squares
-from pyharness.theory.collocation_matrices import points, solver_roundings
-from pyharness.theory.conditioning import ROUNDING
-from pyharness.theory.rational import Exact
-from pyharness.theory.schemes import Numbers, runge_kutta_punched, spacing
 
 # Degree of a step as a polynomial of omega: each product of stages doubles it.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}

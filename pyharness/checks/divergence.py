@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pyharness.checks.theory.amplification import Amplification
 from pyharness.methods.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.theory.amplification import Amplification
 
 Runner = Callable[[Scene], Trajectory]
 

@@ -21,6 +21,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.selection import RECORD, Selection
+from pyharness.checks.theory.conditioning import FLOW, conditioning
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.basis import Basis
@@ -31,7 +32,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene, toml_of
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.theory.conditioning import FLOW, conditioning
 
 _ANEW = "verify --update writes it anew"
 _STEPS = (1, 10)

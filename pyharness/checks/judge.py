@@ -9,14 +9,14 @@ import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name
 from pyharness.checks.compare.candidates import Candidate, End, method_candidate
+from pyharness.checks.theory.conditioning import FLOW, LIVELY, Conditioning
+from pyharness.checks.theory.state_conditioning import conditioning_at
 from pyharness.methods.problem import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory.conditioning import FLOW, LIVELY, Conditioning
-from pyharness.theory.state_conditioning import conditioning_at
 from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 

@@ -30,13 +30,13 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.methods import START, run_of_call, run_of_solve
 from pyharness.checks.selection import Selection
+from pyharness.checks.theory.conditioning import along
 from pyharness.methods.problem import closed_form
 from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.methods.solve import finest
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.scenes.random_scenes import Draw, draw
-from pyharness.theory.conditioning import along
 from pyharness.truth.integer_series import integer_series
 
 # Of each pair of draws, one has a plain scene, and the other a scene of a kind in `NASTY`. Methods

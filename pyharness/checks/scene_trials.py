@@ -21,6 +21,8 @@ from pyharness.checks.judge import (
 from pyharness.checks.orders import in_few_steps, order_if_seen
 from pyharness.checks.random_torques import POLICY
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.theory.conditioning import FLOW, Conditioning
+from pyharness.checks.theory.state_conditioning import conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import THREADS, Job, different
 from pyharness.methods.problem import closed_form
@@ -40,8 +42,6 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.scenes.rotated import axes_of, restarted_at, rotated
-from pyharness.theory.conditioning import FLOW, Conditioning
-from pyharness.theory.state_conditioning import conditioning_at
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)

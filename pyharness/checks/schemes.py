@@ -13,14 +13,14 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.selection import Selection
+from pyharness.checks.theory.collocation_matrices import PARTS
+from pyharness.checks.theory.conditioning import ROUNDING, magnitudes
 from pyharness.model.basis import Basis
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.theory.collocation_matrices import PARTS
-from pyharness.theory.conditioning import ROUNDING, magnitudes
 
 # Roundings of a rate, including the stages that lead to it, and of the sum to which it is added.
 _ROUNDINGS = 32.0

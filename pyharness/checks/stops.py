@@ -15,6 +15,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.methods import cases
 from pyharness.checks.schemes import Stage, is_whole, rows, stages
 from pyharness.checks.selection import Selection
+from pyharness.checks.theory.conditioning import ROUNDING
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene
@@ -22,7 +23,6 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.original.cells import listing_name, subsets
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.theory.conditioning import ROUNDING
 
 _PROGRAM = "runge-kutta"
 _QUOTIENT = Basis(

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.checks.theory.flips import flip_times
 from pyharness.methods.solve import solve
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory, turned_to_space
-from pyharness.theory.flips import flip_times
 from pyharness.views.pictures import saved
 
 PROGRAM = """\

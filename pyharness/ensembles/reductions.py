@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.checks.theory.flips import flip_times
 from pyharness.ensembles.attitude_reductions import (
     axis_flips,
     end_attitude,
@@ -20,7 +21,6 @@ from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import STOP_VARIABLES, Array
-from pyharness.theory.flips import flip_times
 
 Found = NDArray[Any]
 # Value of an integer array where no scene has been computed yet.

@@ -12,7 +12,7 @@ from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from pyharness import Scene, case_scene, solve
-from pyharness.theory.flips import flip_times
+from pyharness.checks.theory.flips import flip_times
 from tests.browser.screen import (
     WIDTHS,
     fragment,

@@ -8,8 +8,8 @@ import pytest
 
 from pyharness import Scene, TorqueLaw
 from pyharness.checks.stress import named, stress, worst
+from pyharness.checks.theory import brouwer
 from pyharness.checks.trials import length, threads
-from pyharness.theory import brouwer
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 

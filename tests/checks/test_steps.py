@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from pyharness.checks.pictures import regions_picture
+from pyharness.checks.theory import collocation_matrices
+from pyharness.checks.theory.amplification import amplification, boundary, weight_of_squares
+from pyharness.checks.theory.collocation_matrices import singular_below, solved
+from pyharness.checks.theory.regions import regions
+from pyharness.checks.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error
+from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original import collocation
 from pyharness.original.linear_solver import leqt1f
-from pyharness.theory import collocation_matrices
-from pyharness.theory.amplification import amplification, boundary, weight_of_squares
-from pyharness.theory.collocation_matrices import singular_below, solved
-from pyharness.theory.regions import regions
-from pyharness.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error
-from pyharness.theory.step_errors import Forecaster, path
 from pyharness.views.pictures import saved
 from tests.checks.stressed import checks_of
 

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, case_scene, solve
+from pyharness.checks.theory.flips import flip_times
 from pyharness.edition.body import AGREEMENT, PROGRAM, SPEEDS, context, data, moments_of_box
 from pyharness.edition.bundle import bundle
 from pyharness.model.extension import extension
-from pyharness.theory.flips import flip_times
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
 from tests.attitude_errors import largest_error
 from tests.conftest import Printed

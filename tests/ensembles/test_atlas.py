@@ -11,6 +11,7 @@ from docs.atlas import draw
 from docs.atlas.collocation import tenfold
 from docs.atlas.maps import place_of
 from docs.atlas.stops import case_scenes, predicted
+from pyharness.checks.theory.flips import flip_times
 from pyharness.ensembles.chunk import solve_chunk
 from pyharness.ensembles.forecast import places_of_a_chunk
 from pyharness.ensembles.run import run_sweep
@@ -19,7 +20,6 @@ from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
-from pyharness.theory.flips import flip_times
 from tests.ensembles.sweeps import written
 
 ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"

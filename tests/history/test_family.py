@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, case_scene
+from pyharness.checks.theory.tableau import tableau
 from pyharness.cli.main import main
 from pyharness.history.family.members import WEIGHTINGS, Member, integrate, predicted_order, run
 from pyharness.history.family.orders import SCHEMES, SLACK, family_members, order_table
@@ -18,7 +19,6 @@ from pyharness.model.report import short
 from pyharness.model.trajectory import Array
 from pyharness.original import compiled
 from pyharness.original.linear_solver import SINGULAR, leqt1f
-from pyharness.theory.tableau import tableau
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
 

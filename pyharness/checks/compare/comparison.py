@@ -17,6 +17,7 @@ from pyharness.checks.compare.agreement import Accuracy, accuracy, differences, 
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.compare.orders import Order, measured_order
 from pyharness.checks.compare.timing import seconds as timed
+from pyharness.checks.theory.conditioning import LIVELY
 from pyharness.methods.from_rows import attitude_from_rows
 from pyharness.methods.registry import (
     METHODS,
@@ -41,7 +42,6 @@ from pyharness.original.programs import (
     checked_word,
     work_of,
 )
-from pyharness.theory.conditioning import LIVELY
 from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pyharness.checks.theory.conditioning import ROUNDING, conditioning
 from pyharness.methods.solve import solve
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError
@@ -16,7 +17,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import Program
-from pyharness.theory.conditioning import ROUNDING, conditioning
 from pyharness.truth.reference import Reference
 
 # A measured order may be below the expected one by at most this.
@@ -217,7 +217,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 def _may_be_singular(program: str, step_size: float) -> bool:
     """Return whether LEQT1F may find a program's matrix singular: condition 1e15 or overflow."""
-    from pyharness.theory.collocation_matrices import PARTS
+    from pyharness.checks.theory.collocation_matrices import PARTS
 
     if program not in PARTS:
         return False

@@ -23,6 +23,13 @@ from pyharness.checks.judge import (
     unknown_flow,
 )
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.theory.conditioning import (
+    ATTITUDE,
+    FLOW,
+    ROUNDING,
+    Conditioning,
+    conditioning,
+)
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.length import CLOSED_FORM
 from pyharness.methods.registry import METHODS
@@ -40,7 +47,6 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.extreme import EXTREMES, POINTED
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rotated import rotated
-from pyharness.theory.conditioning import ATTITUDE, FLOW, ROUNDING, Conditioning, conditioning
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 

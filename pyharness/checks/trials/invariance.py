@@ -16,6 +16,7 @@ from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.compare.candidates import unstopped
 from pyharness.checks.hold import OURS, apart, run_method, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.theory.conditioning import FLOW, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
 from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
 from pyharness.methods.solve import finest, solve
@@ -27,7 +28,6 @@ from pyharness.model.trajectory import Array
 from pyharness.scenes.random_scenes import random_scene
 from pyharness.scenes.rescaled import scaled
 from pyharness.scenes.rotated import restarted_at, rotated
-from pyharness.theory.conditioning import FLOW, Conditioning, conditioning
 
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")

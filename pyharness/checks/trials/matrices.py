@@ -8,11 +8,7 @@ from functools import partial
 from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import Trial, named
-from pyharness.model.listing import Listing
-from pyharness.model.scene_file import case_scene
-from pyharness.original import compiled
-from pyharness.original.linear_solver import SINGULAR
-from pyharness.theory.collocation_matrices import (
+from pyharness.checks.theory.collocation_matrices import (
     HIGHAM,
     PARTS,
     PIVOTS,
@@ -22,6 +18,10 @@ from pyharness.theory.collocation_matrices import (
     singular_below,
     solved,
 )
+from pyharness.model.listing import Listing
+from pyharness.model.scene_file import case_scene
+from pyharness.original import compiled
+from pyharness.original.linear_solver import SINGULAR
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
 # Step sizes (s) of runs. With some of them the matrix of the four-term program is singular.

@@ -20,10 +20,10 @@ from pyharness.checks.disturbances import (
 )
 from pyharness.checks.hold import scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.theory.amplification import amplification, weight_of_squares
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
-from pyharness.theory.amplification import amplification, weight_of_squares
 
 # A, B, C and a steady omega, with few binary digits. The eigenvalues are real, imaginary and
 # complex, in both half-planes.

@@ -12,6 +12,7 @@ from pyharness.checks.compare.candidates import End, not_finite
 from pyharness.checks.hold import ALL, check_all, check_methods, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
+from pyharness.checks.theory.conditioning import Conditioning, conditioning
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.basis import Basis
@@ -20,7 +21,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
 from pyharness.scenes.rescaled import scaled
-from pyharness.theory.conditioning import Conditioning, conditioning
 
 _DRIVEN = replace(
     ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))

@@ -11,6 +11,10 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.compare.candidates import unstopped
 from pyharness.checks.divergence import DOUBLING, Runner, divergence, smallest_divergent
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.theory.amplification import amplification
+from pyharness.checks.theory.collocation_matrices import PARTS, singular_below
+from pyharness.checks.theory.schemes import SCHEMES
+from pyharness.checks.theory.step_errors import FORECAST, Forecaster, Path, path
 from pyharness.methods.fixed_step import fixed_step
 from pyharness.methods.problem import normalized
 from pyharness.methods.registry import FIXED_STEP
@@ -21,10 +25,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.linear_solver import SINGULAR
-from pyharness.theory.amplification import amplification
-from pyharness.theory.collocation_matrices import PARTS, singular_below
-from pyharness.theory.schemes import SCHEMES
-from pyharness.theory.step_errors import FORECAST, Forecaster, Path, path
 from pyharness.truth.reference import reference
 
 CASES = (2, 3, 4, 5, 6)

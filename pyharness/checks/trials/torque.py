@@ -27,12 +27,12 @@ from pyharness.checks.hold import (
 )
 from pyharness.checks.judge import AMPLIFIED, Truth, by_end, judge
 from pyharness.checks.stress import LISTINGS, Trial, named
+from pyharness.checks.theory import brouwer
+from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
 from pyharness.methods.registry import FIXED_STEP
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.theory import brouwer
-from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 

@@ -2,10 +2,10 @@
 
 import argparse
 
+from pyharness.checks.theory.rotations import steady_rotations
+from pyharness.checks.theory.rotations_report import rotations_report
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
-from pyharness.theory.rotations import steady_rotations
-from pyharness.theory.rotations_report import rotations_report
 
 OPTIONS = {
     **shared.BODY,

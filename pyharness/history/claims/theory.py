@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.checks.theory.rotations import steady_rotations
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
 from pyharness.history.family.members import Member, run
@@ -21,7 +22,6 @@ from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 from pyharness.original.cards import deck
-from pyharness.theory.rotations import steady_rotations
 from pyharness.truth.reference import reference
 
 Weights = Sequence[Callable[[Array], Any]]

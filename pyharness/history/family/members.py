@@ -3,7 +3,7 @@
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
-for n weight functions W (eq. 26). The thesis makes one. `pyharness.theory.tableau` computes its
+for n weight functions W (eq. 26). The thesis makes one. `pyharness.checks.theory.tableau` computes its
 coefficients.
 """
 
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from pyharness.checks.theory.tableau import basis, grid, tableau
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.theory.tableau import basis, grid, tableau
 
 WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")

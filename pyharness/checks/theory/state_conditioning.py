@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow
 from pyharness.dynamics.array_tape import inputs_of, outputs_at, table_values
 from pyharness.methods.linearised import transitions
 from pyharness.methods.recorded import system
@@ -21,7 +22,6 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import ATTITUDE, OMEGA, Functions, Tape, evaluate
 from pyharness.model.tape_derivative import with_derivatives
 from pyharness.model.trajectory import Array
-from pyharness.theory.conditioning import Conditioning, conditioning, of_flow
 
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 100

@@ -11,12 +11,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.methods import linearised
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.truth.reference import reference
 
 _CHANGE = 1e-6

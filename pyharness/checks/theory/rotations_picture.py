@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.checks.theory.polhodes import growth_of_bodies, polhodes
+from pyharness.checks.theory.rotations import steady_rotations
 from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.theory.polhodes import growth_of_bodies, polhodes
-from pyharness.theory.rotations import steady_rotations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

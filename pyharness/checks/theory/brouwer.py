@@ -152,7 +152,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     its coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j
     of omega.
     """
-    from pyharness.theory.tableau import tableau
+    from pyharness.checks.theory.tableau import tableau
 
     matrix = tableau("collocation", stages, "gauss").matrix
     rate = float(np.abs(body.slopes).max())

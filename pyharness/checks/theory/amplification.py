@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.checks.theory.collocation_matrices import PARTS
+from pyharness.checks.theory.rational import Exact, Fractions, collocation_matrix, inverse
 from pyharness.model.listing import Listing
-from pyharness.theory.collocation_matrices import PARTS
-from pyharness.theory.rational import Exact, Fractions, collocation_matrix, inverse
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.checks.theory.amplification import Amplification, amplification
 from pyharness.model.listing import Listing, subset
 from pyharness.model.trajectory import Array
-from pyharness.theory.amplification import Amplification, amplification
 
 # Samples of z: smallest value, largest value, and number of values. The rectangle of _REAL and
 # _IMAGINARY contains all stability boundaries. _DISTANCES are distances of imaginary z from 0.

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from pyharness.checks.theory.rotations import Rates, SteadyRotation, SteadyRotations
 from pyharness.model.records import build_record, scene_record
 from pyharness.model.report import Column, Picture, Report, Section, Table, digits, numbers, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
-from pyharness.theory.rotations import Rates, SteadyRotation, SteadyRotations
 
 _TIMES = ("doubling_time", "period", "flip_interval", "linear_until")
 _FULL = (
@@ -101,6 +101,6 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 
 def _picture(scene: Scene) -> Picture:
     # Imported here, because only the picture needs this module, and the table does not.
-    from pyharness.theory.rotations_picture import rotations_picture
+    from pyharness.checks.theory.rotations_picture import rotations_picture
 
     return rotations_picture(scene)

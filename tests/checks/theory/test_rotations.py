@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, solve
+from pyharness.checks.theory.polhodes import growth_of_bodies, polhodes
+from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
 from pyharness.cli.main import main
 from pyharness.methods.linearised import jacobians
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
-from pyharness.theory.polhodes import growth_of_bodies, polhodes
-from pyharness.theory.rotations import SteadyRotation, rates, steady_rotations
 from tests.conftest import Printed
 
 BODY = (40.0, 30.0, 20.0)

@@ -1,6 +1,6 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The errors of a step, the truncation error from `pyharness.theory.schemes`, are propagated by the
+The errors of a step, the truncation error from `pyharness.checks.theory.schemes`, are propagated by the
 state-transition matrix. The methods are not run.
 """
 
@@ -10,13 +10,13 @@ from functools import cache
 
 import numpy as np
 
+from pyharness.checks.theory.collocation_matrices import PARTS, singular_below, solver_roundings
+from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.checks.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
 from pyharness.methods.linearised import jacobians, propagators
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory.collocation_matrices import PARTS, singular_below, solver_roundings
-from pyharness.theory.conditioning import ROUNDING, Conditioning, conditioning
-from pyharness.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
 
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from pyharness.checks.theory.collocation_matrices import solved
 from pyharness.model import extension
-from pyharness.theory.collocation_matrices import solved
 
 
 def test_a_theorem_bounds_errors_only_where_its_hypotheses_hold(

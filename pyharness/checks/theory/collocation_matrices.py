@@ -12,11 +12,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyharness.model.basis import Basis
-from pyharness.model.trajectory import Array
-from pyharness.original import collocation
-from pyharness.original.linear_solver import SINGULAR, leqt1f
-from pyharness.theory.rational import (
+from pyharness.checks.theory.rational import (
     Fractions,
     collocation_matrix,
     fractions,
@@ -24,6 +20,10 @@ from pyharness.theory.rational import (
     inverse,
     norm,
 )
+from pyharness.model.basis import Basis
+from pyharness.model.trajectory import Array
+from pyharness.original import collocation
+from pyharness.original.linear_solver import SINGULAR, leqt1f
 
 # The collocation points of each program, at which the residual is zero, in units of the step size.
 PARTS = {

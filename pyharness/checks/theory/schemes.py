@@ -13,10 +13,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.polynomial import legendre
 
+from pyharness.checks.theory.collocation_matrices import PARTS
+from pyharness.checks.theory.rational import collocation_matrix, inverse
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.theory.collocation_matrices import PARTS
-from pyharness.theory.rational import collocation_matrix, inverse
 
 # Number of terms of a power series in the step size: powers 0 to TERMS - 1.
 TERMS = 24

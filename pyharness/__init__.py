@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from pyharness.checks.compare.method_comparison import compare_methods
     from pyharness.dynamics.scene_reader import read_scene
     from pyharness.dynamics.trajectory_reader import load
-    from pyharness.methods.compiled_call import get_include
-    from pyharness.methods.many import Ensemble, solve_many
-    from pyharness.methods.prepared import prepare
-    from pyharness.methods.prepared_attitude import AttitudeSolver
-    from pyharness.methods.solve import solve
-    from pyharness.methods.solver import Solver
-    from pyharness.methods.stepper import Stepper
-    from pyharness.methods.taylor_ivp import Taylor
+    from pyharness.engine.compiled_call import get_include
+    from pyharness.engine.many import Ensemble, solve_many
+    from pyharness.engine.prepared import prepare
+    from pyharness.engine.prepared_attitude import AttitudeSolver
+    from pyharness.engine.solve import solve
+    from pyharness.engine.solver import Solver
+    from pyharness.engine.stepper import Stepper
+    from pyharness.engine.taylor_ivp import Taylor
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError

@@ -4,7 +4,7 @@ An event is an argument of `pyharness.solve`, in ``events=[...]``. A Python func
 omega can be an event too.
 """
 
-from pyharness.methods.event_functions import Event
-from pyharness.methods.ready_events import crosses, extremum, flip, rest, tilt
+from pyharness.engine.event_functions import Event
+from pyharness.engine.ready_events import crosses, extremum, flip, rest, tilt
 
 __all__ = ["Event", "crosses", "extremum", "flip", "rest", "tilt"]

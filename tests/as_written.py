@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness import Scene
-from pyharness.methods.problem import normalized
+from pyharness.engine.problem import normalized
 from pyharness.model import codes
 from pyharness.model.trajectory import Array
 

@@ -2,7 +2,7 @@
 
 The series integrates omega and attitude of random scenes of `verify`, plain and nasty, with torque
 or not, each to a tolerance from `TOLERANCES`. The truth is the same series at 1e-14, which
-`tests/methods/test_attitude.py` compares with SciPy's solution of all seven unknowns.
+`tests/engine/test_attitude.py` compares with SciPy's solution of all seven unknowns.
 """
 
 import sys

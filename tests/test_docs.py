@@ -21,8 +21,8 @@ from docs.text import page as about_text
 from pyharness import read_scene
 from pyharness.cli import options
 from pyharness.cli.main import VERBS, main
+from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.history import figures
-from pyharness.methods.registry import METHODS, SCIPY_METHODS
 from pyharness.model.report import Report
 from pyharness.views import render as views
 from pyharness.views.csv import csv_text

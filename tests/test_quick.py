@@ -12,8 +12,8 @@ from tests.changed import changed as changed_since
 from tests.quick import ROOT, main, nearest, sources
 
 TESTS = {
-    "tests/methods/test_taylor.py": "from pyharness import solve",
-    "tests/methods/test_plan.py": "from pyharness.methods import taylor\n",
+    "tests/engine/test_taylor.py": "from pyharness import solve",
+    "tests/engine/test_plan.py": "from pyharness.engine import taylor\n",
     "tests/truth/test_other.py": "import numpy\nTEXT = 'taylor_march.f90'",
 }
 
@@ -22,11 +22,11 @@ TESTS = {
 @pytest.mark.parametrize(
     ("path", "wanted"),
     [
-        ("pyharness/methods/taylor.py", ["test_taylor", "test_plan"]),
+        ("pyharness/engine/taylor.py", ["test_taylor", "test_plan"]),
         ("fortran/modern/taylor_march.f90", ["test_other"]),
         ("tests/truth/test_other.py", ["test_other"]),
         ("docs/index.md", []),
-        ("pyharness/methods/registry.py", ["test_taylor", "test_plan"]),
+        ("pyharness/engine/registry.py", ["test_taylor", "test_plan"]),
         ("fortran/modern/sphere.f90", ["test_plan", "test_taylor"]),
     ],
 )

@@ -8,11 +8,11 @@ import numpy as np
 from docs.atlas.maps import region_panels, thinned, values_of
 from pyharness.checks.theory.regions import regions
 from pyharness.checks.theory.rotations import rates
+from pyharness.engine.linearised import jacobians
+from pyharness.engine.solve import solve
 from pyharness.ensembles.batches import batches
 from pyharness.ensembles.store import Store
 from pyharness.ensembles.sweep import Sweep
-from pyharness.methods.linearised import jacobians
-from pyharness.methods.solve import solve
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers

@@ -12,7 +12,7 @@ from pyharness.checks.compare.candidates import (
     prepared_candidate,
     program_candidate,
 )
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS
+from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene

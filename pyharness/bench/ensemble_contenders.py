@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pyharness.bench.contenders import Contender
-from pyharness.methods.many import solve_many
-from pyharness.methods.solve import solve
+from pyharness.engine.many import solve_many
+from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array

@@ -16,7 +16,7 @@ from pyharness.bench.ensemble_contenders import (
 )
 from pyharness.bench.ensemble_measure import SLOW, STEPS, clock_of
 from pyharness.checks.compare.timing import seconds
-from pyharness.methods.prepared import prepare
+from pyharness.engine.prepared import prepare
 from pyharness.model.progress import Progress, no_progress
 
 # Setting of each of our methods: a tolerance, or the number of steps of RK4.

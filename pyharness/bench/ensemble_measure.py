@@ -21,7 +21,7 @@ from pyharness.bench.ensemble_contenders import (
 )
 from pyharness.bench.loop import Call, Say, timed
 from pyharness.checks.compare.timing import Clock, batch_seconds, silenced
-from pyharness.methods.plan import FINEST
+from pyharness.engine.plan import FINEST
 from pyharness.model.attitude import angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress

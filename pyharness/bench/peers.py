@@ -12,7 +12,7 @@ from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse
 from pyharness.bench.heyoka_equations import Formula, heyoka_equations
 from pyharness.checks.compare.candidates import End, Ready, not_finite
 from pyharness.dynamics.system import slopes_of
-from pyharness.methods.scipy_ivp import RightHandSide, state_of, with_attitude
+from pyharness.engine.scipy_ivp import RightHandSide, state_of, with_attitude
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from pyharness.checks.compare.timing import seconds
-from pyharness.methods.prepared import prepare
+from pyharness.engine.prepared import prepare
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
@@ -64,7 +64,7 @@ def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
         found.append(
             measured_saving("velocity", f"{program}, 1000 steps", one, partial(one, velocity=False))
         )
-    code = "import pyharness.methods.prepared"
+    code = "import pyharness.engine.prepared"
     for part, module in (("SciPy", "scipy.integrate"), ("reference", "pyharness.truth.reference")):
         one, other = partial(_python, f"{code}, {module}"), partial(_python, code)
         found.append(measured_saving(part, f"a process that imports {module}", one, other))

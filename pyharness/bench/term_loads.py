@@ -10,7 +10,7 @@ from pyharness.bench.ensemble_contenders import EnsembleLoad
 from pyharness.bench.heyoka_equations import Formula
 from pyharness.bench.measure import Workload
 from pyharness.dynamics import field_terms, terms
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array

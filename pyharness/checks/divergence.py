@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pyharness.checks.theory.amplification import Amplification
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory

@@ -35,8 +35,8 @@ from pyharness.checks.stress import LISTINGS, named
 from pyharness.checks.theory import promises
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.checks.tolerances import affordable
-from pyharness.methods.problem import closed_form
-from pyharness.methods.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
+from pyharness.engine.problem import closed_form
+from pyharness.engine.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.scenes.extreme import EXTREMES, Circumstance, speed

@@ -28,9 +28,9 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.selection import Selection
 from pyharness.checks.tolerances import FEW_DIGITS, OF_CASES, of_case
-from pyharness.methods.problem import closed_form, normalized
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
-from pyharness.methods.solve import finest
+from pyharness.engine.problem import closed_form, normalized
+from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS
+from pyharness.engine.solve import finest
 from pyharness.model.attitude import Quaternion
 from pyharness.model.extension import extension
 from pyharness.model.scene import Scene

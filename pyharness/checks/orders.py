@@ -15,8 +15,8 @@ from pyharness.checks.compare.candidates import method_candidate, program_candid
 from pyharness.checks.compare.orders import Order, measured_order, order_of
 from pyharness.checks.methods import cases
 from pyharness.checks.selection import Selection
-from pyharness.methods.registry import FIXED_STEP, METHODS
-from pyharness.methods.solve import finest
+from pyharness.engine.registry import FIXED_STEP, METHODS
+from pyharness.engine.solve import finest
 from pyharness.model.basis import Basis
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene

@@ -31,9 +31,9 @@ from pyharness.checks.judge import (
 from pyharness.checks.methods import START, run_of_call, run_of_solve
 from pyharness.checks.selection import Selection
 from pyharness.checks.theory.conditioning import along
-from pyharness.methods.problem import closed_form
-from pyharness.methods.registry import METHODS, REGISTRY, SCIPY_METHODS
-from pyharness.methods.solve import finest
+from pyharness.engine.problem import closed_form
+from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.solve import finest
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.scenes.random_scenes import Draw, draw

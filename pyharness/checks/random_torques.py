@@ -23,8 +23,8 @@ from pyharness.checks.judge import (
 from pyharness.checks.methods import run_of_call
 from pyharness.checks.random_methods import CAMPAIGN, ROUNDING, sample
 from pyharness.checks.selection import Selection
-from pyharness.methods.many import solve_many
-from pyharness.methods.registry import METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
+from pyharness.engine.many import solve_many
+from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.scene import Scene

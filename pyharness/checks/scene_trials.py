@@ -25,9 +25,9 @@ from pyharness.checks.theory.conditioning import FLOW, Conditioning
 from pyharness.checks.theory.state_conditioning import conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import THREADS, Job, different
-from pyharness.methods.problem import closed_form
-from pyharness.methods.recorded import system
-from pyharness.methods.registry import (
+from pyharness.engine.problem import closed_form
+from pyharness.engine.recorded import system
+from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
     METHODS,
@@ -35,7 +35,7 @@ from pyharness.methods.registry import (
     check_attitude,
     check_torque,
 )
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.attitude import IDENTITY, angle_between, product, quaternion_of_axes
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple

@@ -6,10 +6,10 @@ A work limit, in right-hand sides, decides which tolerances are affordable, and 
 import math
 
 from pyharness.checks.theory.conditioning import Conditioning
-from pyharness.methods.problem import closed_form
-from pyharness.methods.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
-from pyharness.methods.scipy_ivp import steps_sum
-from pyharness.methods.solve import finest as finest_of
+from pyharness.engine.problem import closed_form
+from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.scipy_ivp import steps_sum
+from pyharness.engine.solve import finest as finest_of
 from pyharness.model.scene import Scene
 from pyharness.scenes.extreme import speed
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.theory.flips import flip_times
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene

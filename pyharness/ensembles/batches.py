@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.engine.batch import OF_PROGRAMS, Batch
 from pyharness.ensembles.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
 from pyharness.ensembles.reductions import needs_attitudes
 from pyharness.ensembles.state_torques import follows_body, with_numbers
 from pyharness.ensembles.sweep import Indices, Sweep, groups, value_columns
-from pyharness.methods.batch import OF_PROGRAMS, Batch
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, subset

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Mapping
 
+from pyharness.engine.registry import METHODS
 from pyharness.ensembles.attitude_reductions import RANKS
 from pyharness.ensembles.reductions import REDUCTIONS
 from pyharness.ensembles.sweep import ReductionSpec
-from pyharness.methods.registry import METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.values import integer, number, three
 

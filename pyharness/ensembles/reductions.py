@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.checks.theory.flips import flip_times
+from pyharness.engine.batch import Batch
 from pyharness.ensembles.attitude_reductions import (
     axis_flips,
     end_attitude,
@@ -17,7 +18,6 @@ from pyharness.ensembles.attitude_reductions import (
     tilted_time,
 )
 from pyharness.ensembles.sweep import ReductionSpec
-from pyharness.methods.batch import Batch
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import STOP_VARIABLES, Array

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pyharness.dynamics.scene_reader import scene_of
+from pyharness.engine.registry import check_torque
 from pyharness.ensembles.fields import CONSTANTS
-from pyharness.methods.registry import check_torque
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene
 from pyharness.model.scene_file import scene_text

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.batch import Solver
 from pyharness.ensembles.axes import Axis
-from pyharness.methods.batch import Solver
 from pyharness.model.scene import Scene
 
 Arrays = dict[str, NDArray[Any]]

@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.dynamics.scene_reader import scene_of, scene_of_file
+from pyharness.engine.batch import Solver
+from pyharness.engine.registry import REGISTRY, requested_tolerance
+from pyharness.engine.solver import PREPARED
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of
 from pyharness.ensembles.fields import ATTITUDE, CHOICES, RIVALS
@@ -16,9 +19,6 @@ from pyharness.ensembles.reduction_spec import reduction_spec_of
 from pyharness.ensembles.reductions import REDUCTIONS, needs_attitudes
 from pyharness.ensembles.state_torques import check_state_axis, check_state_solver
 from pyharness.ensembles.sweep import Sweep
-from pyharness.methods.batch import Solver
-from pyharness.methods.registry import REGISTRY, requested_tolerance
-from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene

@@ -29,8 +29,8 @@ from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli.main import main
-from pyharness.methods import problem
-from pyharness.methods.registry import METHODS
+from pyharness.engine import problem
+from pyharness.engine.registry import METHODS
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene

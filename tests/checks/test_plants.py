@@ -12,8 +12,8 @@ from pyharness.checks.kinds import verify
 from pyharness.checks.plants.planted_twins import TWIN_FAULTS, twin
 from pyharness.checks.plants.plants import PLANTS, Plant
 from pyharness.checks.selection import Selection
-from pyharness.methods.prepared import prepare
-from pyharness.methods.solve import solve
+from pyharness.engine.prepared import prepare
+from pyharness.engine.solve import solve
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.original import compiled

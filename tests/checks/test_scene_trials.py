@@ -16,7 +16,7 @@ from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
 from pyharness.cli.main import main
-from pyharness.methods.registry import METHODS
+from pyharness.engine.registry import METHODS
 from pyharness.model.scene_file import scene_text
 from pyharness.scenes.random_scenes import random_scene
 

@@ -157,7 +157,7 @@ def test_folder_that_can_not_be_made_is_refused_before_any_work(
 def test_file_that_can_not_be_written_is_refused_before_any_work(
     capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pyharness.methods.solve.solve", lambda *_: pytest.fail("worked"))
+    monkeypatch.setattr("pyharness.engine.solve.solve", lambda *_: pytest.fail("worked"))
     for path in ("/proc/rows", "x" * 256):
         _refusal(f"run --case 3 --method auto --out {path}", capsys)
     assert list(Path().iterdir()) == []

@@ -376,7 +376,7 @@ def test_what_ends_a_run_has_an_exit_code(
     def raises(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("pyharness.methods.solve.solve", raises)
+    monkeypatch.setattr("pyharness.engine.solve.solve", raises)
     assert main(["run", "--case", "3", "--method", "taylor"]) == code
     assert capsys.readouterr().err == f"pyharness: {words}\n"
 

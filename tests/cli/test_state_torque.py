@@ -17,8 +17,8 @@ from pyharness import ChangingMoments, Scene, StateTorque, prepare, principal, s
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.dynamics.scene_reader import read_scene
-from pyharness.methods.registry import METHODS
-from pyharness.methods.solve import solve
+from pyharness.engine.registry import METHODS
+from pyharness.engine.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import case_scene

@@ -29,7 +29,7 @@ FOLDER = ROOT / "build" / "cross"
 MODERN = (
     "tests/original/test_linear_solver.py",
     *(
-        f"tests/methods/test_{name}.py"
+        f"tests/engine/test_{name}.py"
         for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
     ),
 )
@@ -37,14 +37,14 @@ MODERN = (
 # same in every build.
 CALLING = (
     "tests/campaigns/fuzz",
-    "tests/methods",
+    "tests/engine",
     *(f"tests/model/test_{name}.py" for name in ("attitude", "conversions", "effort", "values")),
     "tests/original",
     "tests/checks/compare/test_candidates.py",
     "tests/checks/test_motions.py::test_bounds_hold",
     "tests/checks/test_stress.py::test_bounds_hold",
     # The build with traps calls its kernels through Python, so that they have no address.
-    "--ignore=tests/methods/test_compiled_call.py",
+    "--ignore=tests/engine/test_compiled_call.py",
     # These tests enter no kernel, but SciPy, the reference, or Python's words, cards and stages.
     *(
         f"--ignore=tests/{name}.py"

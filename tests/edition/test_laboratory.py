@@ -17,8 +17,8 @@ from pyharness import case_scene, run_program
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.laboratory import MOST_STEPS, context, data
+from pyharness.engine.solve import solve
 from pyharness.history.limits import limit_solution
-from pyharness.methods.solve import solve
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.report import short

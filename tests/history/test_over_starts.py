@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pyharness.engine.batch import Batch, Solver
 from pyharness.history.claims import over_starts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim, outcome
 from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, JUDGED, SILENT
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
-from pyharness.methods.batch import Batch, Solver
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Triple
 from pyharness.model.scene_file import case_scene

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve
-from pyharness.methods.registry import FIXED_STEP, METHODS
+from pyharness.engine.registry import FIXED_STEP, METHODS
 from pyharness.scenes.rescaled import omega_by_torque, rescaling_factor, scaled
 
 _METHODS = ("auto", "taylor", "quick", "gauss-2", "gauss-8", *FIXED_STEP)

@@ -15,8 +15,8 @@ from pyharness import Scene, case_scene, solve
 from pyharness.bench import measure as bench
 from pyharness.checks import judge
 from pyharness.checks.compare import comparison, method_comparison
-from pyharness.methods import registry
-from pyharness.methods.reference_bound import trajectory_bound
+from pyharness.engine import registry
+from pyharness.engine.reference_bound import trajectory_bound
 from pyharness.model.attitude import angle_between
 from pyharness.truth import bounded, enclosure
 from pyharness.truth import reference as reference_module

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import FIXED_STEP, METHODS
-from pyharness.methods.solve import solve
-from pyharness.methods.solver import Solver
+from pyharness.engine.prepared import prepare
+from pyharness.engine.registry import FIXED_STEP, METHODS
+from pyharness.engine.solve import solve
+from pyharness.engine.solver import Solver
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing

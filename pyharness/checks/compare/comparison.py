@@ -18,13 +18,13 @@ from pyharness.checks.compare.candidates import method_candidate, program_candid
 from pyharness.checks.compare.orders import Order, measured_order
 from pyharness.checks.compare.timing import seconds as timed
 from pyharness.checks.theory.conditioning import LIVELY
-from pyharness.methods.from_rows import attitude_from_rows
-from pyharness.methods.registry import (
+from pyharness.engine.from_rows import attitude_from_rows
+from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
     requested_tolerance,
 )
-from pyharness.methods.sensitivity import is_sensitive, motion_growth
+from pyharness.engine.sensitivity import is_sensitive, motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, kind_of, unknown

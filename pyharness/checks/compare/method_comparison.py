@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pyharness.checks.compare.comparison import Comparison, method_finding
-from pyharness.methods.registry import (
+from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
     check_attitude,
     check_torque,
     requested_tolerance,
 )
-from pyharness.methods.sensitivity import motion_growth
+from pyharness.engine.sensitivity import motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene, checked_scene
@@ -36,7 +36,7 @@ def compare_methods(
         The scene; times are the ends of its steps. The torque may depend on omega or attitude if it
         can be recorded.
     methods : sequence of str
-        Names in `pyharness.methods.registry.METHODS`; by default `auto` and SciPy's methods.
+        Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
     tolerance : float, optional
         The tolerance of each method, relative to the largest component of omega; by default that of
         `solve`. A method with a fixed step takes none.

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pyharness.checks.theory.conditioning import ROUNDING, conditioning
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing

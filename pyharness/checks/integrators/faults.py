@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.methods.solve import solve
+from pyharness.engine.solve import solve
 from pyharness.model.attitude import product
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import checked_torque

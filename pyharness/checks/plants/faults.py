@@ -14,7 +14,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pyharness.methods.registry import METHODS
+from pyharness.engine.registry import METHODS
 from pyharness.model.trajectory import Array
 
 COMPILED = "pyharness.original.compiled.run"

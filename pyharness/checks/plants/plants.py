@@ -33,7 +33,7 @@ from pyharness.checks.plants.faults import (
     third_off,
 )
 from pyharness.checks.plants.planted_twins import twin
-from pyharness.methods.solver import CODES as _CODES
+from pyharness.engine.solver import CODES as _CODES
 from pyharness.model import extension
 from pyharness.model.codes import Methods, Places
 from pyharness.model.listing import Listing, flagged
@@ -81,7 +81,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
         kernel = SimpleNamespace(
             solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest), size)
         )
-        return patch("pyharness.methods.solver.extension", lambda: kernel)
+        return patch("pyharness.engine.solver.extension", lambda: kernel)
 
     return planted
 
@@ -195,7 +195,7 @@ PLANTS = (
           twin("two-term", "sign"), 2.0,
           ("decks", "schemes")),
     Plant("sign-in-series", "a sign in what the Taylor kernel is given",
-          on("pyharness.methods.taylor.series_kernel",
+          on("pyharness.engine.taylor.series_kernel",
              lambda found, size: (found[0], (third_off(found[1][0], size), *found[1][1:]))), 2.0,
           ("methods", "attitudes")),
     Plant("sign-in-reference", "a sign in the reference itself",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.methods.linearised import growth, jacobians, propagators
+from pyharness.engine.linearised import growth, jacobians, propagators
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -101,8 +101,8 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
     """Return omega (rad/s, shape (n, 3)), and whether it reaches the last time."""
-    from pyharness.methods.problem import closed_form
-    from pyharness.methods.solve import solve
+    from pyharness.engine.problem import closed_form
+    from pyharness.engine.solve import solve
 
     # Near the separatrix a numerical integration would deviate from the solution after a few turns.
     method = "closed-form" if closed_form(scene) else "taylor"

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from pyharness.checks.theory.schemes import SCHEMES, Series, constant
-from pyharness.methods.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
+from pyharness.engine.registry import FIXED_STEP, REGISTRY, SCIPY_METHODS
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 

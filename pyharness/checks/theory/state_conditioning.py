@@ -13,9 +13,9 @@ import numpy as np
 
 from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow
 from pyharness.dynamics.array_tape import inputs_of, outputs_at, table_values
-from pyharness.methods.linearised import transitions
-from pyharness.methods.recorded import system
-from pyharness.methods.solve import solve
+from pyharness.engine.linearised import transitions
+from pyharness.engine.recorded import system
+from pyharness.engine.solve import solve
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque

@@ -13,7 +13,7 @@ import numpy as np
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
-from pyharness.methods.linearised import jacobians, propagators
+from pyharness.engine.linearised import jacobians, propagators
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -72,7 +72,7 @@ def path(scene: Scene, time: float) -> Path:
 
     Raise InputError if the solution grows without bound before `time`.
     """
-    from pyharness.methods.solve import solve
+    from pyharness.engine.solve import solve
 
     flow = conditioning(scene, time)
     count = _FEWEST_NODES

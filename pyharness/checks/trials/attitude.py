@@ -32,8 +32,8 @@ from pyharness.checks.theory.conditioning import (
 )
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.length import CLOSED_FORM
-from pyharness.methods.registry import METHODS
-from pyharness.methods.solve import solve
+from pyharness.engine.registry import METHODS
+from pyharness.engine.solve import solve
 from pyharness.model.attitude import (
     SEQUENCES,
     Quaternion,

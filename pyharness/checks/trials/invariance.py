@@ -18,8 +18,8 @@ from pyharness.checks.hold import OURS, apart, run_method, scene_of
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.conditioning import FLOW, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
-from pyharness.methods.registry import FIXED_STEP, METHODS, SCIPY_METHODS
-from pyharness.methods.solve import finest, solve
+from pyharness.engine.registry import FIXED_STEP, METHODS, SCIPY_METHODS
+from pyharness.engine.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, Triple

@@ -19,8 +19,8 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory import brouwer
 from pyharness.checks.theory.brouwer import LAWS, POWER, WALK, Noise, Orbit
 from pyharness.checks.tolerances import finest
-from pyharness.methods.problem import normalized
-from pyharness.methods.registry import METHODS
+from pyharness.engine.problem import normalized
+from pyharness.engine.registry import METHODS
 from pyharness.model.basis import Basis
 from pyharness.model.codes import Series
 from pyharness.model.errors import InputError
@@ -60,7 +60,7 @@ _CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of a value of the closed form at
 CLOSED_FORM = Basis(
     "measured",
     "errors that follow from 16 rounding errors of omega by a closed form",
-    "`pytest tests/methods/test_closed_form.py`",
+    "`pytest tests/engine/test_closed_form.py`",
 )
 """Basis of limits that assume that a closed form has at most 16 rounding errors."""
 

@@ -14,7 +14,7 @@ from pyharness.checks.judge import Truth
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import Conditioning, conditioning
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.methods.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.engine.registry import FIXED_STEP, SCIPY_METHODS
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

@@ -8,7 +8,7 @@ from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import ALL, check_all, run_method
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.methods.registry import FIXED_STEP
+from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.scenes.extreme import MIDDLE_AXIS, in_steps

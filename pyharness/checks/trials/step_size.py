@@ -15,9 +15,9 @@ from pyharness.checks.theory.amplification import amplification
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below
 from pyharness.checks.theory.schemes import SCHEMES
 from pyharness.checks.theory.step_errors import FORECAST, Forecaster, Path, path
-from pyharness.methods.fixed_step import fixed_step
-from pyharness.methods.problem import normalized
-from pyharness.methods.registry import FIXED_STEP
+from pyharness.engine.fixed_step import fixed_step
+from pyharness.engine.problem import normalized
+from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing

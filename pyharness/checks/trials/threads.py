@@ -16,9 +16,9 @@ from pyharness.checks.check import BITS, Check, may_hold
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.methods.prepared import prepare
-from pyharness.methods.registry import METHODS
-from pyharness.methods.solver import PREPARED, Solver
+from pyharness.engine.prepared import prepare
+from pyharness.engine.registry import METHODS
+from pyharness.engine.solver import PREPARED, Solver
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing

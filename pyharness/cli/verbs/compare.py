@@ -7,7 +7,7 @@ from pyharness.checks.compare.comparison import compare_programs, listings_for
 from pyharness.checks.compare.method_comparison import compare_methods
 from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
-from pyharness.methods.registry import METHODS, SCIPY_METHODS
+from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Scene

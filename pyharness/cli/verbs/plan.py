@@ -3,9 +3,9 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.methods.plan import plan
-from pyharness.methods.report import plan_report
-from pyharness.methods.solver import PREPARED
+from pyharness.engine.plan import plan
+from pyharness.engine.report import plan_report
+from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
     **shared.BODY,

@@ -5,7 +5,7 @@ import sys
 from dataclasses import replace
 
 from pyharness.cli import options as shared
-from pyharness.methods.report import trajectory_report
+from pyharness.engine.report import trajectory_report
 from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         options, any_axes=by_method, any_torque=by_method, any_state=by_method, changing=by_method
     )
     if (options.program is None) == (options.method is None):
-        from pyharness.methods.registry import METHODS
+        from pyharness.engine.registry import METHODS
 
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         name, title, trajectory = _method(options, scene)
         if name == "reference":
-            from pyharness.methods.reference_bound import trajectory_bound
+            from pyharness.engine.reference_bound import trajectory_bound
 
             bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 
@@ -143,7 +143,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
         word=word,
     )
     if options.attitude is not None:
-        from pyharness.methods.from_rows import attitude_from_rows
+        from pyharness.engine.from_rows import attitude_from_rows
 
         rows = attitude_from_rows(scene, trajectory.time, trajectory.omega)
         trajectory = replace(trajectory, attitude=rows)
@@ -154,8 +154,8 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
     # These modules are imported here, because a run of a program does not need them.
-    from pyharness.methods.registry import METHODS
-    from pyharness.methods.solve import solve
+    from pyharness.engine.registry import METHODS
+    from pyharness.engine.solve import solve
 
     listing_options = (
         "implementation",
@@ -180,7 +180,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     effort, attitude = shared.chosen_effort(options), options.attitude is not None
     trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
     if options.animate is not None:
-        from pyharness.methods.attitude_picture import animation
+        from pyharness.engine.attitude_picture import animation
         from pyharness.model.output_files import write_files
 
         moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
@@ -192,7 +192,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
 
 
 def _check_animation(options: argparse.Namespace, scene: Scene) -> None:
-    from pyharness.methods.attitude_picture import check_animation
+    from pyharness.engine.attitude_picture import check_animation
     from pyharness.model.output_files import check_writable
     from pyharness.views.pictures import check_matplotlib
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.batch import Batch
+from pyharness.engine.many import solve_many
 from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, integrate_models
 from pyharness.history.claims.ledger import claim, claims
 from pyharness.history.claims.rules import Runs
-from pyharness.methods.batch import Batch
-from pyharness.methods.many import solve_many
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.theory.rotations import steady_rotations
+from pyharness.engine.linearised import jacobians
+from pyharness.engine.solve import solve
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
 from pyharness.history.family.members import Member, run
-from pyharness.methods.linearised import jacobians
-from pyharness.methods.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 from pyharness.original.cards import deck

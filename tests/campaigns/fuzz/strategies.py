@@ -12,8 +12,8 @@ from random import Random
 from typing import Any
 
 from pyharness import InputError, Scene, TorqueLaw
-from pyharness.methods.registry import METHODS
-from pyharness.methods.solver import PREPARED
+from pyharness.engine.registry import METHODS
+from pyharness.engine.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, solve
 from pyharness.cli.main import main
+from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.solver import PREPARED
 from pyharness.history.limits import limit
-from pyharness.methods.registry import FIXED_STEP
-from pyharness.methods.solver import PREPARED
 from pyharness.model.errors import printable
 from pyharness.model.trajectory import Trajectory
 from tests.campaigns.fuzz import campaign as fuzz
@@ -237,7 +237,7 @@ def test_extreme_motion_ends_in_time_and_says_how(
     scene: Scene, times: list[float], method: str, tolerance: float, end: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("pyharness.methods.gauss._MOST_EVALUATIONS", 1_000_000)
+    monkeypatch.setattr("pyharness.engine.gauss._MOST_EVALUATIONS", 1_000_000)
     if end == "refused":
         with pytest.raises(InputError):
             solve(scene, times, method, tolerance)
@@ -254,7 +254,7 @@ def test_extreme_motion_ends_in_time_and_says_how(
 
 def test_scipy_gives_up_by_what_it_costs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regression test: Radau took half a minute and more, since its right-hand sides cost more."""
-    monkeypatch.setattr("pyharness.methods.scipy_ivp._MOST_EVALUATIONS", 3_000)
+    monkeypatch.setattr("pyharness.engine.scipy_ivp._MOST_EVALUATIONS", 3_000)
     waves = [((1.0, 2.0, 3.0), 1e4 + n) for n in range(8)]
     for law, method, most in (
         (TorqueLaw((1e42, 0.0, 0.0)), "dop853", 3000),

@@ -19,7 +19,7 @@ PLANTED = (
         "fortran/modern/torque_free.f90",
         "sign 1: w(3) = (s2*dn*orbit%amplitude(2)*orbit%omega(3) + sine*cosine*orbit%rates(3))"
         "*inverse",
-        "tests/methods/test_closed_form.py::test_any_top_at_any_time",
+        "tests/engine/test_closed_form.py::test_any_top_at_any_time",
     ),
     (
         "pyharness/checks/compare/agreement.py",

@@ -124,7 +124,7 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
 @pytest.mark.campaign
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
-    short = ("dynamics/system.py", "modern/tape.f90", "checks/kinds.py", "methods/sides.py")
+    short = ("dynamics/system.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
     some = [each for each in files() if each.endswith(short)]
     assert len(some) == len(short)
     monkeypatch.setattr(sample, "files", lambda: some)
@@ -152,7 +152,7 @@ def test_every_language_has_its_share() -> None:
         lines[language_of(file)] += lines_of_code(file)
     assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
     assert lines["Python"] > lines[FORTRAN] > lines[C]
-    core = {"pyharness/methods/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
+    core = {"pyharness/engine/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
             "pyharness/original/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
             "pyharness/dynamics/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
@@ -161,7 +161,7 @@ def test_every_language_has_its_share() -> None:
 
 @pytest.mark.campaign
 def test_names_are_unique_and_the_change_is_one() -> None:
-    for file in ("pyharness/methods/gauss.py", "fortran/modern/sphere.f90"):
+    for file in ("pyharness/engine/gauss.py", "fortran/modern/sphere.f90"):
         found = mutations(file)
         assert len({each.id for each in found}) == len(found)
         for each in found[::50]:
@@ -222,9 +222,9 @@ def test_equivalent_ones_are_argued_and_still_there() -> None:
 def test_a_stale_entry_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "equivalent.toml"
     path.write_text(
-        '["pyharness/methods/gauss.py"]\n"sign 1: no = such" = "a reason of four words"\n'
+        '["pyharness/engine/gauss.py"]\n"sign 1: no = such" = "a reason of four words"\n'
     )
-    assert stale(equivalent(path)) == ["pyharness/methods/gauss.py: sign 1: no = such"]
+    assert stale(equivalent(path)) == ["pyharness/engine/gauss.py: sign 1: no = such"]
     path.write_text('["no/such.py"]\n"sign 1: x" = "a reason of four words"\n')
     assert stale(equivalent(path)) == ["no/such.py: sign 1: x"]
 

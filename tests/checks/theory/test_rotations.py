@@ -14,7 +14,7 @@ from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.checks.theory.polhodes import growth_of_bodies, polhodes
 from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
 from pyharness.cli.main import main
-from pyharness.methods.linearised import jacobians
+from pyharness.engine.linearised import jacobians
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from tests.conftest import Printed

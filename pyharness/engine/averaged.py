@@ -1,0 +1,252 @@
+"""The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
+
+A weak torque changes the periodic torque-free motion slowly, here in macro-steps of very many
+revolutions. The stroboscopic solution is that of Calvo, Chartier, Murua and Sanz-Serna 2011,
+Numerical stroboscopic averaging for ODEs and DAEs, Applied Numerical Mathematics 61; the two scales
+are those of Chartier, Crouseilles, Lemou and Mehats 2015, Uniformly accurate numerical schemes for
+highly oscillatory Klein-Gordon and nonlinear Schroedinger equations, Numerische Mathematik 129.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.engine.averaged_coordinates import Coordinates
+from pyharness.engine.averaged_error import Done, estimates
+from pyharness.engine.averaged_step import MacroStep, NotResolvedError
+from pyharness.engine.averaged_torque import fastest_of, torque_of
+from pyharness.engine.problem import rows_trajectory
+from pyharness.engine.sensitivity import is_sensitive
+from pyharness.model.array_type import Array
+from pyharness.model.effort import advice
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import ROUNDING, Trajectory
+
+NODES = 20  # in a macro-step
+_TURN = 2.0 * math.pi
+_FEWEST = 100  # revolutions in a macro-step
+_MOST_STEPS = 3000  # some ten seconds
+# A macro-step ends this fraction, and these revolutions, behind the last time, because the time at
+# its end is only estimated.
+_BEYOND, _TURNS_BEYOND = 0.02, 3
+# Factors on the length of a macro-step after a failure, and on the length of the next one after a
+# success at the first and at a later attempt.
+_SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
+# The first guess of the length of a macro-step, relative to the scale on which the motion changes.
+_RELATIVE = 1.3
+_APPROACH = 2.0  # shorter by this factor if the motion approaches the separatrix
+_WAVE = 4.0  # radians of a wave that are like a relative change by 1
+# The oscillation has the relative error exp(-_DIGITS / 2), and its means exp(-_DIGITS).
+_DIGITS = 56.0
+_FEWEST_ANGLES, _MOST_ANGLES = 16, 512
+# Highest frequency of a wave of the torque, relative to the frequency of the motion.
+_FASTEST = 0.02
+# Relative error of a macro-step that is accepted: this fraction of the tolerance, but at least the
+# second number, which allows for rounding errors.
+_SHARE, _FLOOR = 0.05, 1e-15
+_ROWS_AT_ONCE = 1000
+_LARGEST_PHASE = 1e15  # rad
+
+
+def averaged(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
+
+    `steps` are macro-steps; `error` is measured with more nodes and a higher order of averaging.
+    Raise InputError for an opaque torque; if torque-free omega would not oscillate about a
+    principal axis, or is near the separatrix; if the torque is not weak, or may be in resonance; if
+    a recorded torque is more than a polynomial in omega and time, and waves, so that it may change
+    within a part of a macro-step; and if the work limit is exceeded.
+    """
+    coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
+    if coordinates is None:
+        raise InputError(
+            "averaged: without torque, omega would not rotate about a principal axis; allowed: a "
+            "body that is no sphere, and a motion that is not on the separatrix"
+        )
+    # A point that is not finite is refused where the next macro-step begins.
+    with np.errstate(all="ignore"):
+        return _Run(scene, coordinates, times, tolerance, effort).trajectory()
+
+
+class _Run:
+    def __init__(
+        self,
+        scene: Scene,
+        coordinates: Coordinates,
+        times: Sequence[float],
+        tolerance: float,
+        effort: float,
+    ) -> None:
+        self.scene, self.coordinates, self.times = scene, coordinates, times
+        self.tolerance, self.effort = tolerance, effort
+        self.torque, self.varies = torque_of(scene)
+        self.forward = -1.0 if times[-1] < 0.0 else 1.0
+        self.begin = (0.0, 0.0)  # time (s) at the start of the macro-step, in two parts
+        self.point = coordinates.point(scene.omega)
+        self.largest = coordinates.largest(self.point[:, None])
+        self.done: list[Done] = []
+        self.evaluations = 0
+        self.inside = 0.0  # largest relative error that arises within one macro-step
+        self.pace = self._pace(self.point)
+        self.phase = max(1.0, abs(times[-1]) * self.pace)
+        self.longest = math.inf  # rad, of the next macro-step
+        if not self.phase <= _LARGEST_PHASE:
+            raise TimedError(
+                f"averaged: at t = {{time}} s the phase is above {_LARGEST_PHASE:g} radians and "
+                "has no correct digit; use a shorter time",
+                times[-1],
+            )
+        self._check_waves()
+
+    def _check_waves(self) -> None:
+        self.fastest = fastest_of(self.scene.torque)  # rad/s
+        slow = _FASTEST * self.pace
+        if self.fastest > slow:
+            raise InputError(
+                f"averaged: a wave of the torque has the frequency {self.fastest:.3g} rad/s, and "
+                f"may be in resonance with omega, which has {self.pace:.3g} rad/s; allowed: waves "
+                f"up to {slow:.3g} rad/s, or another method"
+            )
+
+    def trajectory(self) -> Trajectory:
+        rows: list[Array] = []
+        n_rows = 0
+        while True:
+            step = self._step()
+            point, parts = step.end
+            whole = math.fsum([*self.begin, *parts])
+            inside = n_rows
+            while inside < len(self.times) and self.forward * (self.times[inside] - whole) <= 0.0:
+                inside += 1
+            angle = step.length
+            for first in range(n_rows, inside, _ROWS_AT_ONCE):
+                part = self.times[first : min(inside, first + _ROWS_AT_ONCE)]
+                local = [math.fsum((t, -self.begin[0], -self.begin[1])) for t in part]
+                angles = step.angles(np.array(local))
+                rows.append(np.array(self.coordinates.omega(*step.at(angles))[0]))
+                angle = float(angles[-1])
+            n_rows = inside
+            propagated = step.propagated(angle)
+            self.done.append(Done.of(self.coordinates, self.point, *propagated))
+            if n_rows == len(self.times):
+                break
+            self.begin = whole, math.fsum((*self.begin, *parts, -whole))
+            self.point = point
+            self.pace = self._pace(self.point)
+        found = np.concatenate(rows, axis=1).T
+        if self.times[0] == 0.0:
+            found[0] = self.scene.omega
+        estimated, growth = estimates(
+            self.coordinates, self.scene.euler_coefficients, self.done, found[-1], angle
+        )
+        rounding = ROUNDING * (growth + self.phase)
+        error = estimated / self.largest + self.inside + rounding
+        ended = "sensitive" if is_sensitive(growth, self.tolerance) else "complete"
+        return rows_trajectory(
+            self.times, found, self.evaluations, len(self.done), ended, error=error, growth=growth
+        )
+
+    def _pace(self, point: Array) -> float:
+        """Return the frequency of the motion (rad/s), roughly."""
+        low = float(point[2])
+        high = low + self.coordinates.bend * float(point[0] * point[0] + point[1] * point[1])
+        # One step of the arithmetic-geometric mean of the least and the largest |w_a|.
+        low, high = math.sqrt(low), math.sqrt(high)
+        return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
+
+    def _forecast(self) -> float:
+        """Return a length (rad) of the next macro-step."""
+        point = self.point
+        slopes = self.forward * MacroStep.mean_slopes(
+            self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
+        )
+        square = float(point[0] * point[0] + point[1] * point[1])
+        low = float(min(point[2], point[2] + self.coordinates.bend * square))
+        # Relative change per radian: of the distance from the separatrix, of x and y, and of the
+        # torque's waves.
+        approach = float(slopes[2]) / low
+        change = max(
+            approach,
+            -_APPROACH * approach,
+            math.hypot(slopes[0], slopes[1]) / math.sqrt(point[2]),
+            self.fastest / (_WAVE * self.pace),
+        )
+        rest = abs(self.times[-1] - self.begin[0]) * self.pace
+        if not change < math.inf:
+            raise self._too_fast()
+        if change == 0.0:
+            return rest * (1.0 + _BEYOND) + _TURNS_BEYOND * _TURN
+        little = 1e-3 / change
+        trend = (self._pace(point + little * slopes) / self.pace - 1.0) / little
+        rest *= min(2.0, max(0.5, 1.0 + 0.5 * trend * rest)) * (1.0 + _BEYOND)
+        return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
+
+    def _step(self) -> MacroStep:
+        """Return the longest possible next macro-step, or raise TimedError."""
+        time = self.begin[0]
+        angles = self._angles(float(self.coordinates.modulus(self.point)))
+        length = self._forecast()
+        for attempt in range(math.ceil(self.effort * _MOST_STEPS) - len(self.done)):
+            revolutions = max(_FEWEST, math.ceil(length / _TURN))
+            try:
+                step = MacroStep(
+                    self.coordinates, self.torque, self.varies, self.point, time,
+                    self.forward * revolutions * _TURN, (NODES, angles),
+                )  # fmt: skip
+            except NotResolvedError:
+                step = None
+            if step is not None:
+                self.evaluations += step.evaluations
+                needed = self._angles(step.modulus)
+                if needed > angles:
+                    angles = needed
+                    continue
+                if self._is_accurate(step):
+                    longer = _LONGER if attempt == 0 else _HARDLY_LONGER
+                    self.longest = longer * abs(step.length)
+                    self.inside = max(self.inside, self._relative(step).sum())
+                    self.largest = max(self.largest, self.coordinates.largest(step.stroboscopic))
+                    return step
+            if revolutions == _FEWEST:
+                raise self._too_fast()
+            length = _SHORTER * revolutions * _TURN
+        raise TimedError(
+            f"averaged exceeded its work limit at t = {{time}} s after {len(self.done)} "
+            "macro-steps; " + advice("use a shorter time", self.effort),
+            time,
+        )
+
+    def _too_fast(self) -> TimedError:
+        return TimedError(
+            f"averaged: at t = {{time}} s the motion changes too much in {_FEWEST} revolutions; "
+            "allowed: a weaker torque, slower waves, a motion farther from the separatrix, or "
+            "another method",
+            self.begin[0],
+        )
+
+    def _angles(self, modulus: float) -> int:
+        """Return the number of angles that this squared modulus needs."""
+        # The oscillation has singularities at the angles i times this width.
+        width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
+        if width * _MOST_ANGLES < _DIGITS:
+            raise TimedError(
+                "averaged: at t = {time} s the motion is near the separatrix; allowed: a shorter "
+                "time, or another method",
+                self.begin[0],
+            )
+        return max(_FEWEST_ANGLES, 4 * math.ceil(0.25 * _DIGITS / width))
+
+    def _is_accurate(self, step: MacroStep) -> bool:
+        slow, late = self._relative(step)
+        allowed = _SHARE * self.tolerance
+        is_slow = slow <= max(_FLOOR, allowed / self.phase)
+        return bool(is_slow and late <= max(_FLOOR * self.phase, allowed))
+
+    def _relative(self, step: MacroStep) -> Array:
+        """Return the relative error of slow components, and of the phase (rad)."""
+        slow = np.abs(step.error[:3]).max(axis=1) / step.scale[:3]
+        return np.array([slow.max(), np.abs(step.error[3]).max() * self.pace])

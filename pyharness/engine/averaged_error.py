@@ -1,0 +1,67 @@
+"""Error and error amplification over all macro-steps of the method `averaged`."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from pyharness.engine.averaged_coordinates import Coordinates
+from pyharness.model.array_type import Array
+from pyharness.model.scene import Triple
+
+_PHASES = 8  # angles in a revolution at which perturbations start
+_MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
+
+
+class Done(NamedTuple):
+    """A macro-step that is complete."""
+
+    start: Array  # the point at the start
+    by_omega: Array  # derivatives of the start with respect to omega, for some psi
+    error: Array  # shape (4,); of the point at the end
+    transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
+
+    @classmethod
+    def of(cls, coordinates: Coordinates, start: Array, error: Array, transition: Array) -> Self:
+        """Return a macro-step with its start and the error of its end."""
+        phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
+        cosine, sine = np.cos(phases), np.sin(phases)
+        omega = coordinates.omega(start[:, None], cosine, sine)[0]
+        by_omega = coordinates.by_omega(np.array(omega), cosine, sine)
+        return cls(start, by_omega, error, transition)
+
+
+def estimates(
+    coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
+) -> tuple[float, float]:
+    """Return the largest measured error of omega (rad/s) and amplification at several ends."""
+    count = len(done)
+    error, growth = _at(coordinates, coefficients, done, omega, angle)
+    for n in range(1, count, -(-count // _MOST_ENDS)):
+        start = done[n].start[:, None]
+        there = np.concatenate(coordinates.omega(start, np.ones(1), np.zeros(1))[0])
+        other_error, other_growth = _at(coordinates, coefficients, done[:n], there, 0.0)
+        error, growth = max(error, other_error), max(growth, other_growth)
+    return error, growth
+
+
+def _at(
+    coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
+) -> tuple[float, float]:
+    """Return them at the end of the last macro-step."""
+    a, b, c = coefficients
+    x, y, z = omega
+    cosine, sine = np.cos([angle]), np.sin([angle])
+    # The derivatives of omega at the end with respect to the point, and to the time at which the
+    # point is reached.
+    back = np.empty((3, 4))
+    back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
+    back[:, 3] = -a * y * z, -b * z * x, -c * x * y
+    growth, measured = 1.0, np.zeros(3)
+    for each in reversed(done):
+        measured = measured + back @ each.error
+        back = back @ each.transition
+        amplified = np.abs(back[:, :3] @ each.by_omega)
+        growth = max(growth, float(amplified.sum(axis=-1).max()))
+    return float(np.abs(measured).max()), growth

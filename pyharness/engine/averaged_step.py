@@ -1,0 +1,232 @@
+"""One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
+
+The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow s = psi/length, from
+0 to 1. The equation dv/dpsi = F(v, psi) becomes
+
+    dv/dpsi + (1/length) dv/ds = F(v, psi).
+
+Let V(s) be v at psi = 0, the stroboscopic solution, W = v - V the oscillation, and < > the mean
+over psi. The equation is equivalent to
+
+    V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
+    W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
+
+Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one.
+Newton's method solves the first equation at all Chebyshev points and angles together. Sweeps with
+more of them measure the error.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from pyharness.engine.averaged_coordinates import Coordinates, Torque
+from pyharness.engine.averaged_nodes import (
+    Fast,
+    Slow,
+    between_angles,
+    between_nodes,
+    fast_nodes,
+    slow_nodes,
+)
+from pyharness.model.array_type import Array
+
+MOST_SWEEPS = 12
+_LEAST_SWEEPS = 3
+_MORE_NODES, _MORE_ANGLES = 4, 8  # of the sweep that measures the error
+_FEWEST_ANGLES = 16
+_DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
+# The iteration has converged if a sweep changes less than the first relative number. Rounding
+# errors may cause changes up to the second.
+_CONVERGED, _ROUNDED = 1e-15, 1e-12
+_MOST_NEWTON = 10
+_CLOSE = 1e-7  # rad; Newton's method squares it
+
+
+class NotResolvedError(Exception):
+    """The exception for a macro-step that is too long, or has no solution."""
+
+
+class MacroStep:
+    """The solution over one macro-step.
+
+    `stroboscopic`, shape (4, nodes), is the point at psi = 0, its time without a part proportional
+    to psi, and `error` the measured one. `modulus` is the largest square on the orbits.
+    """
+
+    def __init__(
+        self,
+        coordinates: Coordinates,
+        torque: Torque,
+        varies: bool,
+        start: Array,
+        start_time: float,
+        length: float,
+        sizes: tuple[int, int],
+    ) -> None:
+        """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
+
+        `sizes` are the numbers of nodes and angles, both even.
+        """
+        self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
+        self._start, self.length, self._sizes = start[:, None], length, sizes
+        self._slow, self._fast = slow_nodes(sizes[0]), fast_nodes(sizes[1])
+        self._integral = length * self._slow.integral.T
+        # Without dependence on time, the time is an integral, and no unknown of Newton's method.
+        self._n_unknowns = 4 if varies else 3
+        self.scale = coordinates.scale(start)
+        self.evaluations = 0
+        with np.errstate(all="ignore"):
+            self._pace = 0.0
+            self._pace = float(self._slopes(self._start[..., None], self._fast)[3].mean())
+            self._solve()
+
+    def _solve(self) -> None:
+        # Few angles are enough for the first approximation, and for the Jacobian matrices.
+        few = fast_nodes(max(_FEWEST_ANGLES, self._sizes[1] // 4 * 2))
+        slopes = self._slopes(self._start[..., None], few) @ few.mean
+        mean = self._start + slopes * (self.length * self._slow.nodes)
+        self._check(mean)
+        slopes = self._linearise(mean, few)
+        mean = mean + self._newton(self._start + slopes @ self._integral - mean)
+        waves = np.zeros((4, *self._sizes))
+        change, last = np.inf, np.inf
+        # The time is relative to the duration of the macro-step.
+        sizes = self.scale * (1.0, 1.0, 1.0, abs(self.length))
+        for sweep in range(1, MOST_SWEEPS + 1):
+            residual, waves = self._residual(mean, waves, self._slow, self._fast)
+            correction = self._newton(residual)
+            mean = mean + correction
+            change, last = float((np.abs(correction).max(axis=1) / sizes).max()), change
+            stalls = sweep >= _LEAST_SWEEPS and not change < 0.5 * last
+            # The first sweep is without the oscillation, and may change nothing for that reason.
+            if (sweep > 1 and change <= _CONVERGED) or stalls:
+                break
+        self._check(mean)
+        if not change <= _ROUNDED:
+            raise NotResolvedError
+        self.stroboscopic, self._waves = mean, waves
+        self.error = self._measured()
+
+    @staticmethod
+    def mean_slopes(
+        coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
+    ) -> Array:
+        """Return the mean derivatives by psi at a point, shape (4,)."""
+        fast = fast_nodes(angles)
+        times = np.full(angles, time)
+        found: Array = coordinates.slopes(
+            point[:, None], times, fast.cosine, fast.sine, torque, 0.0
+        ).mean(axis=-1)
+        return found
+
+    def _check(self, mean: Array) -> None:
+        """Set the largest modulus; raise NotResolvedError unless it is below 1."""
+        self.modulus = float(self.coordinates.modulus(mean).max())
+        if not (np.isfinite(mean).all() and self.modulus < 1.0):
+            raise NotResolvedError
+
+    def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
+        """Return the derivatives on a grid of nodes and angles."""
+        nodes = (slow or self._slow).nodes[: point.shape[-2], None]
+        time = self._start_time + (self._pace * self.length) * nodes + point[3]
+        self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
+        return self.coordinates.slopes(
+            point, time, fast.cosine, fast.sine, self._torque, self._pace
+        )
+
+    def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
+        """Return the residual of the averaged equation, and the next W."""
+        slopes = self._slopes(mean[..., None] + waves, fast, slow)
+        right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
+        waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
+        offset = waves @ fast.mean
+        return right + (offset[:, :1] - offset) - mean, waves
+
+    def _linearise(self, mean: Array, few: Fast) -> Array:
+        """Set the Jacobian matrices, and return the right-hand side."""
+        n, count = self._n_unknowns, self._sizes[0]
+        shift = _DIFFERENCE * self.scale[:n, None]
+        shifted = np.repeat(mean[:, None], n + 1, axis=1)
+        shifted[range(n), range(1, n + 1)] += shift
+        slopes = self._slopes(shifted[..., None], few) @ few.mean
+        self._jacobian = (slopes[:, 1:] - slopes[:, :1]) / shift
+        matrix = self._integral.T[:, None, :] * -self._jacobian[:n, None]
+        matrix = matrix.reshape(n * count, n * count)
+        matrix.flat[:: n * count + 1] += 1.0
+        if not np.isfinite(matrix).all():
+            raise NotResolvedError
+        self._inverse = np.linalg.inv(matrix)
+        found: Array = slopes[:, 0]
+        return found
+
+    def _newton(self, residual: Array) -> Array:
+        """Return the correction of the solution at the nodes."""
+        n = self._n_unknowns
+        found = residual.copy()
+        found[:n] = (self._inverse @ residual[:n].ravel()).reshape(n, -1)
+        if n == 3:
+            found[3] += (self._jacobian[3] * found[:3]).sum(axis=0) @ self._integral
+        return found
+
+    def _measured(self) -> Array:
+        """Return the error at the nodes, by two finer sweeps."""
+        count, angles = self._sizes
+        nodes, turns, back = _finer(count, angles)
+        slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
+        # The change since the start has smaller rounding errors than the point.
+        mean = self._start + (self.stroboscopic - self._start) @ nodes.T
+        _, waves = self._residual(mean, (nodes @ self._waves) @ turns, slow, fast)
+        residual, _ = self._residual(mean, waves, slow, fast)
+        return self._newton(residual @ back.T)
+
+    def propagated(self, angle: float) -> tuple[Array, Array]:
+        """Return the measured error at an angle (rad), and the state-transition matrix, (4, 4)."""
+        at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
+        found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
+        responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)
+        found[:n, :n] = at @ responses
+        if n == 3:
+            slopes = (self._jacobian[3][..., None] * responses).sum(axis=0)
+            found[3, :3] = (at @ self._integral.T) @ slopes
+        return self.error @ at, found
+
+    @property
+    def end(self) -> tuple[Array, tuple[float, float]]:
+        """Return the point at the end, with time 0, and two parts of that time (s)."""
+        found = self.stroboscopic[:, -1].copy()
+        found[3] = 0.0
+        return found, (self._pace * self.length, float(self.stroboscopic[3, -1]))
+
+    def angles(self, times: Array) -> Array:
+        """Return the angles psi (rad) at times (s) since the start."""
+        nodes = self._slow.nodes
+        known = self._pace * self.length * nodes + self.stroboscopic[3]
+        forward = 1.0 if self.length > 0.0 else -1.0
+        angle = self.length * np.interp(forward * times, forward * known, nodes)
+        for _ in range(_MOST_NEWTON):
+            point, cosine, sine = self.at(angle)
+            fast = self.coordinates.omega(point, cosine, sine)[2]
+            change = ((times - self._pace * angle) - point[3]) * (self.coordinates.rate * fast)
+            angle = angle + change
+            if np.abs(change).max() <= _CLOSE:
+                break
+        return angle
+
+    def at(self, angle: Array) -> tuple[Array, Array, Array]:
+        """Return the points at angles psi (rad), (4, n), and cosines and sines."""
+        nodes = between_nodes(self._sizes[0], angle / self.length)
+        turns = between_angles(self._sizes[1], np.mod(angle, 2.0 * np.pi))
+        point = self.stroboscopic @ nodes.T + ((nodes @ self._waves) * turns).sum(axis=-1)
+        return point, np.cos(angle), np.sin(angle)
+
+
+@lru_cache(maxsize=16)
+def _finer(count: int, angles: int) -> tuple[Array, Array, Array]:
+    """Return matrices that interpolate to more nodes and angles, and back."""
+    more = slow_nodes(count + _MORE_NODES).nodes
+    return (
+        between_nodes(count, more),
+        between_angles(angles, fast_nodes(angles + _MORE_ANGLES).angles).T.copy(),
+        between_nodes(count + _MORE_NODES, slow_nodes(count).nodes),
+    )

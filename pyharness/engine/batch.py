@@ -1,0 +1,285 @@
+"""Batches of scenes, which differ by arrays of quantities."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.engine.ensemble import Ensemble
+from pyharness.engine.many import solve_many
+from pyharness.engine.many_space import scene_of_row
+from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
+from pyharness.engine.solve import solve
+from pyharness.engine.solver import PREPARED
+from pyharness.model.attitude import IDENTITY, product
+from pyharness.model.codes import Statuses
+from pyharness.model.errors import InputError
+from pyharness.model.extension import ENDS
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Array
+from pyharness.original.many import ProgramEnsemble, run_many
+
+# Quantities that may be arrays for a program, but not for a method.
+OF_PROGRAMS = ("step_size", "lipschitz")
+_EFFORT = 1e9  # in effect no work limit: the caller has requested the whole batch
+
+
+@dataclass(frozen=True)
+class Solver:
+    """The method, or the program of the thesis, that solves a batch; the other of the two is None.
+
+    `t_end` (s) is by default step size times steps. For programs alone, `listing` selects the
+    mistakes that remain (``original``, ``corrected``), `reading` the interpretations of doubtful
+    statements, `lipschitz` the limit (1/s) of the test, and `may_stop` whether it stops.
+    """
+
+    method: str | None = "auto"
+    program: str | None = None
+    tolerance: float | None = None  # by default the method's own
+    t_end: float | None = None
+    listing: str = "original"
+    reading: str = "adopted"
+    lipschitz: float = 500.0
+    may_stop: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Many scenes that one method or program solves, and their results, computed when first read.
+
+    Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
+    and `stop_variable`, and call `rows` and `by_method`.
+
+    `scene` has what all scenes have in common, and `arrays` what differs, a row each, by argument
+    of `solve_many` and `run_many`; always `omega0`. `listing` is None for a method, `t_end` (s) has
+    shape (n,), and `attitude` is for methods only.
+    """
+
+    scene: Scene
+    solver: Solver
+    listing: Listing | None
+    t_end: Array
+    arrays: Mapping[str, Array]
+    attitude: bool = False
+
+    @property
+    def omega0(self) -> Array:
+        """Return the initial angular velocities, shape (n, 3), rad/s."""
+        return self.arrays["omega0"]
+
+    @property
+    def step_sizes(self) -> Array:
+        """Return the step sizes, shape (n,), s."""
+        return self.arrays.get("step_size", np.full(len(self.omega0), self.scene.step_size))
+
+    @property
+    def bodies(self) -> Array:
+        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) for one body."""
+        return self.arrays.get("moments", np.array([self.scene.moments]))
+
+    @property
+    def is_program(self) -> bool:
+        """Return whether a program of the thesis solves the batch."""
+        return self.listing is not None
+
+    @cached_property
+    def omega(self) -> Array:
+        """Return omega at `t_end`, shape (n, 3), rad/s, or NaN."""
+        return self._program.omega[:, -1] if self.is_program else self._ends.omega
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """Return how each solution ended, by `pyharness.model.codes.Statuses`, shape (n,)."""
+        return (self._program if self.is_program else self._ends).status
+
+    @property
+    def n_rows(self) -> NDArray[np.int32]:
+        """Return the number of steps that a program completed, shape (n,)."""
+        return self._program.n_rows
+
+    @property
+    def stop_variable(self) -> NDArray[np.int8]:
+        """Return the positions, from 1, in STOP_VARIABLES for which runs stopped, or 0, (n,)."""
+        return self._program.stop_variable
+
+    def sample_steps(self, samples: int) -> list[int]:
+        """Return the last steps, from 1, of nearly equal parts of a run."""
+        steps = self.scene.steps
+        return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
+
+    def rows(self, samples: int) -> Array:
+        """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
+
+        A method integrates to each time anew, so that errors do not add up; a program is read at
+        `sample_steps`.
+        """
+        if not self.is_program:
+            return np.stack([each.omega for each in self._samples(samples)], axis=1)
+        if samples not in self._rows:
+            self._rows[samples] = self.run(self.sample_steps(samples)).omega
+        return self._rows[samples]
+
+    def attitudes(self, samples: int) -> Array:
+        """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
+
+        Quaternions, scalar first, from the body to the axes of the body at time 0.
+        """
+        ends = []
+        for each in self._samples(samples):
+            assert each.attitude is not None
+            ends.append(each.attitude)
+        found = np.stack(ends, axis=1)
+        if self.scene.torque.needs_attitude:
+            w, x, y, z = self.first_attitudes.T[:, :, None]
+            found = np.stack(product((w, -x, -y, -z), np.moveaxis(found, 2, 0)), axis=2)
+        return found
+
+    @property
+    def first_attitudes(self) -> Array:
+        """Return the attitudes at time 0, shape (n, 4) or (1, 4)."""
+        first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
+        found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
+        return found
+
+    def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
+        """Return omega (rad/s) at `part` * `t_end` by another method, shape (n, 3)."""
+        return self._solve(method, tolerance, self.t_end * part).omega
+
+    def from_start(self, omega0: Array) -> "Batch":
+        """Return a batch without results that starts from `omega0` (rad/s)."""
+        return replace(self, arrays={**self.arrays, "omega0": omega0})
+
+    def run(self, at: list[int]) -> ProgramEnsemble:
+        """Return the results of the program at the steps `at`, ascending.
+
+        Scenes are run one by one, without the codes IER, if `torque_rate` differs or the program
+        refuses one; only that is then REFUSED.
+        """
+        if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
+            try:
+                return self._run(self.scene, self.arrays, at)
+            except InputError:  # raised by at least one scene
+                pass
+        return self._run_each(at)
+
+    def scene_of(self, i: int) -> Scene:
+        """Return scene `i` (from 0), without attitude unless the torque needs it.
+
+        Raise InputError if its numbers are not allowed.
+        """
+        own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
+        scene = self.scene
+        if not scene.torque.needs_attitude:
+            scene = replace(scene, attitude=None)
+        return scene_of_row(scene, own, i)
+
+    @cached_property
+    def _ends(self) -> Ensemble:
+        return self._solve_own(self.t_end)
+
+    @cached_property
+    def _program(self) -> ProgramEnsemble:
+        return self.run([self.scene.steps])
+
+    @cached_property
+    def _rows(self) -> dict[int, Array]:
+        return {}
+
+    @cached_property
+    def _found(self) -> dict[int, list[Ensemble]]:
+        return {}
+
+    def _samples(self, samples: int) -> list[Ensemble]:
+        if samples not in self._found:
+            parts = [(i + 1) / samples for i in range(samples - 1)]
+            ends = [self._solve_own(self.t_end * part) for part in parts]
+            self._found[samples] = [*ends, self._ends]
+        return self._found[samples]
+
+    def _solve_own(self, t_end: Array) -> Ensemble:
+        method = self.solver.method
+        assert method is not None
+        tolerance = requested_tolerance(method, self.solver.tolerance)
+        more = {}
+        if self.attitude and not self.scene.torque.needs_attitude:
+            # One attitude suits all scenes: `first_attitudes` turns the result.
+            more["attitude0"] = IDENTITY
+        return self._solve(method, tolerance, t_end, **more)
+
+    def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
+        """Return the states at `t_end` (s), one by one if no compiled kernel takes all."""
+        by_state = isinstance(self.scene.torque, StateTorque)
+        if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
+            return self._solve_each(method, tolerance, t_end)
+        tolerance = max(tolerance, REGISTRY[method].finest)
+        arrays: dict[str, Any] = {
+            name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
+        }
+        scene = self.scene
+        if not scene.torque.needs_attitude:
+            scene = scene if scene.attitude is None else replace(scene, attitude=None)
+            arrays.pop("attitude0", None)
+        arrays |= more
+        return solve_many(scene, t_end, method=method, tolerance=tolerance, **arrays)
+
+    def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
+        n = len(self.omega0)
+        ends, status = np.full((n, 3), np.nan), np.full(n, Statuses.REFUSED, dtype=np.int8)
+        for i in range(n):
+            try:
+                finest = METHODS[method].finest
+                found = solve(
+                    self.scene_of(i), float(t_end[i]), method, max(tolerance, finest),
+                    attitude=self.scene.torque.needs_attitude,
+                )  # fmt: skip
+            except InputError:  # refuses this scene alone
+                continue
+            status[i] = ENDS.index(found.ended)
+            if found.has_all_rows:
+                ends[i] = found.omega[-1]
+        return Ensemble(ends, status)
+
+    def _run_each(self, at: list[int]) -> ProgramEnsemble:
+        n, steps = len(self.omega0), np.array(at, np.int32)
+        found = ProgramEnsemble(
+            omega=np.full((n, len(at), 3), np.nan),
+            status=np.full(n, Statuses.REFUSED, np.int8),
+            at=steps,
+            velocity=None,
+            recorded_time=np.full((n, len(at)), np.nan),
+            n_rows=np.zeros(n, np.int32),
+            stop_variable=np.zeros(n, np.int8),
+            stop_quotient=np.full(n, np.nan),
+            ier=None,
+        )
+        for i in range(n):
+            own = {name: array[i : i + 1] for name, array in self.arrays.items()}
+            try:
+                scene = self.scene
+                if "torque_rate" in own:
+                    rate = own.pop("torque_rate")[0]
+                    scene = replace(scene, torque=replace(scene.law, rate=rate))
+                part = self._run(scene, own, at)
+            except InputError:  # refuses this scene alone
+                continue
+            for name in ("omega", "status", "n_rows", "stop_variable", "stop_quotient"):
+                getattr(found, name)[i] = getattr(part, name)[0]
+            found.recorded_time[i] = part.recorded_time
+        return found
+
+    def _run(self, scene: Scene, arrays: Mapping[str, Array], at: list[int]) -> ProgramEnsemble:
+        assert self.listing is not None
+        options: dict[str, Any] = {"lipschitz": self.solver.lipschitz, **arrays}
+        return run_many(
+            replace(scene, attitude=None),
+            self.listing,
+            may_stop=self.solver.may_stop,
+            at=at,
+            effort=_EFFORT,
+            **options,
+        )

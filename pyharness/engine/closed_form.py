@@ -1,0 +1,102 @@
+"""Solutions in closed form: a sphere under any torque, and other bodies without torque.
+
+The latter consist of Jacobi's elliptic functions.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.engine.problem import normalized, remainders, trajectory_of
+from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, torque_noise
+from pyharness.model.effort import advice, waves
+from pyharness.model.errors import InputError, TimedError
+from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
+from pyharness.model.principal import principal
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+_CALM = 1e3  # amplifications below it grow with the time, so that the last is the largest
+_MOST_ROWS = 16  # at which the amplification is computed
+
+
+def period_of(scene: Scene) -> float:
+    """Return the period of omega (s) without torque, or 0."""
+    if scene.changing is not None or not scene.torque.is_zero:
+        return 0.0
+    bare = principal(scene)[0]
+    found = extension().torque_free_period(bare.euler_coefficients, remainders(bare), bare.omega)
+    return float(found)
+
+
+def _largest_estimate(
+    scene: Scene, times: Sequence[float], noise: float
+) -> tuple[float | None, float | None]:
+    """Return the largest error and amplification at the last, and near a separatrix other times."""
+    error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
+    if error is None or growth is None or growth < _CALM:
+        return error, growth
+    rows = {*np.linspace(0, len(times) - 1, _MOST_ROWS).astype(int).tolist()}
+    for row in rows - {len(times) - 1}:
+        other, larger = closed_form_estimate(scene, scene.omega, times[row], noise)
+        if other is None or larger is None:
+            return None, None
+        error, growth = max(error, other), max(growth, larger)
+    return error, growth
+
+
+def known_solution(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Return the trajectory of a scene at `times` (s) from its closed form.
+
+    It is ``sensitive`` if amplified rounding errors exceed the tolerance. Raise InputError if there
+    is no closed form, or if the work limit is exceeded.
+    """
+    work = np.array([effort, 0.0])
+    attitudes = None
+    if scene.attitude is not None:
+        if not scene.torque.is_zero or scene.moments is None:
+            raise InputError(
+                "closed-form: there is no closed form of the attitude with a torque, or of a "
+                "body given by coefficients; allowed: moments, and no torque"
+            )
+        rows, attitudes, n_rows, status = extension().torque_free_attitude_solution(
+            scene.moments, scene.omega, scene.attitude, times, moments_low=scene.moments_low
+        )
+    elif not any(scene.euler_coefficients):
+        rows, n_rows, status = extension().sphere_solution(
+            *normalized(scene)[1:], scene.omega, times, effort=work
+        )
+        if status == GAVE_UP:
+            raise InputError(
+                f"closed-form: {waves(scene)} waves at {len(times)} times would take too long; "
+                + advice("use fewer times", effort, work[1])
+            )
+    elif not scene.torque.is_zero:
+        raise InputError(
+            "closed-form: the scene has a torque, and its body is not a sphere; allowed: a "
+            "sphere, or no torque"
+        )
+    else:
+        rows, n_rows, status = extension().torque_free_solution(
+            scene.euler_coefficients, scene.omega, times, coefficients_low=remainders(scene)
+        )
+    if status == REFUSED:
+        raise InputError(
+            "closed-form: the motion is not bounded, or the square of a component "
+            "underflows; allowed: "
+            "coefficients A, B, C not all of one sign, none of them zero between equal signs"
+        )
+    if status == GAVE_UP:
+        raise TimedError(
+            "closed-form: at t = {time} s the phase is above 1e15 radians and has no correct "
+            "digit; use a shorter time",
+            times[n_rows],
+        )
+    if status != COMPLETE:
+        return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
+    noise = torque_noise(scene, scene.omega, times[-1])
+    error, growth = _largest_estimate(scene, times, noise)
+    status = SENSITIVE if is_sensitive(growth, tolerance, noise) else COMPLETE
+    return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

@@ -1,0 +1,87 @@
+"""Dense output and events of a trajectory."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pyharness.engine import dense
+from pyharness.engine.closed_form import period_of
+from pyharness.engine.event_fits import Solution
+from pyharness.engine.event_functions import EventFunction
+from pyharness.engine.events import found_events, no_events
+from pyharness.engine.periodic_events import PERIODS, are_of_omega
+from pyharness.engine.registry import METHODS
+from pyharness.engine.sides import row_names
+from pyharness.model.dense_output import DenseOutput, Pieces
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+
+
+def solution_of(
+    scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
+) -> DenseOutput:
+    """Return the solution as a function of time, between 0 and `found`."""
+    is_closed = not found.evaluations and method != "reference"
+    return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
+
+
+def with_events(
+    scene: Scene,
+    found: Trajectory,
+    functions: list[EventFunction],
+    ends: tuple[float, float],
+    rows: dense.Rows,
+    method: str,
+    tolerance: float,
+) -> Trajectory:
+    """Return a trajectory with its events, without what follows a terminal one.
+
+    `ends` are the first and last requested times (s).
+    """
+    sol = found.sol or solution_of(scene, found, rows, method, tolerance)
+    events = no_events(len(functions), 3 if found.attitude is None else 7)
+    if sol.t_min < sol.t_max:
+        pieces, period = sol.states, 0.0
+        if not isinstance(pieces, Pieces):
+            if are_of_omega(functions):
+                period = period_of(scene)
+            shown = _first_periods(found, rows, tolerance, period)
+            pieces = dense.state_pieces(scene, shown, rows, tolerance, METHODS[method].finest)
+        # A fixed step of a method has a tolerance of 1.
+        own = tolerance if tolerance < 1.0 else 0.0
+        events = found_events(functions, Solution(pieces, sol, own), period)
+    kept = (found.time >= events.first) & (found.time <= events.last)
+    cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in row_names(found)}
+    # An overflow remains the ending if it is not beyond a terminal event.
+    overflowed = found.ended == "overflow" and (
+        (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
+        or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
+    )
+    if (math.isfinite(events.first) or math.isfinite(events.last)) and not overflowed:
+        cut["ended"] = "event"
+    if found.sol is not None:
+        low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)
+        cut["sol"] = replace(sol, t_min=low, t_max=high)
+    return replace(found, **cut, t_events=events.times, y_events=events.states)
+
+
+def _first_periods(
+    found: Trajectory, rows: dense.Rows, tolerance: float, period: float
+) -> Trajectory:
+    """Return a trajectory over at most a few periods (s) on each side of 0."""
+    ends = found.time[[0, -1]]
+    last = PERIODS * period
+    # A little more than these periods is not worth another way to find events.
+    if last == 0.0 or np.abs(ends).max() <= 2.0 * last:
+        return found
+    return rows(
+        np.unique(np.where(np.abs(ends) > 2.0 * last, np.sign(ends) * last, ends)), tolerance
+    )
+
+
+def with_events_reversed(found: Trajectory) -> Trajectory:
+    """Return a trajectory with its events in reverse order."""
+    times, states = found.t_events or [], found.y_events or []
+    return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])

@@ -1,0 +1,225 @@
+"""Dense output of every method: Chebyshev polynomials through the method's own results.
+
+Intervals are divided until the last coefficients are far below the tolerance. A closed form is
+evaluated instead.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pyharness.dynamics.rates import rates
+from pyharness.engine.stepper import step_lengths
+from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import nodes
+from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Trajectory
+
+# The results at the nodes are computed to this part of the tolerance, because a polynomial may
+# have larger errors than its nodes; and to the second part if the method can't meet the first.
+_NODE_TOLERANCE = 0.25
+_LARGEST_NODE_TOLERANCE = 0.75
+# Largest of the last coefficients of a polynomial, in tolerances, and relative to the state.
+_LAST = 0.02
+# Rounding errors of a method, over the error amplification. They are not smooth.
+_OWN_ROUNDING = 4e-15
+_ROUNDING = 4e-16
+_TAIL = 3  # coefficients whose size is an estimate of those left out
+# A piece has errors of the method that are not smooth if its tail is not much smaller than that of
+# the piece of which it is a part, although the polynomial of the latter was accurate.
+_DIVIDED = 8.0
+_MOST_PARTS = 64  # into which an interval is divided at once
+_MOST_PIECES = 200_000
+_RADIANS = 2.0  # of rotation in an interval; first guess
+_SHORT = 0.25  # a shorter part of an interval than the largest gap of its nodes could hide
+
+
+@dataclass(frozen=True, eq=False)
+class _Open:
+    """An interval (s) without a polynomial, a part of a longer one."""
+
+    low: float
+    high: float
+    tail: float = math.inf  # of the polynomial of the longer interval
+    whole: Pieces | None = None  # this polynomial
+
+    def is_rough(
+        self, tail: float, times: Array, values: Array, scale: float, rough: float
+    ) -> bool:
+        """Return whether the method has errors, below `rough`, that are not smooth."""
+        if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
+            return False
+        # A fast wave between few nodes has small tails too, but another polynomial.
+        apart = np.abs(self.whole(times) - values).max(axis=0)
+        apart[:3] /= scale or 1.0
+        return bool(apart.max() <= rough)
+
+
+# A function that returns the trajectory at given times to a given tolerance.
+Rows = Callable[[Array, float], Trajectory]
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    rows: Rows
+    tolerance: float
+
+    def __call__(self, times: Array) -> Array:
+        if not times.size:
+            return self(np.zeros(1))[:0]
+        each, place = np.unique(times, return_inverse=True)
+        return self.rows(each, self.tolerance).y.T[place]
+
+
+def dense_output(
+    scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
+) -> DenseOutput:
+    """Return the solution as a function of time, between 0 and the rows of `found`, in order.
+
+    `rows` returns more of them; a tolerance of 1 means a fixed step. Raise InputError if too many
+    polynomials would be needed.
+    """
+    ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
+    states: Callable[[Array], Array]
+    if is_closed or len(ends) == 1:
+        states = _Solved(rows, tolerance)
+    else:
+        states = state_pieces(scene, found, rows, tolerance, finest)
+    return DenseOutput(ends[0], ends[-1], states, partial(rates, scene))
+
+
+def state_pieces(
+    scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
+) -> Pieces:
+    """Return the solution as polynomials, from 0 to another time at least."""
+    ends = sorted({0.0, *found.time[[0, -1]].tolist()})
+    if tolerance == 1.0:
+        return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
+    own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
+    rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
+    edges = _first_edges(scene, found, ends, tolerance)
+    return _fitted(edges, rows, tolerance, own, rough)
+
+
+def _first_edges(
+    scene: Scene, found: Trajectory, ends: list[float], tolerance: float
+) -> list[float]:
+    """Return the ends of the first intervals (s), among them all changes of tables.
+
+    A short torque shows in the steps of a Taylor series, at which an interval is therefore divided,
+    but hardly at few nodes.
+    """
+    tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
+    inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
+    bounds = sorted({*ends, *inner})
+    fastest = float(np.abs(found.omega).max(initial=max(map(abs, scene.omega))))
+    total = ends[-1] - ends[0]
+    share = min(_MOST_PIECES, found.steps, fastest * total / _RADIANS) / total
+    edges: list[float] = []
+    for low, high in itertools.pairwise(bounds):
+        count = max(1, math.ceil((high - low) * share))
+        edges += np.linspace(low, high, count + 1)[:-1].tolist()
+    edges.append(bounds[-1])
+    if tape is None and scene.changing is None:
+        return edges
+    attitude = found.attitude is not None or scene.torque.needs_attitude
+    steps: dict[float, float] = {}
+    for end in ends:
+        steps |= step_lengths(scene, attitude, end, tolerance, bounds)
+    step_ends = np.array(sorted(steps))
+    lengths = np.array([steps[each] for each in step_ends])
+    more: list[float] = []
+    for low, high in itertools.pairwise(edges):
+        within = slice(*np.searchsorted(step_ends, [low, high]))
+        if lengths[within].min(initial=math.inf) < _SHORT * (high - low):
+            more += step_ends[within].tolist()
+    return sorted({*edges, *more})
+
+
+def _fitted(
+    edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float
+) -> Pieces:
+    """Return polynomials through the rows of a method, for intervals that are divided as needed.
+
+    `own` are two tolerances of the rows, `rough` is their largest error that is not smooth.
+    """
+    open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
+    done: dict[float, tuple[float, Array]] = {}
+    scale = 0.0
+    aim = max(_LAST * tolerance, _ROUNDING)
+    while open_pieces:
+        if len(open_pieces) + len(done) > _MOST_PIECES:
+            raise InputError(
+                f"dense output and events need more than {_MOST_PIECES} polynomials; use a "
+                "shorter time or a larger tolerance, or give the times of the results"
+            )
+        lows, highs = np.array([(piece.low, piece.high) for piece in open_pieces]).T
+        each = nodes(lows, highs, POINTS)
+        times, place = np.unique(each, return_inverse=True)
+        try:
+            states = rows(times, own[0]).y.T
+        except InputError as error:
+            if own[0] == own[-1]:
+                raise InputError(f"dense output and events: {error}") from error
+            own = own[1:]
+            continue
+        if len(states) < len(times):
+            raise InputError("dense_output: the method reached fewer times than before")
+        scale = max(scale, float(np.abs(states[:, :3]).max()))
+        values = states[place.reshape(each.shape)]
+        coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
+        tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
+        tails[:, :3] /= scale or 1.0
+        following = []
+        for piece, own_nodes, own_values, tail in zip(
+            open_pieces, each, values, tails.max(axis=1).tolist(), strict=True
+        ):
+            low, high = piece.low, piece.high
+            if (
+                tail <= aim
+                or high - low <= 64 * math.ulp(max(abs(low), abs(high)))
+                or piece.is_rough(tail, own_nodes, own_values, scale, rough)
+            ):
+                done[low] = high, own_values
+                continue
+            parts = math.ceil(1.2 * (tail / aim) ** (1.0 / (NODES - _TAIL)))
+            cuts = np.linspace(low, high, min(max(parts, 2), _MOST_PARTS) + 1).tolist()
+            whole = Pieces(np.array([low, high]), own_values[None])
+            following += [_Open(a, b, tail, whole) for a, b in itertools.pairwise(cuts)]
+        open_pieces = following
+    starts = sorted(done)
+    return Pieces(np.array([*starts, done[starts[-1]][0]]), np.array([done[t][1] for t in starts]))
+
+
+def _of_fixed_steps(
+    scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
+) -> Pieces:
+    """Return the cubics with states and derivatives at the ends of steps."""
+    step = scene.step_size
+    steps = [math.ceil(abs(end) / step) for end in ends]
+    if max(steps) > _MOST_PIECES:
+        raise InputError(
+            f"dense output and events need more than {_MOST_PIECES} steps; use a larger step or a "
+            "shorter time"
+        )
+    before = [-k * step for k in range(steps[0] - 1, 0, -1)] if ends[0] < 0.0 else []
+    after = [k * step for k in range(1, steps[-1])] if ends[-1] > 0.0 else []
+    times = np.unique([ends[0], *before, 0.0, *after, ends[-1]])
+    states = rows(times, 1.0).y.T
+    slopes = derivatives(times, states)
+    length = np.diff(times)[:, None, None]
+    u = (0.5 + 0.5 * POINTS)[None, :, None]
+    first, last = states[:-1, None], states[1:, None]
+    values = (
+        (1.0 + 2.0 * u) * (1.0 - u) ** 2 * first
+        + u * u * (3.0 - 2.0 * u) * last
+        + length * u * (1.0 - u) * ((1.0 - u) * slopes[:-1, None] - u * slopes[1:, None])
+    )
+    return Pieces(times, values)

@@ -1,0 +1,298 @@
+"""Polynomials through the values of an event's function, and the errors of these values.
+
+A function counts as 0 on an interval if it is 0 to within its error there, and reaches 0 by a kink
+or a jump; a decay has no such interval.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from pyharness.engine.event_functions import EventFunction
+from pyharness.engine.event_roots import (
+    NODES,
+    POINTS,
+    TO_COEFFICIENTS,
+    Fits,
+    Index,
+    Roots,
+    joined,
+)
+from pyharness.model.array_type import Array
+from pyharness.model.chebyshev import nodes
+from pyharness.model.dense_output import DenseOutput, Pieces
+
+# Largest of the last coefficients of a polynomial that has converged, relative to its values.
+_LAST = 2e-14
+_TAIL = 3  # coefficients whose size is an estimate of those left out
+# Divisions of an interval in two, after which the function is not smooth.
+_MOST_DIVISIONS = 44
+# A function that is 0 from some time on was so many times its error this part of a polynomial of
+# the solution earlier.
+_SUDDEN, _BEFORE = 1e3, 0.01
+_MOST_PIECES = 100_000  # that are divided at the same time
+_SHIFT = 2.0**-26  # relative difference of an argument, by which a derivative is estimated
+ROUNDING = 2.0**-50  # of the arguments of a function
+# A double root is known at best to the error of omega, relative to omega.
+_COARSEST = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The solution of a scene for the search for events: polynomials and dense output.
+
+    `tolerance` is that of omega, 0 for a fixed step.
+    """
+
+    pieces: Pieces
+    sol: DenseOutput
+    tolerance: float
+
+    def states(self, times: Array) -> Array:
+        """Return omega and attitude at `times` (s), one row for each."""
+        return _normalised(self.pieces(times))
+
+    def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
+        """Return the values of an event's function at `times` (s)."""
+        states = self.states(times) if states is None else states
+        rates = self.sol.rates(times, states) if g.event.needs_rates else None
+        return g(times, states, rates)
+
+    def exact_values(self, g: EventFunction, times: Array) -> Array:
+        """Return the values at `times` (s), without the polynomials."""
+        return self.values(g, times, _normalised(self.sol.states(times)))
+
+    def noise(self, g: EventFunction, times: Array) -> Array:
+        """Return the errors of a function by rounding of time and errors of omega and attitude."""
+        states = self.states(times)
+        rates = self.sol.rates(times, states) if g.event.needs_rates else None
+        value = g(times, states, rates)
+        shift = _SHIFT * np.abs(times)
+        later = np.where(times + shift > times, times + shift, times)
+        found = ROUNDING * np.abs(g(later, states, rates) - value) / _SHIFT
+        # A tolerance in excess of the limit would hide pairs of roots.
+        own = max(ROUNDING, min(self.tolerance, _COARSEST))
+        largest = self._largest_until(times)
+        for k in range(states.shape[1]):
+            moved = states.copy()
+            moved[:, k] += _SHIFT * (largest if k < 3 else 1.0)
+            found += own * np.abs(self.values(g, times, moved) - value) / _SHIFT
+        if rates is not None:
+            largest = np.abs(rates[:, :3]).max(axis=1)
+            for k in range(3):
+                moved = rates.copy()
+                moved[:, k] += _SHIFT * largest
+                found += ROUNDING * np.abs(g(times, states, moved) - value) / _SHIFT
+        return found
+
+    @cached_property
+    def _largest(self) -> Array:
+        """The largest component of omega (rad/s) up to the end of each polynomial."""
+        sizes = np.abs(self.pieces.values[:, :, :3]).max(axis=(1, 2))
+        count = int(np.sum(self.pieces.edges[:-1] < 0.0))
+        before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
+        return np.concatenate([before, np.maximum.accumulate(after)])
+
+    def _largest_until(self, times: Array) -> Array:
+        piece = np.searchsorted(self.pieces.edges, times, side="right") - 1
+        return self._largest[np.clip(piece, 0, len(self._largest) - 1)]
+
+
+def _normalised(states: Array) -> Array:
+    if states.shape[-1] > 3:
+        states[..., 3:] /= np.linalg.norm(states[..., 3:], axis=-1, keepdims=True)
+    return states
+
+
+def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
+    """Return polynomials through a function's values, and roots where there are none."""
+    edges = solution.pieces.edges
+    low, high = edges[:-1], edges[1:]
+    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
+    coefficients = solution.pieces.coefficients
+    basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
+    inner = _normalised(basis @ coefficients)
+    times = nodes(low, high, POINTS)
+    values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
+        times.shape
+    )
+    first, last = values[:, 0].copy(), values[:, -1]
+    # Adjacent intervals have the same value at their common end.
+    first[1:] = last[:-1]
+    done: list[Fits] = []
+    rough: list[Roots] = []
+    while low.size:
+        c = values @ TO_COEFFICIENTS.T
+        largest = np.abs(values).max(axis=1)
+        tail = np.abs(c[:, -_TAIL:]).max(axis=1)
+        is_done = tail <= _LAST * largest
+        near = np.flatnonzero(~is_done)
+        is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
+        fits = Fits(low, high, first, last, c, np.zeros(len(low)))
+        done.append(fits.only(is_done))
+        is_rough = ~is_done & (
+            (high - low <= np.maximum(smallest, 64.0 * np.spacing(np.abs(low) + np.abs(high))))
+            | (len(low) > max(_MOST_PIECES, 2 * len(edges)))
+        )
+        rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
+        split = ~is_done & ~is_rough
+        middle = 0.5 * low[split] + 0.5 * high[split]
+        ends = np.column_stack([low[split], middle, middle, high[split]])
+        low, high = ends.reshape(-1, 2).T
+        smallest = np.repeat(smallest[split], 2)
+        first, last = first[split], last[split]
+        if not low.size:
+            break
+        times = nodes(low, high, POINTS)
+        values = solution.values(g, times.ravel()).reshape(times.shape)
+        centre = values[0::2, -1]
+        first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
+    return _all_fits(done), joined(rough)
+
+
+def _all_fits(parts: list[Fits]) -> Fits:
+    return Fits(*(np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0])))
+
+
+def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
+    """Return the largest noise at three nodes of each interval."""
+    if not low.size:
+        return np.zeros(0)
+    times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
+    noise = solution.noise(g, times.ravel()).reshape(times.shape)
+    return np.asarray(noise.max(axis=1))
+
+
+def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
+    """Return the polynomials, with noise, that can be distinguished from 0."""
+    noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
+    fits = replace(fits, noise=noise)
+    return fits.only(fits.sizes > 2.0 * noise)
+
+
+def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
+    """Return the sign changes between adjacent nodes of intervals."""
+    values = values.copy()
+    values[:, 0] = first
+    is_negative = values < 0.0
+    row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
+    change = np.where(is_negative[row, column], 1, -1)
+    zeros = np.zeros(len(row))
+    middle = 0.5 * times[row, column] + 0.5 * times[row, column + 1]
+    return Roots(middle, change, zeros, zeros, zeros, zeros, zeros)
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroIntervals:
+    """The intervals from `low` to `high` (s), ascending, on which a function is 0 to within error.
+
+    `noise` is the magnitude below which a value beside them can't be distinguished from 0; `before`
+    and `after` are the signs there, or 0 where the function decays, and at the ends of the
+    solution.
+    """
+
+    low: Array
+    high: Array
+    noise: Array
+    before: Array
+    after: Array
+
+    def roots(self, counts_touches: bool) -> Roots:
+        """Return the roots where the integration from 0 reaches the intervals.
+
+        If touches do not count, only changes between the two sides are roots.
+        """
+        is_before = self.high < 0.0
+        is_first = (self.low <= 0.0) & ~is_before
+        time = np.where(is_before, self.high, np.maximum(self.low, 0.0))
+        lasting = np.where(self.high <= 0.0, self.low, self.high) - time
+        change = np.where(is_first, 0.0, np.where(is_before, self.after, -self.before))
+        is_root = is_first | (change != 0.0)
+        if not counts_touches:
+            is_root = ~is_first & (self.before * self.after < 0.0)
+        # An interval around time 0 is reached on both sides.
+        both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
+        time, change = (np.append(x[is_root], x[both]) for x in (time, change))
+        zeros = np.zeros(len(time))
+        lasting = np.append(lasting[is_root], self.low[both])
+        return Roots(time, change.astype(int), zeros, zeros, zeros, zeros, lasting)
+
+    def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
+        """Return which roots are in an interval, or undistinguished from one."""
+        following = np.searchsorted(self.low, roots.time, side="right")
+        before = np.append(-math.inf, self.high)[following]
+        after = np.append(self.low, math.inf)[following]
+        found: Index = roots.time <= before
+        # Changes of sign of a function that is not smooth are known to so many rounding errors.
+        longest = np.diff(solution.pieces.edges).max()
+        apart = np.minimum(roots.time - before, after - roots.time)
+        found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
+        for edges, number in ((before, following - 1), (after, following)):
+            near = np.flatnonzero(np.isfinite(edges) & ~found)
+            middle = solution.values(g, 0.5 * roots.time[near] + 0.5 * edges[near])
+            noise = np.maximum(self.noise[number[near]], roots.noise[near])
+            found[near] = np.abs(middle) <= noise
+        return found
+
+
+def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
+    """Return the intervals on which a function is 0 to within error."""
+    if not fits.low.size:
+        return ZeroIntervals(*(np.zeros(0) for _ in range(5)))
+    fits = fits.only(np.argsort(fits.low))
+    sizes, noise = fits.sizes, np.zeros(len(fits.low))
+    largest = [sizes.argmax()]
+    limit = _noise_of(g, solution, fits.low[largest], fits.high[largest])[0]
+    # Where no value is far above its error, any may be 0.
+    near = np.flatnonzero(sizes <= max(sizes.max() / _SUDDEN, _SUDDEN * limit))
+    noise[near] = 2.0 * _noise_of(g, solution, fits.low[near], fits.high[near])
+    zero = near[sizes[near] <= noise[near]]
+    is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]
+    begins = np.flatnonzero(is_begin)
+    ends = np.append(begins[1:], len(zero))[: len(begins)] - 1
+    begins, ends = zero[begins], zero[ends]
+    low, high = fits.low[begins], fits.high[ends]
+    earlier = np.minimum(fits.low[begins - 1], low)
+    later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
+    low = _refined(
+        g, solution, low, earlier, np.maximum(2.0 * sizes[begins], noise[begins] / _SUDDEN)
+    )
+    high = _refined(g, solution, high, later, np.maximum(2.0 * sizes[ends], noise[ends] / _SUDDEN))
+    noise = noise[begins]
+    earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
+    values = solution.values(g, np.concatenate([earlier, later])).reshape(2, -1)
+    before, after = np.where(np.abs(values) > _SUDDEN * noise, np.sign(values), 0.0)
+    for times in (earlier, later):
+        noise = np.maximum(noise, solution.noise(g, times))
+    return ZeroIntervals(low, high, noise, before, after)
+
+
+def _refined(
+    g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
+) -> Array:
+    """Return the times, between two lists of times, from which on a function is below a level.
+
+    A polynomial may extend beyond a kink; those of the solution are at its ends.
+    """
+    inner, outer = ends.copy(), others.copy()
+    k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
+    k = k[np.abs(solution.values(g, outer[k])) > level[k]]
+    while k.size:
+        middle = 0.5 * inner[k] + 0.5 * outer[k]
+        is_between = (middle != inner[k]) & (middle != outer[k])
+        k, middle = k[is_between], middle[is_between]
+        is_zero = np.abs(solution.values(g, middle)) <= level[k]
+        inner[k] = np.where(is_zero, middle, inner[k])
+        outer[k] = np.where(is_zero, outer[k], middle)
+    return inner
+
+
+def _beside(solution: Solution, times: Array, side: int) -> Array:
+    edges = solution.pieces.edges
+    piece = np.searchsorted(edges, times, side="left" if side < 0 else "right") - 1
+    piece = np.clip(piece, 0, len(edges) - 2)
+    beside = times + side * _BEFORE * (edges[piece + 1] - edges[piece])
+    return np.asarray(np.clip(beside, edges[0], edges[-1]))

@@ -1,0 +1,307 @@
+"""Events: the times at which functions of time, omega and attitude are 0.
+
+The solution is a polynomial on each of many intervals. A function of it is approximated on these,
+which are divided until the polynomials have converged, and all their roots are isolated: also close
+and double roots of a smooth function. Where it is not smooth, intervals become tiny, and sign
+changes between nodes are found, but not one that is undone before the next node.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pyharness.engine.event_fits import (
+    ROUNDING,
+    Solution,
+    fitted,
+    with_noise,
+    zero_intervals,
+)
+from pyharness.engine.event_functions import EventFunction
+from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
+from pyharness.engine.periodic_events import improved, repeated
+from pyharness.model.array_type import Array
+
+_BLOCK = 4_000  # polynomials whose roots are isolated together
+_STATE_ROUNDING = 2.0**-46  # of polynomials of the state, over their largest values
+_POLISHES = 3
+# A time is exact if the sign changes within so many of its rounding errors on either side of it.
+_EXACT = 8.0
+_WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
+
+
+def event_roots(g: EventFunction, solution: Solution) -> Roots:
+    """Return all events of a function, with sign changes in the order of time.
+
+    Those at an end are to, or from, the values beside it.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        fits, rough = fitted(g, solution)
+        zeros = zero_intervals(g, solution, fits)
+        fits = with_noise(g, solution, fits.only(may_vanish(fits)))
+        found = [rough]
+        for begin in range(0, len(fits.low), _BLOCK):
+            found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
+        roots = _distinct(g, solution, joined(found))
+        roots = joined([roots, _at_ends(g, solution)])
+        roots = roots.only(~zeros.contain(g, solution, roots))
+        roots = _polished(g, solution, _merged(g, solution, roots))
+        return joined([roots, zeros.roots(g.event.counts_touches)])
+
+
+def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
+    """Return roots with the noise at their own times, without extrema not near 0."""
+    if not roots.time.size:
+        return roots
+    noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
+    noise = np.minimum(noise, roots.noise)
+    value = solution.values(g, roots.time)
+    # A value beyond 0, as seen from those beside the extremum, is on the other side of two roots.
+    is_root = (roots.change != 0) | (np.abs(value) <= noise) | (value * roots.curvature < 0.0)
+    return replace(roots, noise=noise).only(is_root)
+
+
+def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
+    if not roots.time.size:
+        return roots
+    time, value = roots.time, solution.values(g, roots.time)
+    is_simple = (roots.change != 0) & (roots.slope * roots.change > 0.0)
+    low, high = solution.pieces.edges[[0, -1]]
+    for _ in range(_POLISHES):
+        step = np.where(is_simple, -value / np.where(is_simple, roots.slope, 1.0), 0.0)
+        step[~np.isfinite(step)] = 0.0
+        trial = np.clip(time + step, low, high)
+        if not np.any(trial != time):
+            break
+        other = solution.values(g, trial)
+        better = np.abs(other) < np.abs(value)
+        time, value = np.where(better, trial, time), np.where(better, other, value)
+    return replace(roots, time=_bisected(g, solution, time, roots.change))
+
+
+def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
+    """Return the times of roots, those of inexact sign changes by bisection.
+
+    A root of odd multiplicity is lost in the errors of polynomials, but not of signs.
+    """
+    edges = solution.pieces.edges
+    bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
+    piece = np.clip(np.searchsorted(edges, times) - 1, 0, len(edges) - 2)
+    rounding = np.spacing(np.abs(times)) + np.spacing(edges[piece + 1] - edges[piece])
+    found, width = times.copy(), _EXACT * rounding
+    wide = np.flatnonzero(changes)
+    low, high = times.copy(), times.copy()
+    open_ones: list[Index] = []
+    while wide.size:
+        low[wide] = np.maximum(times[wide] - width[wide], bounds[wide])
+        high[wide] = np.minimum(times[wide] + width[wide], bounds[wide + 1])
+        has_change = _have_change(g, solution, low[wide], high[wide], changes[wide])
+        open_ones.append(wide[has_change & (width[wide] > _EXACT * rounding[wide])])
+        is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
+        wide = wide[~(has_change | is_whole)]
+        width[wide] *= _WIDER
+    k = np.concatenate(open_ones) if open_ones else wide
+    while k.size:
+        middle = 0.5 * low[k] + 0.5 * high[k]
+        k, middle = (x[(middle > low[k]) & (middle < high[k])] for x in (k, middle))
+        is_late = solution.values(g, middle) * changes[k] >= 0.0
+        low[k], high[k] = np.where(is_late, low[k], middle), np.where(is_late, middle, high[k])
+        found[k] = high[k]
+    return found
+
+
+def _have_change(
+    g: EventFunction, solution: Solution, low: Array, high: Array, changes: Index
+) -> Index:
+    values = solution.values(g, np.concatenate([low, high]))
+    first, last = values.reshape(2, -1) * changes
+    found: Index = (first < 0.0) & (last > 0.0)
+    return found
+
+
+def _at_ends(g: EventFunction, solution: Solution) -> Roots:
+    edges = solution.pieces.edges
+    ends = np.unique([edges[0], 0.0, edges[-1]])
+    # A function that is not 0 to rounding at an end is on one side of 0 there.
+    values = solution.values(g, ends)
+    noise = 4.0 * replace(solution, tolerance=0.0).noise(g, ends)
+    is_root = np.abs(values) <= noise
+    found = ends[is_root]
+    zeros = np.zeros(len(found))
+    return Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros, zeros)
+
+
+def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
+    count = len(roots.time)
+    if not count:
+        return roots
+    time = roots.time
+    noise = np.maximum(roots.noise[:-1], roots.noise[1:])
+    gap = np.diff(time)
+    middle = solution.values(g, time[:-1] + 0.5 * gap) if count > 1 else gap
+    is_same = (
+        (np.abs(middle) <= noise)
+        | _have_one_extremum(g, solution, roots, noise)
+        | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
+    )
+    is_jump = (roots.change != 0) & (roots.slope == 0.0)
+    between = np.flatnonzero(is_jump[:-1] & is_jump[1:] & ~is_same)
+    is_same[between] = _have_any_sign(g, solution, (time[:-1] + 0.5 * gap)[between])
+    group = np.concatenate([[0], np.cumsum(~is_same)])
+    total = np.zeros(group[-1] + 1, dtype=int)
+    np.add.at(total, group, roots.change)
+    change = np.sign(total)
+    begin = np.flatnonzero(np.diff(group, prepend=-1))
+    chosen, size = begin.copy(), np.diff(begin, append=count)
+    ends = (*solution.pieces.edges[[0, -1]].tolist(), 0.0)
+    # A jump there and back, both by rounding, is no change of sign.
+    is_event = (change != 0) | ~np.minimum.reduceat(is_jump, begin)
+    for k in np.flatnonzero(size > 1):
+        chosen[k] = _chosen(roots, np.arange(begin[k], begin[k] + size[k]), change[k], ends)
+    merged = replace(roots.only(chosen), change=change).only(is_event)
+    return _with_extrema(g, solution, merged, ends)
+
+
+def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
+    """Return at which times rounding errors of the state decide the sign, as at a jump."""
+    found: Index = np.zeros(len(times), dtype=bool)
+    if not times.size:
+        return found
+    states = solution.states(times)
+    is_negative = solution.values(g, times, states) < 0.0
+    largest = np.abs(states[:, :3]).max(axis=1)
+    for k in range(states.shape[1]):
+        for side in (-1.0, 1.0):
+            moved = states.copy()
+            moved[:, k] += side * _STATE_ROUNDING * (largest if k < 3 else 1.0)
+            found |= (solution.values(g, times, moved) < 0.0) != is_negative
+    return found
+
+
+def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
+    """Return which adjacent roots are a pair only by errors, around an extremum that is 0."""
+    found: Index = np.zeros(len(noise), dtype=bool)
+    gap = np.diff(roots.time)
+    for k in (slice(None, -1), slice(1, None)):
+        step = -roots.slope[k] / roots.curvature[k]
+        widest = np.sqrt(8.0 * roots.near[k] / np.abs(roots.curvature[k]))
+        near = np.flatnonzero((gap <= widest) & (np.abs(step) <= widest))
+        if near.size:
+            trial = np.clip(roots.time[k] + step, *solution.pieces.edges[[0, -1]])[near]
+            found[near] |= np.abs(solution.values(g, trial)) <= noise[near]
+    return found
+
+
+def _with_extrema(
+    g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
+) -> Roots:
+    """Return roots in which a double one is at its extremum."""
+    is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
+    if not is_double.any():
+        return roots
+    step = np.zeros(len(roots.time))
+    step[is_double] = -roots.slope[is_double] / roots.curvature[is_double]
+    # The errors of the polynomial, and not only the noise, may have moved the root this far.
+    widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
+    step[~(np.abs(step) <= widest)] = 0.0
+    trial = np.clip(roots.time + step, *solution.pieces.edges[[0, -1]])
+    is_root = np.abs(solution.values(g, trial)) <= roots.noise
+    return replace(roots, time=np.where(is_root, trial, roots.time))
+
+
+def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
+    """Return the root that stands for a group: an end, or the middle one."""
+    at_end = group[np.isin(roots.time[group], ends)]
+    if at_end.size:
+        return int(at_end[0])
+    alike = group[roots.change[group] == change]
+    alike = alike if alike.size else group
+    return int(alike[len(alike) // 2])
+
+
+def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
+    """Return the times of the events after (1) or before (-1) 0, in the order away from 0.
+
+    As in SciPy, sign changes at 0 are from 0, and those at the end to 0.
+    """
+    end = solution.pieces.edges[-1 if side > 0 else 0]
+    if side * end <= 0.0:
+        return np.zeros(0)
+    roots = roots.only((side * roots.time >= 0.0) & (side * (roots.time + roots.lasting) >= 0.0))
+    time, change, lasting = (side * x[::side] for x in (roots.time, roots.change, roots.lasting))
+    is_end = (lasting == 0.0) & ((time == 0.0) | (time == side * end))
+    last, first = np.append(0.0, time + lasting), np.append(time, side * end)
+    for k in np.flatnonzero(is_end):
+        beside = first[k + 1] if time[k] == 0.0 else last[k]
+        value = solution.values(g, np.array([side * (0.5 * time[k] + 0.5 * beside)]))[0]
+        change[k] = np.sign(value) * (1 if time[k] == 0.0 else -1)
+    accepted = (change == g.event.direction) | (g.event.direction == 0)
+    if not g.event.counts_touches:
+        accepted &= (change != 0) & ~is_end
+    found: Array = side * time[accepted]
+    return found
+
+
+def _repeated(
+    g: EventFunction, solution: Solution, times: Array, side: int, period: float
+) -> Array:
+    """Return all events on one side of 0, also beyond the polynomials."""
+    last, end = solution.pieces.edges[-1], solution.sol.t_max
+    if side < 0:
+        last, end = solution.pieces.edges[0], solution.sol.t_min
+    if last == end:
+        return times
+    found, kept = repeated(side * times, period, abs(end), g.name)
+    found *= side
+    found[kept:] = improved(g, found[kept:], solution.exact_values, period)
+    return np.clip(found, solution.sol.t_min, solution.sol.t_max)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundEvents:
+    """The `times` (s) of the events of each function, ascending, and the `states` there.
+
+    `first` and `last` (s) are the terminal ones before and after 0, or infinite.
+    """
+
+    times: list[Array]
+    states: list[Array]
+    first: float
+    last: float
+
+
+def no_events(count: int, columns: int) -> FoundEvents:
+    """Return the events if no time but 0 was requested."""
+    states = [np.zeros((0, columns)) for _ in range(count)]
+    return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
+
+
+def found_events(
+    functions: list[EventFunction], solution: Solution, period: float = 0.0
+) -> FoundEvents:
+    """Return the events of several functions, without those beyond a terminal event.
+
+    With a period (s), events beyond the polynomials are repetitions.
+    """
+    roots = [event_roots(g, solution) for g in functions]
+    sides: dict[int, list[Array]] = {}
+    limits: dict[int, float] = {}
+    for side in (-1, 1):
+        lists = [side_events(g, solution, x, side) for g, x in zip(functions, roots, strict=True)]
+        if period > 0.0:
+            lists = [
+                _repeated(g, solution, times, side, period)
+                for g, times in zip(functions, lists, strict=True)
+            ]
+        ends = [
+            abs(times[int(g.limit) - 1])
+            for g, times in zip(functions, lists, strict=True)
+            if len(times) >= g.limit
+        ]
+        limits[side] = min(ends, default=math.inf)
+        sides[side] = [times[np.abs(times) <= limits[side]] for times in lists]
+    # A root at time 0 may be in the lists of both sides.
+    times = [np.unique(np.concatenate(both)) for both in zip(*sides.values(), strict=True)]
+    states = [solution.sol(each).T for each in times]
+    return FoundEvents(times, states, -limits[-1], limits[1])

@@ -1,0 +1,188 @@
+"""Gauss collocation with equal steps, halved until two solutions agree."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness.engine.problem import normalized, trajectory_of
+from pyharness.engine.sensitivity import is_sensitive, motion_growth, torque_noise
+from pyharness.model.effort import Integrator, advice, waves
+from pyharness.model.errors import TimedError
+from pyharness.model.extension import COMPLETE, SENSITIVE, extension
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import ROUNDING, Array, Trajectory
+from pyharness.scenes.rescaled import omega_by_torque
+
+# Work limit: right-hand sides of all trial integrations together, some ten seconds. A wave of
+# the torque costs half as much as a right-hand side.
+_MOST_EVALUATIONS = 200_000_000
+_ORDER_THAT_SHOWS = 8  # highest order that the error estimate relies on
+# If the relative difference of two solutions is below this limit, shorter steps do not reduce it.
+_ROUNDING = 16 * 2.0**-53
+# rad/s, near the largest number of binary64. If two solutions reach it, the motion overflows.
+_NEAR_THE_END = 1e300
+
+
+def gauss(stages: int) -> Integrator:
+    """Return a solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
+
+    With d the largest difference in omega between two solutions, and r <= 2 the quotient of their
+    steps, the estimated error of the finer is 2 d / (r**p - 1). The 2 is for safety; p is the
+    order, but at most 8: methods of higher order take longer steps, with which the error does not
+    yet fall at the full order.
+    """
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        kernel = _kernel(scene, stages, times, effort)
+        if times[-1] == 0.0:
+            return trajectory_of(times, np.array([scene.omega]).T, 1, COMPLETE, 0, 0)
+        scale = max(map(abs, scene.omega))
+        start = max(scale, kernel.pushed)
+        lengths = _lengths(times)
+        step, spent, reached = _first_step(kernel.rate, float(lengths.min())), 0, 0.0
+        most = kernel.most
+        more = 1.0  # estimated steps of the final solution over the steps of the next solution
+        pace = 2.0 * stages  # right-hand sides per step
+        before: _Solution | None = None
+        last = math.inf  # the previous difference of two solutions (rad/s)
+        growth: float | None = None
+        counts = previous = kernel.counts(step)
+        while True:
+            # Each step takes at least two iterations.
+            steps = float(counts.sum())
+            if not step or spent + 2.0 * stages * steps > most:
+                needed = spent + steps * (pace * (more - 1.0) + 2.0 * stages * more)
+                enough = effort * max(needed, 0.5 * pace * more * steps) / most
+                remedies = "use a shorter time, a larger tolerance or more stages"
+                raise TimedError(
+                    f"gauss-{stages} exceeded its work limit at t = {{time}} s after {spent} "
+                    "right-hand sides; " + advice(remedies, effort, enough),
+                    reached,
+                )
+            found = kernel.solution(step)
+            spent += found.evaluations
+            pace = max(pace, found.evaluations / steps)
+            reached = float(found.reached[0])
+            if before is not None and before.n_rows == found.n_rows:
+                n = found.n_rows
+                scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
+                difference = found.difference(before, n)
+                # If an interval has as many steps as before, the difference does not measure an
+                # error: `known` is then 0.
+                ratio = float((counts / previous).min(initial=2.0))
+                known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
+                count = int(counts.sum())
+                noise = torque_noise(scene, scene.omega, times[-1], count, scale)
+                floor = _ROUNDING * scale * (1.0 + noise)
+                if growth is None and difference > 0.5 * last:
+                    # Shorter steps did not help: rounding dominates, or the steps are still too
+                    # long.
+                    growth = motion_growth(scene, times[-1])
+                if growth is not None and is_sensitive(growth, tolerance, noise):
+                    floor *= growth
+                allowed = max(tolerance * scale * known / 2.0, floor)
+                close = known > 0.0 and difference <= allowed
+                last = difference
+                if known > 0.0 and allowed > 0.0:
+                    excess = difference / (allowed * (known + 1.0))
+                    more = max(1.0, excess ** (1.0 / min(2 * stages, _ORDER_THAT_SHOWS)))
+                if close and found.status == COMPLETE:
+                    # The motion amplifies rounding errors of every method.
+                    growth = motion_growth(scene, times[-1])
+                    is_blurred = is_sensitive(growth, tolerance, noise)
+                    status = SENSITIVE if is_blurred else COMPLETE
+                    error = 2.0 * difference / (known * scale) if difference else 0.0
+                    if difference > tolerance * scale * known / 2.0:
+                        # The difference comes from rounding, which does not fall with the step.
+                        error = difference / scale
+                    error += ROUNDING * (growth or 1.0) * (1.0 + noise)
+                    return trajectory_of(times, found.rows, n, status, count, spent, error, growth)
+                if found.blows_up(before, start):
+                    return trajectory_of(times, found.rows, n, found.status, count, spent)
+            before, previous = found, counts
+            step *= 0.5
+            counts = kernel.counts(step)
+
+    return solve
+
+
+@dataclass(frozen=True)
+class _Solution:
+    rows: Array
+    reached: Array
+    n_rows: int
+    status: int
+    evaluations: int
+
+    def difference(self, other: "_Solution", n: int) -> float:
+        return float(np.abs(self.rows[:, :n] - other.rows[:, :n]).max(initial=0.0))
+
+    def blows_up(self, coarser: "_Solution", start: float) -> bool:
+        """Return whether this solution and a coarser one end because omega grows without bound.
+
+        Both end before the last time, and nearly together. With m the largest |omega| (rad/s)
+        there, m exceeds 1e300 in both, or the finer m exceeds 1.5 coarser m, and this product 1000
+        times every |omega| at a requested time, if any, and `start`, the initial one or that by
+        torque alone.
+        """
+        if COMPLETE in (self.status, coarser.status):
+            return False
+        # If omega grows slowly, it is larger in the finer solution only because this ends later.
+        if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
+            return False
+        largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
+        so_far = float(np.abs(self.rows[:, : self.n_rows]).max(initial=start))
+        return largest > 1.5 * before > 1e3 * so_far or min(largest, before) > _NEAR_THE_END
+
+
+class _Kernel(NamedTuple):
+    """The function that solves a scene with equal steps, and what determines its steps.
+
+    `rate` (rad/s) is that of the phases of motion and torque, `pushed` the omega (rad/s) by the
+    torque alone, and `most` the work limit in right-hand sides.
+    """
+
+    solution: "Callable[[float], _Solution]"
+    counts: Callable[[float], Array]
+    rate: float
+    pushed: float
+    most: float
+
+
+def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) -> _Kernel:
+    given = normalized(scene)
+    rate = max(map(abs, scene.euler_coefficients)) * max(map(abs, scene.omega))
+    for amplitude, frequency in scene.law.sines + scene.law.cosines:
+        if any(amplitude):
+            rate = max(rate, abs(frequency))
+    return _Kernel(
+        lambda step: _Solution(
+            *extension().gauss_solution(*given, scene.omega, times, stages, step, effort=effort)
+        ),
+        lambda step: _step_counts(_lengths(times), step),
+        rate,
+        omega_by_torque(scene, times[-1]),
+        effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene)),
+    )
+
+
+def _step_counts(lengths: Array, step: float) -> Array:
+    """Return the number of steps in each interval, at most `step` (s) and a relative 1e-6 long."""
+    with np.errstate(over="ignore", divide="ignore"):
+        return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
+
+
+def _lengths(times: Sequence[float]) -> Array:
+    lengths = np.abs(np.diff(np.array(times, dtype=float), prepend=0.0))
+    found: Array = lengths[lengths > 0.0]
+    return found
+
+
+def _first_step(rate: float, shortest: float) -> float:
+    """Return a step size (s), a part of `shortest`, in which a phase grows by half a radian."""
+    return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

@@ -1,0 +1,367 @@
+"""Solution of many bodies in one call, in parallel in the kernel and in several threads.
+
+A result is bit-for-bit the same whatever the other bodies, their order and the threads.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.engine.ensemble import Ensemble as Ensemble
+from pyharness.engine.ensemble import place_for
+from pyharness.engine.many_details import Details
+from pyharness.engine.many_scenes import (
+    Axes,
+    check_alike,
+    checked_rows,
+    from_rows,
+    from_scenes,
+    rows_of_scene,
+)
+from pyharness.engine.many_space import (
+    NO_ATTITUDE,
+    inertia_scenes,
+    is_solved_alone,
+    solve_one_by_one,
+)
+from pyharness.engine.plan import FINEST
+from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
+from pyharness.engine.solver import CODES, PREPARED
+from pyharness.model.arrays import (
+    check_rows,
+    count_bodies,
+    only_one,
+    rows_of,
+    spread,
+    threads_of,
+)
+from pyharness.model.attitude import scalar_first
+from pyharness.model.codes import Methods
+from pyharness.model.effort import checked_effort
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.extension import extension
+from pyharness.model.pieces import for_each_piece
+from pyharness.model.progress import bar_of_bodies, expect_bodies
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import ROUNDING, Array
+from pyharness.model.values import Number, boolean, finite
+from pyharness.model.waves import with_merged_rows
+
+_BODY = ("moments", "coefficients", "inertia")
+_TORQUE = ("torque_constant", "torque_rate", "sines", "cosines")
+_STARTS = ("omega0", "attitude0")
+_MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
+_NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
+_NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
+_UNKNOWN = -1.0  # a kernel's estimate of what it does not know
+
+
+def solve_many(
+    scene: Scene | Sequence[Scene],
+    t_end: Any,
+    *,
+    omega0: Any = None,
+    attitude0: Any = None,
+    moments: Any = None,
+    coefficients: Any = None,
+    inertia: Any = None,
+    torque_constant: Any = None,
+    torque_rate: Any = None,
+    sines: Any = None,
+    cosines: Any = None,
+    method: str = "auto",
+    tolerance: Number | None = None,
+    step: Number | None = None,
+    effort: float = 1.0,
+    estimates: bool = False,
+    events: object = None,
+    sensitivities: Iterable[str] | None = None,
+    threads: int = 1,
+    out: "Ensemble | Array | None" = None,
+    progress: bool = False,
+) -> Ensemble:
+    """Solve many scenes in one call, each to its own final time.
+
+    Parameters
+    ----------
+    scene : Scene, or sequence of Scene
+        One scene, which supplies what no array does; or all scenes, without arrays.
+    t_end : float, or array of shape (n,)
+        Final times, s, of either sign or 0.
+    omega0 : array, shape (n, 3) or (3,)
+        Initial angular velocities, rad/s. One row serves all bodies, here and below.
+    attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
+        Quaternions at time 0, from body to space, scalar first. The default is the scene's; without
+        one, no attitudes are returned.
+    moments, coefficients : array, shape (n, 3) or (3,)
+        Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
+    inertia : array, shape (n, 3, 3) or (3, 3)
+        Inertia matrices (kg m2), in place of moments; vectors and attitudes are about their axes.
+    torque_constant, torque_rate : array, shape (n, 3) or (3,)
+        Constant torques (N m) and their rates (N m/s); over the moments (1/s2, 1/s3) for bodies
+        given by coefficients.
+    sines, cosines : array, shape (n, k, 4) or (k, 4)
+        The k waves of the torques: three amplitudes (as `torque_constant`) and the frequency
+        (rad/s).
+    method : str
+        A name in `pyharness.engine.solver.PREPARED`. `auto` uses closed forms or the Taylor
+        series.
+    tolerance : float
+        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
+        end, and of the attitude's angle (rad). The default depends on the method.
+    step : float, optional
+        Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
+    effort : float
+        Factor on the work limit of a body, beyond which its status is `gave up`.
+    estimates : bool
+        Whether to return estimated errors and error amplifications.
+    events : callable, Event, or list of these
+        Functions whose roots are found, as in `solve`; none may be terminal. They need the method
+        `auto`, `taylor` or `closed-form`, and some milliseconds a body.
+    sensitivities : iterable of str
+        Names of parameters, as in `solve`, for derivatives of final states by the same methods.
+    threads : int
+        Number of threads. The kernel releases the GIL.
+    out : Ensemble, or array of shape (n, 3), optional
+        An earlier result for as many bodies, or an array for omega, to be overwritten.
+    progress : bool
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Ensemble
+        The final states. A body that can't be solved has NaN and a status with the reason.
+
+    Raises
+    ------
+    InputError
+        If the arrays differ in their numbers of rows, the method can't solve the bodies, the
+        tolerance or effort is out of range, or events or sensitivities can't be computed for any.
+    NotBuiltError
+        If the extension is not built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyharness import case_scene, solve_many
+    >>> starts = np.array([[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]])
+    >>> np.round(solve_many(case_scene(2), 1.0, omega0=starts).omega, 6) + 0.0
+    array([[-0.958924,  0.283662, 10.      ],
+           [ 1.196944, -1.602287,  5.      ]])
+    """
+    arrays = {
+        "omega0": omega0, "attitude0": scalar_first(attitude0), "moments": moments,
+        "coefficients": coefficients, "inertia": inertia, "torque_constant": torque_constant,
+        "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
+    }  # fmt: skip
+    details = None
+    scene = scene if isinstance(scene, Scene) else list(scene)
+    if scene and (events is not None or sensitivities is not None):
+        details = Details(
+            scene, t_end, arrays, method=method, tolerance=tolerance, effort=effort,
+            events=events, sensitivities=sensitivities,
+        )  # fmt: skip
+    with bar_of_bodies(boolean("progress", progress)):
+        found = _solved(
+            scene, t_end, arrays, out, step, method=method, tolerance=tolerance, effort=effort,
+            estimates=boolean("estimates", estimates), threads=threads,
+        )  # fmt: skip
+    if details is None:
+        # The result of an earlier call may be used again.
+        has_details = found.t_events is not None or found.sensitivities is not None
+        return replace(found, **_NO_DETAILS) if has_details else found
+    with bar_of_bodies(progress):
+        return details.added_to(found)
+
+
+def _solved(
+    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
+    out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
+    effort: float, estimates: bool, threads: int,
+) -> Ensemble:  # fmt: skip
+    own = {name: value for name, value in arrays.items() if value is not None}
+    kind = only_one({name: own[name] for name in _BODY if name in own})
+    ready: dict[str, Any] = {}
+    axes: Axes | None = None
+    if isinstance(scene, Scene):
+        if kind and scene.changing is not None:  # the arrays give other bodies
+            scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
+        if is_solved_alone(scene, {name: own[name] for name in _TORQUE if name in own}):
+            _, asked = _chosen(method, tolerance)
+            return solve_one_by_one(
+                scene, t_end, {name: arrays[name] for name in (*_TORQUE, *_BODY, *_STARTS)}, out,
+                method=method, tolerance=asked, effort=checked_effort(effort),
+                estimates=estimates, threads=threads_of(threads),
+            )  # fmt: skip
+        step_size = scene.step_size
+        if kind == "inertia" or (scene.inertia is not None and not kind):
+            given, axes = from_rows(
+                inertia_scenes(scene, {name: arrays[name] for name in (*_TORQUE, *_BODY)})
+            )
+            starts = {name: own[name] for name in _STARTS if name in own}
+            own = {**given, **starts}
+            axes.about_principal(own, starts)
+        else:
+            if scene.inertia is not None:  # the arrays give other bodies
+                scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
+            ready = rows_of_scene(scene)
+    else:
+        scene = list(scene)
+        for name in (*_STARTS, *_TORQUE, *_BODY):
+            if name not in own:
+                continue
+            raise InputError(
+                f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
+                "scenes without arrays"
+            )
+        if any(_is_special(each) for each in scene):
+            if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
+                is_solved_alone(each, {}) for each in scene
+            ):
+                return _solve_groups(
+                    scene, t_end, step, out, method=method, tolerance=tolerance, effort=effort,
+                    estimates=estimates, threads=threads,
+                )  # fmt: skip
+            check_alike(scene)
+            own, axes = from_rows(scene)
+        else:
+            own = from_scenes(scene)
+        step_size = scene[0].step_size
+    if step is not None:
+        step_size = finite("step", step)
+    code, asked = _chosen(method, tolerance)
+    bodies = _Bodies(ready, {**own, "t_end": t_end}, step_size, code, asked, checked_effort(effort))
+    if bodies.attitude is not None:
+        check_attitude(method)
+    found = bodies.solve(threads_of(threads), out, estimates)
+    if axes is not None:
+        axes.give_back(found.omega, found.attitude)
+        if found.error is not None and bodies.attitude is not None:
+            # The initial omega was rounded after the rotation to principal axes.
+            found.error[:] += (
+                ROUNDING * np.max(np.abs(bodies.omega0), axis=1) * np.abs(bodies.times)
+            )
+    return found
+
+
+def _is_special(scene: Scene) -> bool:
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    return scene.inertia is not None or is_solved_alone(scene, {})
+
+
+def _solve_groups(
+    scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
+    **settings: Any,
+) -> Ensemble:  # fmt: skip
+    """Return the final states of scenes that need several kernel calls.
+
+    Bodies with moments or coefficients share one, those with an inertia matrix another; a torque in
+    space or of the state has its own.
+    """
+    check_alike(scenes)
+    if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
+        raise InputError(NO_ATTITUDE)
+    times, n = rows_of("t_end", t_end), len(scenes)
+    check_rows("t_end", times, n)
+    times = spread(times, n)
+    found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
+    expect_bodies(n)
+    groups: dict[int, list[int]] = {}
+    for row, each in enumerate(scenes):
+        kind = row if is_solved_alone(each, {}) else -1 if each.inertia is not None else -2
+        groups.setdefault(kind, []).append(row)
+    for kind, rows in groups.items():
+        own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
+        # One scene is not worth the preparation of a vector kernel. With an array, even of the same
+        # torque, the body is solved alone.
+        alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
+        part = solve_many(own, times[rows], step=step, **alone, **settings)
+        found.omega[rows], found.status[rows] = part.omega, part.status
+        if found.attitude is not None:
+            found.attitude[rows] = part.attitude
+        if found.estimates is not None:
+            found.estimates[rows] = part.estimates
+    return found
+
+
+class _Bodies:
+    """The checked arguments of the kernel: `ready` rows of a scene, replaced by `own` arrays."""
+
+    def __init__(
+        self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
+        effort: float,
+    ) -> None:  # fmt: skip
+        given = checked_rows(own)
+        self.n = count_bodies(given)
+        rows = {**ready, **given}
+        self.by_moments = "moments" in (given if "coefficients" in given else rows)
+        self.body = rows["moments" if self.by_moments else "coefficients"]
+        self.rate, self.times = rows["torque_rate"], rows["t_end"]
+        self.attitude = rows.get("attitude0")
+        law: tuple[Array, Array, Array] | None = ready.get("merged")
+        if law is None or not given.keys().isdisjoint(_MERGED):
+            law = with_merged_rows(*(rows[name] for name in _MERGED))
+        self.constant, self.sines, self.cosines = law
+        self.omega0 = spread(rows["omega0"], self.n)
+        self.step = step
+        if not step > 0.0:
+            raise InputError(f"step is {step:g}; allowed: above 0")
+        self.code, self.tolerance, self.effort = code, tolerance, effort
+        if code == Methods.CLOSED_FORM:
+            self._check_form()
+
+    def _check_form(self) -> None:
+        torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
+        if any(each.any() for each in torques):
+            raise InputError(
+                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
+            )
+        if self.attitude is not None and not self.by_moments:
+            raise InputError(
+                "closed-form can't compute the attitude of bodies given by coefficients; "
+                "allowed: moments, or methods auto and taylor"
+            )
+
+    def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
+        found = place_for(out, self.n, self.attitude is not None, with_estimates)
+        if found.estimates is not None:
+            found.estimates[:] = _UNKNOWN
+        # A kernel may write a result before it reads the start again.
+        if np.may_share_memory(self.omega0, found.omega):
+            self.omega0 = self.omega0.copy()
+        attitude = self.attitude
+        if attitude is not None and np.may_share_memory(attitude, found.attitude):
+            self.attitude = attitude.copy()
+        for_each_piece(partial(self._enter, found), self.n, threads)
+        if found.estimates is not None:
+            found.estimates[~(found.estimates >= 0.0)] = np.nan
+        return found
+
+    def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
+        def part(array: Array) -> Array:
+            return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
+
+        extension().solve_ensemble(
+            self.code, self.tolerance, self.step, self.effort, self.by_moments,
+            part(self.body), part(self.constant), part(self.rate), part(self.sines),
+            part(self.cosines), part(self.omega0), part(self.times),
+            _NOTHING if self.attitude is None else part(self.attitude), given_up,
+            found.omega[piece].T,
+            _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
+            found.estimates_of(piece),
+        )  # fmt: skip
+
+
+def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
+    """Return the kernel's integer for a method, and the tolerance, or raise InputError."""
+    if not isinstance(method, str) or method not in PREPARED:
+        raise unknown("method", method, PREPARED)
+    finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
+    asked = requested_tolerance(method, tolerance)
+    if not finest <= asked <= 1.0:
+        raise InputError(f"tolerance is {asked:g}; allowed: {finest:g} to 1")
+    return (Methods.CLOSED_FORM_OR_TAYLOR if method == "auto" else CODES[method]), asked

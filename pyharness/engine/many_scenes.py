@@ -1,0 +1,182 @@
+"""Conversion of scenes to the arrays of `solve_many`."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pyharness.engine.prepared_inertia import axes_and_turn, rotated, turned_back
+from pyharness.model.arrays import check_rows, rows_of, unit_quaternions, waves_of
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import InputError
+from pyharness.model.principal import principal
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import Array
+from pyharness.model.waves import with_merged_rows
+
+_MOST_KEPT = 8  # scenes whose arrays are kept
+
+
+class Axes:
+    """The principal axes of n bodies, or of all, and conversions."""
+
+    def __init__(self, axes: Array, turns: Array) -> None:
+        """Store the axes, columns of `axes`, (n, 3, 3), also as quaternions, (n, 4)."""
+        self.axes, self.turns = axes, turns
+
+    def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
+        """Convert the arrays `omega0` and `attitude0` of `given`, if named, in place."""
+        if "omega0" in names:
+            rows = rows_of("omega0", given["omega0"], 3)
+            self._check("omega0", rows)
+            given["omega0"] = rotated(rows, self.axes.transpose(0, 2, 1))
+        if "attitude0" in names:
+            attitudes = unit_quaternions(rows_of("attitude0", given["attitude0"], 4))
+            self._check("attitude0", attitudes)
+            conjugate = self.turns * np.array([1.0, -1.0, -1.0, -1.0])
+            given["attitude0"] = turned_back(attitudes, conjugate)
+
+    def give_back(self, omega: Array, attitude: Array | None) -> None:
+        """Convert final omegas, (n, 3), and attitudes, (n, 4), in place."""
+        omega[:] = rotated(omega, self.axes)
+        if attitude is not None:
+            attitude[:] = turned_back(attitude, self.turns)
+
+    def _check(self, name: str, rows: Array) -> None:
+        if len(self.axes) != 1:
+            check_rows(name, rows, len(self.axes))
+
+
+def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
+    """Return scenes with full inertia matrices as arrays about principal axes; None as NaN.
+
+    They have A, B, C, which rounded moments would give less accurately.
+    """
+    each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
+    axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
+    return _stacked(each), axes
+
+
+_NONE = (math.nan, math.nan, math.nan)
+_REFUSED: dict[str, Any] = {
+    "coefficients": _NONE, "omega0": _NONE, "torque_constant": _NONE, "torque_rate": _NONE,
+    "sines": [], "cosines": [], "axes": np.eye(3), "turn": IDENTITY, "attitude0": None,
+}  # fmt: skip
+
+
+def _full_row(scene: Scene) -> dict[str, Any]:
+    turned, axes = principal(scene)
+    law, moments = turned.body_torque, np.array(turned.moments)
+    return {
+        "coefficients": turned.euler_coefficients,
+        "omega0": turned.omega,
+        "torque_constant": np.array(law.constant) / moments,
+        "torque_rate": np.array(law.rate) / moments,
+        "sines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.sines],
+        "cosines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.cosines],
+        "axes": axes,
+        "turn": axes_and_turn(scene)[1],
+        "attitude0": turned.attitude,
+    }
+
+
+def _filled(laws: list[Any]) -> list[Any]:
+    """Return lists of waves filled up to one length."""
+    most = max(map(len, laws))
+    return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
+
+
+def _from_scene(scene: Scene) -> dict[str, Any]:
+    law = checked_scene(scene).body_torque
+    kind = "coefficients" if scene.moments is None else "moments"
+    return {
+        kind: getattr(scene, kind),
+        "omega0": scene.omega,
+        "torque_constant": law.constant,
+        "torque_rate": law.rate,
+        "sines": [[*amplitude, frequency] for amplitude, frequency in law.sines],
+        "cosines": [[*amplitude, frequency] for amplitude, frequency in law.cosines],
+        "attitude0": scene.attitude,
+    }
+
+
+_kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
+
+
+def rows_of_scene(scene: Scene) -> dict[str, Any]:
+    """Return `checked_rows` of a scene, kept and not to be changed, and its `merged` torque.
+
+    For few bodies the conversion takes longer than the solution.
+    """
+    # Equal scenes may differ in the signs of zeros. Hence an entry holds for one object only, and
+    # keeps it alive so that no other object gets its identity.
+    found = _kept.get(id(scene))
+    if found is not None:
+        return found[1]
+    rows: dict[str, Any] = checked_rows(_from_scene(scene))
+    rows["merged"] = with_merged_rows(rows["torque_constant"], rows["sines"], rows["cosines"])
+    if len(_kept) >= _MOST_KEPT:
+        _kept.clear()
+    _kept[id(scene)] = scene, rows
+    return rows
+
+
+def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
+    """Return float arrays with one row per body, or one for all; raise InputError for others."""
+    rows = {}
+    for name, convert in _CONVERSIONS.items():
+        values = given.get(name)
+        if values is not None or (name == "t_end" and name in given):
+            rows[name] = convert(values)
+    return rows
+
+
+def check_alike(scenes: Sequence[Scene]) -> None:
+    """Raise InputError if scenes differ in having attitudes, or in step sizes."""
+    if len({each.step_size for each in scenes}) > 1:
+        raise InputError("the scenes have different step sizes; allowed: one step size for all")
+    if len({each.attitude is None for each in scenes}) > 1:
+        raise InputError(
+            "some of the scenes have an attitude and others have none; allowed: all, or none"
+        )
+
+
+def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
+    """Return arrays for scenes, or raise InputError if one kernel call can't solve all."""
+    if not scenes:
+        raise InputError("the sequence of scenes is empty; give at least one scene")
+    check_alike(scenes)
+    rows = [_from_scene(each) for each in scenes]
+    if len({"moments" in row for row in rows}) > 1:
+        raise InputError(
+            "some bodies are given by coefficients and others are not; allowed: "
+            "coefficients for all, or for none"
+        )
+    return _stacked(rows)
+
+
+def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {"attitude0": None}
+    for name in ("moments", "coefficients", "omega0", "torque_constant", "torque_rate"):
+        if name in rows[0]:
+            found[name] = np.array([row[name] for row in rows])
+    for name in ("sines", "cosines"):
+        found[name] = _filled([row[name] for row in rows])
+    if any(row["attitude0"] is not None for row in rows):
+        found["attitude0"] = np.array([row["attitude0"] or IDENTITY for row in rows])
+    return found
+
+
+# The arrays of `solve_many`, in the order in which they are checked.
+_CONVERSIONS: dict[str, Callable[[Any], Array]] = {
+    **{
+        name: lambda values, name=name: rows_of(name, values, 3)  # type: ignore[misc]
+        for name in ("omega0", "moments", "coefficients", "torque_constant", "torque_rate")
+    },
+    "sines": partial(waves_of, "sines"),
+    "cosines": partial(waves_of, "cosines"),
+    "t_end": partial(rows_of, "t_end"),
+    "attitude0": lambda values: rows_of("attitude0", values, 4),
+}

@@ -1,0 +1,39 @@
+"""Packing of a scene into one array for kernels."""
+
+import numpy as np
+
+from pyharness.dynamics.system import is_recorded, with_constant_body
+from pyharness.engine.problem import normalized, normalized_in_space, remainders
+from pyharness.engine.recorded import kernel_tape, system
+from pyharness.model.codes import Places
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+
+def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
+    """Return a scene and its method's settings as one array, in the order of `Places`."""
+    packed = np.zeros(Places.WAVES)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = scene.step_size
+    packed[Places.EFFORT] = effort
+    if is_recorded(scene):
+        return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+    coefficients, constant, rate, sines, cosines = _torque_of(scene)
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
+    packed[Places.CONSTANT : Places.RATE] = constant
+    packed[Places.RATE : Places.EFFORT] = rate
+    packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
+    packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
+    packed[Places.MOMENTS_LOW : Places.WAVES] = scene.moments_low
+    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
+
+
+def _torque_of(scene: Scene) -> tuple[Array, ...]:
+    if not scene.torque.in_space:
+        return normalized(scene)
+    # The ratios of the moments are left out, because the packed array contains the moments.
+    coefficients, _, *torque = normalized_in_space(scene)
+    return coefficients, *torque

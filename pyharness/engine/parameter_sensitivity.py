@@ -1,0 +1,195 @@
+"""Sensitivities: derivatives of a solution by parameters, by Taylor series."""
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.dynamics.parameters import (
+    ATTITUDE,
+    OMEGA0,
+    initial_state,
+    parameters_of,
+    varied_equations,
+)
+from pyharness.engine.closed_form import period_of
+from pyharness.engine.recorded import kernel_tape
+from pyharness.model.array_type import Array
+from pyharness.model.errors import InputError, TimedError, kind_of, unknown
+from pyharness.model.extension import COMPLETE, GAVE_UP, extension
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.tape import Tape
+from pyharness.model.trajectory import Trajectory
+
+# Largest tolerance of the derivatives of one period, and smallest tolerance of any.
+_OF_PERIOD, _FINEST = 1e-13, 1e-15
+# Change of omega in a period, relative, from which on the derivatives of the period are used.
+_VARIES = 1e-2
+_METHODS = ("auto", "taylor", "closed-form")
+_MOST_COLUMNS = 200
+_THREE = (0.0, 0.0, 0.0)  # as many values as omega0 and the attitude have
+# The parameters whose equations are periodic for a body without torque. The period depends on all
+# of them but the torque, under which it changes with time.
+_CONSTANT = "torque.constant"
+_PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
+
+
+def checked_names(
+    scene: Scene, names: Iterable[str], method: str, attitude: bool
+) -> tuple[str, ...]:
+    """Return the given names of parameters, each once.
+
+    Raise InputError if one is unknown, or its sensitivities can't be computed.
+    """
+    place = "sensitivities"
+    if method not in _METHODS:
+        raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
+    allowed = "allowed: names, as in ['omega0', 'moments']"
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise InputError(f"{place}: {kind_of(names)}; {allowed}")
+    if isinstance(scene.torque, StateTorque) and scene.torque.tape is None:
+        raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
+    values = parameters_of(scene)
+    known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
+    found: dict[str, None] = {}
+    for name in itertools.islice(names, _MOST_COLUMNS + 1):
+        if not isinstance(name, str):
+            raise InputError(f"{place}: {kind_of(name)}; {allowed}")
+        if name == ATTITUDE and not attitude:
+            raise InputError(f"{place}: the attitude is not computed; give attitude=True")
+        if name not in known:
+            raise unknown("parameter", name, known, place)
+        if values.get(name, _THREE) is None:
+            raise InputError(f"{place}: {name} is the name of two parameters; allowed: other names")
+        found[name] = None
+    if sum(len(values.get(name) or _THREE) for name in found) > _MOST_COLUMNS:
+        raise InputError(f"{place}: more than {_MOST_COLUMNS} values; give fewer names")
+    if found and not attitude and varied_equations(scene, tuple(found), False).tape.needs_attitude:
+        raise InputError(f"{place}: the torque depends on the attitude; give attitude=True")
+    return tuple(found)
+
+
+def sensitivities_at(
+    scene: Scene, found: Trajectory, names: Sequence[str], tolerance: float, effort: float
+) -> dict[str, Array]:
+    """Return the derivatives of `found` by name, of shape (n, 3, m) or (n, 7, m) for m values.
+
+    `tolerance` is relative to the largest in a column so far. Raise InputError if the work limit is
+    exceeded, or a derivative overflows.
+    """
+    if not names:
+        return {}
+    times, attitude = found.time, found.attitude is not None
+    # Near the separatrix, an error of omega as large as the distance from it would lead to the
+    # derivatives of another motion.
+    tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
+    # Only a closed form takes no evaluations.
+    is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
+    period = _period(scene) if is_closed else 0.0
+    # Two periods take as long as the calculation from one period.
+    if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):
+        columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
+    else:
+        columns, rows, _ = _by_series(scene, names, attitude, times, tolerance, effort)
+    return {name: rows[:, :, each] for name, each in columns.items()}
+
+
+def _by_series(
+    scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
+    effort: float,
+) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
+    """Return the columns of each name, all derivatives, and those at 0."""
+    equations = varied_equations(scene, names, attitude)
+    state, starts = initial_state(scene, equations)
+    packed, forcings = _packed(equations.tape, len(state), equations.forcings)
+    rows = np.empty((len(times), *starts.shape))
+    is_before = times < 0.0
+    for side in (is_before, ~is_before):
+        places = np.flatnonzero(side)
+        # Each side is computed from 0 outward.
+        places = places[np.argsort(np.abs(times[places]))]
+        if places.size:
+            own = times[places]
+            derivatives, n_rows, status = extension().tape_derivatives(
+                packed, state, starts, forcings, own, tolerance, effort
+            )
+            _check(status, n_rows, own, derivatives)
+            rows[places] = derivatives.transpose(2, 0, 1)
+    return equations.columns, rows, starts
+
+
+def _period(scene: Scene) -> float:
+    """Return the period of omega (s), or 0 if there is none, or omega is nearly constant."""
+    # A function that is 0 now, and has a parameter of this name, may depend on time.
+    period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
+    largest = math.hypot(*scene.omega)
+    return period if period * np.abs(_slope(scene)).max() > _VARIES * largest else 0.0
+
+
+def _slope(scene: Scene) -> Array:
+    """Return the derivative of omega at time 0 without torque."""
+    x, y, z = scene.omega
+    if scene.inertia is None:
+        return np.array(scene.euler_coefficients) * (y * z, z * x, x * y)
+    inertia, omega = np.array(scene.inertia), np.array(scene.omega)
+    slope: Array = -np.linalg.solve(inertia, np.cross(omega, inertia @ omega))
+    return slope
+
+
+def _by_periods(
+    scene: Scene, names: Sequence[str], times: Array, period: float, tolerance: float, effort: float
+) -> tuple[dict[str, slice], Array]:
+    """Return the columns of each name, and all derivatives of a periodic omega, shape (n, 3, m).
+
+    By Floquet's theorem, a perturbation of the initial omega changes the period, and grows by the
+    same multiple of the slope of omega in every period: M = I + N is the matrix of one period,
+    where N has rank 1, and N N = 0. Therefore k periods add up to M^k = I + k N, and the part F
+    that the parameters cause in the first period to k F + k (k - 1)/2 N F. The moments change the
+    period once and for all: their N F is 0.
+    """
+    whole = np.floor(times / period)
+    rest = times - whole * period
+    inner, place = np.unique(np.append(np.clip(rest, 0.0, period), period), return_inverse=True)
+    # The error of one period is repeated in every other one.
+    tolerance = min(tolerance, _OF_PERIOD)
+    columns, rows, starts = _by_series(
+        scene, (OMEGA0, *(x for x in names if x != OMEGA0)), False, inner, tolerance, effort
+    )
+    transition, last = rows[:, :, columns[OMEGA0]], rows[place[-1]]
+    slope = _slope(scene)
+    growth = slope @ (last[:, columns[OMEGA0]] - np.eye(3)) / (slope @ slope)
+    shear = np.outer(slope, growth)
+    forced = last - last[:, columns[OMEGA0]] @ starts
+    drift = np.zeros_like(forced)
+    if _CONSTANT in columns:
+        drift[:, columns[_CONSTANT]] = shear @ forced[:, columns[_CONSTANT]]
+    k = whole[:, None, None]
+    change = k * (shear @ starts + forced) + 0.5 * k * (k - 1.0) * drift
+    found = transition[place[:-1]] @ change + rows[place[:-1]]
+    return {name: columns[name] for name in names}, found
+
+
+def _packed(
+    tape: Tape, n_unknowns: int, forcings: NDArray[np.int32]
+) -> tuple[Array, NDArray[np.int32]]:
+    """Return a tape as the kernel reads it, with combinations in place of outputs."""
+    packed = kernel_tape(tape, n_unknowns)
+    # The outputs are the last combinations, which the array counts here.
+    first = int(packed[3]) - len(tape.outputs)
+    return packed, np.where(forcings > 0, forcings + first, 0).astype(np.int32)
+
+
+def _check(status: int, n_rows: int, times: Array, derivatives: Array) -> None:
+    """Raise InputError if derivatives are not complete or not finite."""
+    time = times[min(n_rows, len(times) - 1)]
+    if status == GAVE_UP:
+        raise TimedError(
+            "sensitivities exceeded their work limit before t = {time} s; use a shorter time, a "
+            "larger tolerance, or more effort",
+            time,
+        )
+    if status != COMPLETE or not np.isfinite(derivatives).all():
+        raise TimedError("sensitivities overflow before t = {time} s; use a shorter time", time)

@@ -1,0 +1,80 @@
+"""Events of a body without torque: those of one period, repeated."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pyharness.engine.event_functions import EventFunction
+from pyharness.model.array_type import Array
+from pyharness.model.errors import InputError
+from pyharness.model.symbols import Recorder
+from pyharness.model.tape import ATTITUDE, N_INPUTS, TIME
+
+# The events are found in so many periods, where the second and third have no end of the solution.
+PERIODS = 3.0
+_MOST_EVENTS = 5_000_000
+_BLOCK = 100_000  # events that are improved together
+# Half the distance at which the slope of a function is measured, in periods. It is the largest
+# correction of a time too.
+_PROBE = 1e-5
+# Largest error of the time of an event, in periods, before the time is improved.
+_MARGIN = 1e-6
+
+
+def are_of_omega(functions: Sequence[EventFunction]) -> bool:
+    """Return whether functions, called once with symbols, depend on omega and its slope alone."""
+    return all(map(_is_of_omega, functions))
+
+
+def _is_of_omega(g: EventFunction) -> bool:
+    recorder = Recorder(n_inputs=N_INPUTS + 3)
+    time, *state = recorder.inputs()
+    omega, attitude, rates = np.split(np.array(state, dtype=object), [3, 7])
+    try:
+        tape = recorder.tape([g.event.function(time, omega, attitude, rates)])
+    except Exception:  # the function may raise anything where it expects a number
+        return False
+    return tape.inputs.isdisjoint({TIME, *ATTITUDE})
+
+
+def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
+    """Return the times of events until `end`, and how many are those of `times`.
+
+    The latter (s) are of the first PERIODS periods. Raise InputError for too many events.
+    """
+    # An event at the end of a period may be found on either side of it, and is not lost here.
+    margin = _MARGIN * period
+    inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
+    if not inner.size:
+        # There may be an event at time 0 alone.
+        return times[times < period], len(times[times < period])
+    # No event is near the beginning of the period that is repeated.
+    phases = np.sort(inner % period)
+    gaps = np.diff(phases, append=phases[0] + period)
+    begin = period + phases[gaps.argmax()] + 0.5 * gaps.max()
+    begin -= period if begin > 2.0 * period else 0.0
+    first = times[times <= begin]
+    one = times[(times > begin) & (times <= begin + period)]
+    count = np.floor((end - begin) / period) + 1.0
+    if count * len(one) > _MOST_EVENTS:
+        raise InputError(
+            f"{where}: more than {_MOST_EVENTS} events; use a shorter time, or the attribute "
+            "terminal"
+        )
+    later = (one + period * np.arange(count)[:, None]).ravel()
+    return np.concatenate([first, later[later <= end]]), len(first)
+
+
+def improved(
+    g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
+) -> Array:
+    """Return the times (s) of events, after one Newton step."""
+    found, probe = times.copy(), _PROBE * period
+    for begin in range(0, len(times), _BLOCK):
+        block = times[begin : begin + _BLOCK]
+        before, value, after = (values(g, block + shift) for shift in (-probe, 0.0, probe))
+        with np.errstate(all="ignore"):
+            step = -value * 2.0 * probe / (after - before)
+        # A root without a sign change has no slope.
+        found[begin : begin + _BLOCK] += np.where(np.abs(step) < probe, step, 0.0)
+    return found

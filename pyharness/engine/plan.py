@@ -1,0 +1,161 @@
+"""The choice of the method and of the computed quantities."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from pyharness.engine.problem import closed_form
+from pyharness.engine.registry import REGISTRY, check_torque, requested_tolerance
+from pyharness.model.effort import waves
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
+
+FINEST = REGISTRY["auto"].finest
+# Under a torque with fast waves, Runge-Kutta, which averages them, may take fewer operations than a
+# Taylor series, or may be the only one that can solve the scene. The kernel chooses between the two
+# down to the smallest tolerance at which that was seen.
+RK4_OR_TAYLOR = "quick or taylor"
+_FEW_DIGITS = 1e-9
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The decision whether a part, such as ``torque``, is computed, and why."""
+
+    part: str
+    kept: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The choices that are made before a scene is solved: the method and the computed quantities.
+
+    `closed_form` is its kind, as ``sphere``; `fallback` a method if `method` can't solve the scene.
+    """
+
+    scene: Scene
+    method: str  # name of the method that was chosen or requested
+    closed_form: str | None  # sphere, symmetric or elliptic, if a closed form is used
+    fallback: str | None  # name of the method that is used if `method` refuses the scene
+    velocity: bool  # whether the translational velocity is requested
+    rows: bool  # whether intermediate output is requested
+
+    @cached_property
+    def decisions(self) -> tuple[Decision, ...]:
+        """Return a decision for each part of the scene's solution."""
+        return tuple(_decisions(self))
+
+    @property
+    def skipped(self) -> frozenset[str]:
+        """Return the names of the parts that are not computed."""
+        return frozenset(each.part for each in self.decisions if not each.kept)
+
+
+def plan(
+    scene: Scene,
+    method: str = "auto",
+    tolerance: float | None = None,
+    velocity: bool = False,
+    rows: bool = False,
+) -> Plan:
+    """Return the plan for a scene; `rows` requests intermediate output.
+
+    Raise InputError if the method can't solve the scene, or the tolerance is out of range.
+    """
+    tolerance = requested_tolerance(method, tolerance)
+    finest = REGISTRY["quick"].finest if method == "quick" else FINEST
+    if not finest <= tolerance <= 1.0:
+        place = " for quick" if method == "quick" else ""
+        raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
+    form = closed_form(checked_scene(scene, any_torque=True, any_state=True, changing=True))
+    # The plan includes the attitude if the torque needs it.
+    check_torque(scene, method, attitude=True)
+    fallback = None
+    if method == "auto":
+        few_digits = (
+            isinstance(scene.torque, TorqueLaw)
+            and scene.changing is None
+            and not scene.torque.in_space
+            and waves(scene) > 0
+            and tolerance >= _FEW_DIGITS
+        )
+        # Runge-Kutta has no intermediate output.
+        method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
+        # A perturbation of a rotation about the middle axis may be so small that its square, which
+        # the closed form needs, underflows. The Taylor series can propagate it.
+        fallback = "taylor" if form else None
+    elif method == "closed-form" and form is None:
+        raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
+    form = form if method == "closed-form" else None
+    return Plan(scene, method, form, fallback, velocity, rows)
+
+
+def _decisions(chosen: Plan) -> Iterator[Decision]:
+    scene = chosen.scene
+    closed = chosen.method == "closed-form"
+    if closed:
+        yield Decision("integration", False, f"closed form: {chosen.closed_form}")
+    else:
+        why = "requested" if closed_form(scene) else _why_no_form(scene)
+        yield Decision("integration", True, why)
+    yield from _of_body(scene, closed)
+    yield from _of_torque(scene.torque)
+    for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
+        if part == "attitude" and scene.torque.needs_attitude:
+            fixed = scene.torque.in_space
+            why = "the torque is fixed in space" if fixed else "the torque depends on it"
+            yield Decision(part, True, why)
+        else:
+            yield Decision(part, wanted, "requested" if wanted else "not requested")
+    wanted, why = chosen.rows, "intermediate output requested" if chosen.rows else "only the end"
+    if wanted and closed:
+        wanted, why = False, "closed form"
+    yield Decision("dense output", wanted, why)
+    # No prepared solver uses the reference solution or SciPy.
+    yield Decision("reference", False, "not requested")
+    yield Decision("SciPy", False, "our own kernels solve it")
+
+
+def _of_body(scene: Scene, closed: bool) -> Iterator[Decision]:
+    names = ("A w2 w3", "B w1 w3", "C w1 w2")
+    if scene.changing is not None:
+        for name in names:
+            yield Decision(name, True, "its inertia changes with time")
+        return
+    equal = ("I2 = I3", "I3 = I1", "I1 = I2")
+    for name, value, product in zip(names, scene.euler_coefficients, equal, strict=True):
+        if value != 0.0:
+            yield Decision(name, True, f"coefficient {value:g}")
+        elif closed:
+            yield Decision(name, False, product)
+        else:
+            # The kernels sum three products side by side in one register.
+            yield Decision(name, True, f"{product}: zero; costs no time beside the others")
+
+
+def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
+    if isinstance(torque, StateTorque):
+        count = "opaque" if torque.tape is None else f"{len(torque.tape.operations)} operations"
+        yield Decision("torque", True, f"depends on the state: {count}")
+        return
+    yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
+    for name, terms in (("sines", torque.sines), ("cosines", torque.cosines)):
+        acts = any(any(amplitude) for amplitude, _ in terms)
+        yield Decision(name, acts, f"{len(terms)} in the law" if acts else "none act")
+    varies = "the law varies" if torque.varies else "constant: read once"
+    yield Decision("torque of time", torque.varies, varies)
+
+
+def _why_no_form(scene: Scene) -> str:
+    if scene.changing is not None:
+        return "its inertia changes with time"
+    if isinstance(scene.torque, StateTorque):
+        return "its torque depends on the state"
+    if scene.torque.is_zero:
+        return "its coefficients let it grow without bound"
+    if scene.torque.in_space:
+        return "its torque is fixed in space"
+    return "it has a torque and is not a sphere"

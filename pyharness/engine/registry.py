@@ -1,0 +1,272 @@
+"""The registry of all methods that solve a scene."""
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pyharness.dynamics.system import is_recorded
+from pyharness.engine.problem import rows_trajectory
+from pyharness.engine.scipy_ivp import FINEST, scipy_method
+from pyharness.model.effort import Integrator
+from pyharness.model.errors import InputError
+from pyharness.model.principal import PrincipalScene
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import Number, tolerance_of
+
+# Smallest and default tolerances of Gauss collocation with 1 to 8 stages. For smaller tolerances
+# the low orders would need too many steps.
+_GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
+_GAUSS_DEFAULT = (1e-6, 1e-10, *6 * (1e-12,))
+# For SciPy's methods. Over a hundred radians with attitude, or if perturbations grow a
+# thousandfold, no method of SciPy meets a smaller tolerance, and Radau takes too long.
+_SCIPY_DEFAULT = 1e-8
+_DEFAULT = 1e-12
+
+
+@dataclass(frozen=True)
+class Method:
+    """The properties of a method, of this project or SciPy."""
+
+    name: str
+    title: str
+    source: str
+    finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
+    # The tolerance if none is requested: the smallest one that the method meets in ordinary scenes
+    # within a fraction of its work limit, but not below 1e-12; 1 if the method takes no tolerance.
+    default: float
+    solve: Integrator  # called with checked times on one side of 0, in order away from 0
+    gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
+    # `order` is the order of the global error in the step size, or 0 if the order varies.
+    # `evaluations` is the number of right-hand sides per step, or 0 if that number varies.
+    order: int = 0
+    evaluations: int = 0
+    any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
+    attitude: bool = False  # propagates the attitude together with omega
+    space_torque: bool = False  # takes a torque about the axes of space, together with attitude
+    # Takes a torque that depends on omega or attitude, and propagates the attitude under it.
+    state_torque: bool = False
+    # Takes weak torques alone, also a recorded one that depends on omega; computes no attitude.
+    weak_torque: bool = False
+    scipy: str = ""  # SciPy's name of the method; empty for our own methods
+
+    @property
+    def is_fixed_step(self) -> bool:
+        """Return whether the method has the scene's step size."""
+        return self.finest == 1.0
+
+
+def _reference(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    from pyharness.truth.reference import reference
+
+    result = reference(scene, times, effort=effort)
+    finite = np.isfinite(result.omega).all(axis=1)
+    if not finite.all():
+        return rows_trajectory([], result.omega[:0], 0, len(times), "overflow")
+    ended = "complete" if len(result.time) == len(times) else "overflow"
+    largest = max(*map(abs, scene.omega), float(np.abs(result.omega).max(initial=0.0)))
+    # An estimate of 0 would be a promise that nothing has tested. If the scene was transformed to
+    # principal axes, the rounding errors of the transformation are not estimated.
+    error = result.error / largest if largest and not isinstance(scene, PrincipalScene) else None
+    if error is not None and result.attitude is not None:
+        error = max(error, result.angle_error)
+    return rows_trajectory(
+        result.time.tolist(), result.omega, 0, len(times), ended, attitude=result.attitude,
+        error=error,
+    )  # fmt: skip
+
+
+def _no_rows(*given: object) -> Trajectory:
+    raise InputError(
+        "method 'quick' returns the state at one time only; use it with prepare, or give auto"
+    )
+
+
+def _from(room: str, name: str, *arguments: str | int) -> Integrator:
+    """Return a solver, `name` in the module `room`, that imports it when first called.
+
+    With arguments, `name` makes the solver.
+    """
+
+    def solve(*given: Any) -> Trajectory:
+        solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
+        trajectory: Trajectory = (solver(*arguments) if arguments else solver)(*given)
+        return trajectory
+
+    return solve
+
+
+def _scipy(scipy: str, title: str, source: str) -> Method:
+    source = f"scipy.integrate.solve_ivp; {source}"
+    return Method(
+        scipy.lower(),
+        title,
+        source,
+        FINEST[scipy],
+        _SCIPY_DEFAULT,
+        scipy_method(scipy),
+        attitude=True,
+        state_torque=True,
+        scipy=scipy,
+    )
+
+
+def _gauss(stages: int) -> Method:
+    return Method(
+        f"gauss-{stages}",
+        f"Gauss collocation of order {2 * stages}, steps halved until two agree",
+        "fortran/modern/gauss_collocation.f90; Hairer, McLachlan and Razakarivony 2008",
+        _GAUSS_FINEST[stages - 1],
+        _GAUSS_DEFAULT[stages - 1],
+        _from("gauss", "gauss", stages),
+        order=2 * stages,
+    )
+
+
+def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
+    title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
+    solve = _from("fixed_step", "fixed_step", name)
+    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
+
+
+REGISTRY = {
+    method.name: method
+    for method in (
+        Method(
+            "auto",
+            "closed form where there is one, else Taylor series",
+            "pyharness.engine.plan",
+            1e-15,
+            _DEFAULT,
+            _from("solve", "by_plan"),
+            attitude=True,
+            space_torque=True,
+            state_torque=True,
+        ),
+        _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
+        _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
+        _scipy("LSODA", "Adams and BDF with switching", "Petzold 1983"),
+        _scipy("Radau", "implicit Runge-Kutta of order 5", "Hairer and Wanner 1996, IV.8"),
+        Method(
+            "taylor",
+            "Taylor series by recurrence, step and order adapted",
+            "ours; Jorba and Zou 2005, Experimental Mathematics 14",
+            1e-15,
+            _DEFAULT,
+            _from("taylor", "taylor"),
+            attitude=True,
+            space_torque=True,
+            state_torque=True,
+        ),
+        Method(
+            "reference",
+            "known solution, or Taylor series in decimal arithmetic",
+            "pyharness.truth.reference",
+            2.0**-52,
+            _DEFAULT,
+            _reference,
+            any_scale=True,
+            attitude=True,
+            state_torque=True,
+        ),
+        Method(
+            "closed-form",
+            "known solution: sphere, or any body without torque by elliptic functions",
+            "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
+            1e-14,
+            _DEFAULT,
+            _from("closed_form", "known_solution"),
+            any_scale=True,
+            attitude=True,
+        ),
+        Method(
+            "averaged",
+            "two-scale averaging, for weak torques over very many revolutions",
+            "ours; Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics 61",
+            1e-13,
+            _DEFAULT,
+            _from("averaged", "averaged"),
+            weak_torque=True,
+        ),
+        *map(_gauss, range(1, 9)),
+        _fixed_step("improved-euler", "improved Euler", "Jacobs 1982, eq. 29", 2, 2),
+        _fixed_step("taylor-3", "three terms of the Taylor series", "Jacobs 1982, eq. 30", 2, 2),
+        _fixed_step("rk4", "classical Runge-Kutta", "Jacobs 1982, eq. 31", 4, 4),
+        Method(
+            "quick",
+            "Runge-Kutta in scaled unknowns, for few digits at the end",
+            "fortran/modern/scaled_runge_kutta.f90",
+            # At finer tolerances the rounding errors of its many steps would matter.
+            1e-12,
+            _DEFAULT,
+            _no_rows,
+            gives_rows=False,
+        ),
+    )
+}
+# The methods that return rows at requested times.
+METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
+FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
+GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
+# The methods with a prepared solver for a torque that depends on the state.
+PREPARED_FOR_STATE = ("auto", "taylor")
+# SciPy's name of each of its methods, by the name in this registry.
+SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
+
+
+def requested_tolerance(method: str, tolerance: Number | None) -> float:
+    """Return the tolerance, unchecked, or the method's default; raise InputError if no number."""
+    chosen = REGISTRY[method]
+    return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
+
+
+def check_attitude(method: str) -> None:
+    """Raise InputError if the method can't propagate the attitude."""
+    if not REGISTRY[method].attitude:
+        able = ", ".join(each.name for each in REGISTRY.values() if each.attitude)
+        raise InputError(f"method {method} does not compute attitudes; allowed: {able}")
+
+
+def check_prepared(scene: Scene, method: str) -> None:
+    """Raise InputError if no solver can be prepared, as only by series for torques of the state."""
+    if is_recorded(scene) and method not in PREPARED_FOR_STATE:
+        what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
+        raise InputError(
+            f"method {method} has no prepared solver for {what}; "
+            f"allowed: {', '.join(PREPARED_FOR_STATE)}, or the function solve"
+        )
+
+
+def check_torque(scene: Scene, method: str, attitude: bool) -> None:
+    """Raise InputError if the method can't solve a scene because of its torque."""
+    torque, chosen = scene.torque, REGISTRY[method]
+    kind = "a torque about the axes of space"
+    able: list[str] = []
+    if isinstance(torque, StateTorque):
+        kind = "a recorded torque, which is no TorqueLaw"
+        if torque.needs_attitude:
+            kind = "a torque that depends on the attitude"
+        if torque.tape is None and not chosen.scipy:
+            kind, able = "an opaque torque", list(SCIPY_METHODS)
+        elif chosen.weak_torque and scene.changing is not None:
+            kind = "an inertia that changes with time"
+            able = [each.name for each in REGISTRY.values() if each.state_torque]
+        elif not (chosen.state_torque or (chosen.weak_torque and not torque.needs_attitude)):
+            able = [each.name for each in REGISTRY.values() if each.state_torque]
+    elif scene.changing is not None and not chosen.state_torque:
+        kind = "an inertia that changes with time"
+        able = [each.name for each in REGISTRY.values() if each.state_torque]
+    elif torque.in_space and not chosen.space_torque and scene.changing is None:
+        able = [each.name for each in REGISTRY.values() if each.space_torque]
+    if able:
+        raise InputError(
+            f"method {method} can't solve a scene with {kind}; allowed: {', '.join(able)}"
+        )
+    if torque.needs_attitude and not attitude:
+        raise InputError(f"{kind} needs the attitude; give attitude=True, or --attitude FORM")

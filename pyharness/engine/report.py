@@ -1,0 +1,176 @@
+"""The reports of `run` and `plan`, and the picture of a trajectory."""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pyharness.model.listing import Listing
+from pyharness.model.report import Column, Picture, Report, Table, digits, words
+from pyharness.model.scene import Scene
+from pyharness.model.scene_report import ending, estimates, heading
+from pyharness.model.trajectory import Array, Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pyharness.engine.plan import Plan
+    from pyharness.truth.bounded import ErrorBound
+
+_NUMBER = digits(".6g")
+_TIMES = (
+    Column("time", _NUMBER, unit="s"),
+    Column("TIME", _NUMBER, unit="s", name="recorded_time"),
+)
+_OMEGA = tuple(Column(f"U{i}", _NUMBER, unit="rad/s", name=f"omega{i}") for i in (1, 2, 3))
+_VELOCITY = tuple(Column(f"V{i}", _NUMBER, unit="m/s", name=f"velocity{i}") for i in (1, 2, 3))
+_ATTITUDE = {
+    "quaternion": tuple(Column(f"q{i}", _NUMBER, name=f"q{i}") for i in range(4)),
+    "3-1-3": tuple(Column(name, _NUMBER, unit="deg") for name in ("phi", "theta", "psi")),
+    "3-2-1": tuple(Column(name, _NUMBER, unit="deg") for name in ("yaw", "pitch", "roll")),
+    "matrix": tuple(
+        Column(f"R{i}{j}", _NUMBER, name=f"R{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)
+    ),
+}
+_END: dict[str, Any] = {
+    "color": "black", "marker": "x", "linestyle": "none", "clip_on": False, "zorder": 5,
+}  # fmt: skip
+
+
+def trajectory_report(
+    scene: Scene,
+    method: str,
+    listing: Listing | None,
+    title: str,
+    trajectory: Trajectory,
+    form: str = "quaternion",
+    word: str | None = None,
+    bound: "ErrorBound | None" = None,
+) -> Report:
+    """Return the report of one trajectory of a scene, with a table of its rows and a picture.
+
+    `word` is a program's arithmetic if not binary64, and `form` that of the attitude:
+    ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound` is for the method `reference`.
+    """
+    columns = [*_TIMES, *_OMEGA]
+    parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
+    velocity = trajectory.velocity
+    if velocity is not None:
+        columns += _VELOCITY
+        parts.append(velocity)
+    attitude = trajectory.attitude
+    if attitude is not None:
+        columns += _ATTITUDE[form]
+        parts.append(_shown(attitude, form))
+    rows = np.column_stack(parts)
+    numbers = Table(columns, rows)
+    steps = np.arange(1, len(rows) + 1)
+    # The nine elements of a matrix fill the width of a terminal, so that most columns are omitted.
+    kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
+    counted = Table(
+        [Column("step", digits(".0f")), *(columns[k] for k in kept)],
+        np.column_stack([steps, rows[:, kept]]),
+    )
+
+    def record() -> dict[str, Any]:
+        from pyharness.model import records
+
+        return {
+            "scene": records.scene_record(scene),
+            "method": method,
+            "listing": None if listing is None else records.listing_record(listing),
+            **({} if word is None else {"word": word}),
+            "trajectory": {
+                "time": trajectory.time.tolist(),
+                "recorded_time": trajectory.recorded_time.tolist(),
+                "omega": trajectory.omega.tolist(),
+                "velocity": None if velocity is None else velocity.tolist(),
+                "attitude": None if attitude is None else attitude.tolist(),
+                "tolerance": trajectory.tolerance,
+                **records.estimate_record(trajectory),
+            },
+            **({} if bound is None else {"reference_bound": bound.record()}),
+            **records.ending_record(trajectory),
+            "build": records.build_record(),
+        }
+
+    return Report(
+        "run",
+        text=[
+            [*heading(scene), title],
+            [counted],
+            [ending(trajectory), *estimates(trajectory), *_bounds(bound)],
+        ],
+        record=record,
+        data=numbers,
+        pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
+    )
+
+
+def _bounds(bound: "ErrorBound | None") -> list[str]:
+    """Return lines that state the error of the reference."""
+    if bound is None:
+        return []
+    lines = [f"reference: error of any omega at most {bound.text()}"]
+    if bound.turned is not None:
+        lines.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
+    return lines + ([f"WARNING: {bound.warning}"] if bound.warning else [])
+
+
+def _shown(attitude: Array, form: str) -> Array:
+    from pyharness.model.attitude import SEQUENCES, angles, matrices
+
+    if form in SEQUENCES:
+        return angles(attitude, form)
+    return matrices(attitude).reshape(-1, 9) if form == "matrix" else attitude
+
+
+def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
+    from matplotlib.figure import Figure
+
+    has_attitude = trajectory.attitude is not None and len(trajectory.time) > 0
+    figure = Figure(figsize=(12.5 if has_attitude else 7.0, 7.0), dpi=110, layout="constrained")
+    marker = "o" if len(trajectory.time) == 1 else ""
+    style: dict[str, Any] = {"color": "black", "linewidth": 1.2, "marker": marker}
+    note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
+    left: Any = figure
+    if has_attitude:
+        from pyharness.engine.attitude_picture import draw_sphere
+
+        parts: Any = figure.subfigures(1, 2, width_ratios=(7.0, 5.5))
+        left, right = parts
+        draw_sphere(right.add_subplot(projection="3d"), trajectory)
+    axes = left.subplots(3, 1, sharex=True)
+    for row in range(3):
+        axes[row].plot(trajectory.time, trajectory.omega[:, row], **style)
+        if note:
+            mark_end(axes[row], trajectory, row)
+        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        axes[row].grid(visible=True, linewidth=0.3)
+    axes[2].set_xlabel("time (s)")
+    return Picture(figure, numbers, (title, note))
+
+
+def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
+    """Mark the last omega of a component by a cross, at the edge if outside the limits."""
+    bottom, top = axes.get_ylim()
+    axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
+    axes.set_ylim(bottom, top)
+
+
+def plan_report(scene: Scene, plan: "Plan") -> Report:
+    """Return the report of a plan: the method, and which parts are computed, and why."""
+    table = Table(
+        words("part computed why"),
+        [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],
+    )
+
+    def record() -> dict[str, Any]:
+        from pyharness.model.records import scene_record
+
+        decisions = [asdict(each) for each in plan.decisions]
+        found = {"method": plan.method, "closed_form": plan.closed_form, "decisions": decisions}
+        return {"scene": scene_record(scene), "plan": found}
+
+    head = [*heading(scene), f"method: {plan.method}"]
+    return Report("plan", text=[head, [table]], record=record, data=table)

@@ -1,0 +1,246 @@
+"""The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
+
+SciPy controls the local error of a step, our tolerance the error at the requested times. A
+preliminary integration with few digits supplies what relates them: the largest |omega|, the phase,
+in proportion to which local errors add up, and the error amplification.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness.engine.linearised import growth, propagators
+from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, Run, rows_of
+from pyharness.engine.scipy_run import RightHandSide as RightHandSide
+from pyharness.engine.scipy_state import finest_of_state, solve_state
+from pyharness.engine.sensitivity import is_sensitive, torque_noise
+from pyharness.model.effort import Integrator, waves
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import ROUNDING, Trajectory
+from pyharness.scenes.rescaled import omega_by_torque
+
+# Largest ratio of the error at the end to the local error. The first table applies to a motion of a
+# few radians. The second table is added for each radian, multiplied by the error amplification.
+# Both were measured on random scenes that the checks do not use, and were increased by half.
+_SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
+_SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
+# The ratio that is added for each radian by which the body rotates, if its attitude is requested.
+# The reason is that an error of omega changes the attitude until the end.
+_SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
+# The local tolerance compensates for an error amplification up to this value. Beyond it, the error
+# grows in proportion to the amplification, as with every method.
+_SENSITIVE = 1e3
+# Factor on the bound of the error if there is intermediate output. Such output is interpolated by a
+# polynomial in each step, whose error is not controlled.
+_ROWS = 4.0
+# Longest step, in radians of a torque wave. A method that samples a fast wave always at the same
+# phase treats it as a constant torque, although the error estimates are small.
+_WAVE_STEP = 2.0
+# FINEST has the tolerances that the methods claim to meet in motions of a few radians.
+_A_FEW = 1.05
+FINEST = {name: _A_FEW * FINEST_STEP * total for name, total in _SUM.items()}
+
+_COARSE = 1e-3
+# The preliminary integration is repeated if the expected omega exceeds the largest omega of the
+# solution by this factor.
+_FAR = 4.0
+_MOST_GUESSES = 200
+_NODES_PER_RADIAN = 4.0
+_FEWEST_NODES, _MOST_NODES = 30, 20_000
+
+# Work limit, five to ten seconds of Python. Each wave of a torque adds an eighth to the cost of a
+# right-hand side; Radau also solves linear systems.
+_MOST_EVALUATIONS = 500_000
+_RADAU_SHARE = 2
+
+
+class _Ahead(NamedTuple):
+    largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
+    # Integral over time of the largest coefficient times |omega|, plus the phases of the torque
+    # waves (rad). The phase of a wave is limited in proportion to the omega that it can add.
+    radians: float
+    growth: float  # error amplification until the end, at least 1
+    turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
+
+
+def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
+    """Return a bound of the ratio of an error at the end to that per step; angles are in rad."""
+    found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
+    return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
+
+
+def finest_tolerance(name: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that SciPy's `name` can meet to `time` (s)."""
+    if isinstance(scene.torque, StateTorque):
+        return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
+    ahead = _Run(scene, time, name).ahead()
+    return FINEST_STEP * steps_sum(name, *ahead[1:])
+
+
+def scipy_method(name: str) -> Integrator:
+    """Return an integrator by SciPy's method `name`, which chooses the local tolerance."""
+
+    def solve(
+        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    ) -> Trajectory:
+        if isinstance(scene.torque, StateTorque):
+            return solve_state(name, scene, times, tolerance, effort, _most(name, effort))
+        if times[-1] == 0.0:
+            return rows_of(times, np.array([state_of(scene)]), 0, 0, "complete")
+        run = _Run(scene, times[-1], name, effort)
+        try:
+            ahead = run.ahead()
+            if ahead.largest == 0.0:
+                # The body is at rest, and no torque acts.
+                rest = np.tile(state_of(scene), (len(times), 1))
+                return rows_of(times, rest, run.evaluations, len(times), "complete")
+            run.add_attitude()
+            total = steps_sum(name, *ahead[1:])
+            finest = FINEST_STEP * total
+            if tolerance < finest * (1.0 - 1e-9):
+                raise InputError(
+                    f"tolerance is {tolerance:g}; {run.label} can't meet it over "
+                    f"{ahead.radians:.3g} radians in which perturbations grow "
+                    f"{ahead.growth:.3g} times; allowed for this motion: {finest * 1.06:.2g} to 1, "
+                    "or a shorter time"
+                )
+            if len(times) > 1:
+                total *= _ROWS
+            step = max(FINEST_STEP, tolerance / total)
+            noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
+            is_blurred = noise > 0.0 and is_sensitive(ahead.growth, tolerance, noise)
+            if is_blurred:
+                # No step has an error below the rounding of the torque, and the step-size control
+                # would search long for one.
+                step = max(step, ROUNDING * noise)
+            allowed = step * ahead.largest
+            # The step is limited by the fastest wave that can change omega by more than the local
+            # tolerance over the whole time.
+            waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
+            fastest = max(waves_that_count, default=0.0)
+            longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
+            sizes = [allowed] * 3 + [step] * (len(run.start) - 3)
+            result = run.solved(name, step, sizes, times, longest)
+            low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
+            if result.status == 1 and low <= 0.0 <= high:
+                # Omega is bounded, but its phase can't be computed beyond this time.
+                raise run.phase_error(float(result.t_events[0][0]))
+        except NoNumberError:
+            nothing = np.empty((0, len(run.start)))
+            return rows_of([], nothing, run.evaluations, len(times), "overflow")
+        rows = result.y.T if len(result.t) else np.empty((0, len(run.start)))
+        finite = np.isfinite(rows).all(axis=1)
+        count = len(rows) if finite.all() else int(np.argmin(finite))
+        ended = "complete" if count == len(times) else "overflow"
+        if ended == "complete" and is_blurred:
+            ended = "sensitive"
+        # SciPy does not report the number of steps. The right-hand sides include those of the
+        # preliminary integration.
+        return rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
+
+    return solve
+
+
+def state_of(scene: Scene) -> tuple[float, ...]:
+    """Return omega (rad/s), and the quaternion if any, at time 0."""
+    return (*scene.omega, *(scene.attitude or ()))
+
+
+def with_attitude(slopes: RightHandSide) -> RightHandSide:
+    """Return the right-hand side for omega and attitude, q' = q (0, omega)/2, from omega's."""
+
+    def both(time: float, state: Sequence[float]) -> list[float]:
+        x, y, z, a, b, c, d = state
+        return [
+            *slopes(time, (x, y, z)),
+            -0.5 * (b * x + c * y + d * z),
+            0.5 * (a * x + c * z - d * y),
+            0.5 * (a * y + d * x - b * z),
+            0.5 * (a * z + b * y - c * x),
+        ]
+
+    return both
+
+
+def _most(name: str, effort: float) -> float:
+    """Return the work limit, in right-hand sides, without waves."""
+    return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
+
+
+class _Run(Run):
+    def __init__(self, scene: Scene, end: float, name: str, effort: float = 1.0) -> None:
+        self.scene = scene
+        rate = max(map(abs, scene.euler_coefficients))
+        most = int(_most(name, effort) * 8 / (8 + waves(scene)))
+        super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
+
+    def add_attitude(self) -> None:
+        if self.scene.attitude is not None:
+            self.start = state_of(self.scene)
+            self.slopes = with_attitude(self.slopes)
+
+    def _scale_by_torque(self) -> float:
+        """Return a bound of |omega| (rad/s) by the torque alone; 1 if not finite."""
+        bound = omega_by_torque(self.scene, self.end)
+        return bound if math.isfinite(bound) else 1.0
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def ahead(self) -> _Ahead:
+        """Integrate with few digits, and return the quantities that set the local tolerance.
+
+        The absolute tolerance is a fraction of an estimate of the largest |omega|: the initial one
+        or, at rest, that by the torque; if the solution is much smaller, the integration is
+        repeated. If omega grows without bound, the estimate, or the omega by torque alone if
+        larger, replaces the largest, and phase and amplification are 0 and 1.
+        """
+        scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
+        if scale == 0.0:
+            return _Ahead(0.0, 0.0, 1.0)
+        for _ in range(_MOST_GUESSES):
+            coarse = self.solved("RK45", _COARSE, _COARSE * scale)
+            sizes = np.nan_to_num(np.abs(coarse.y), nan=0.0, posinf=0.0)
+            largest = float(sizes.max(initial=0.0))
+            if not 0.0 < largest < scale / _FAR:
+                break
+            scale = largest
+        if coarse.status != 0:
+            # No tolerance can be met until the end, because omega grows without bound or its phase
+            # has no correct digit left.
+            return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
+        length = abs(float(coarse.t[-1]) * self.unit)
+        count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
+        times = np.linspace(0.0, float(coarse.t[-1]), max(_FEWEST_NODES, min(_MOST_NODES, count)))
+        omega = np.nan_to_num(coarse.sol(times).T)
+        sizes = np.abs(omega).max(axis=1)
+        largest = max(largest, float(sizes.max()))
+        radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
+        turned = 0.0
+        if self.scene.attitude is not None:
+            turned = length * float(np.linalg.norm(omega, axis=1).mean())
+        with np.errstate(all="ignore"):
+            flow = propagators(self.scene, times * self.unit, omega)
+        return _Ahead(largest, radians, growth(np.nan_to_num(flow)), turned)
+
+
+def _pushes(scene: Scene) -> list[tuple[float, float]]:
+    """Return the largest component of each wave, over its moment (1/s2), and the frequency."""
+    moments = scene.moments or (1.0, 1.0, 1.0)
+    return [
+        (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
+        for amplitude, frequency in scene.law.sines + scene.law.cosines
+    ]
+
+
+def _turned(scene: Scene, span: float, largest: float) -> float:
+    """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
+
+    Each is at most the omega that the wave can add, relative to `largest`.
+    """
+    found = 0.0
+    for push, frequency in _pushes(scene):
+        found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)
+    return found

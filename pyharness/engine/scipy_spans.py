@@ -1,0 +1,82 @@
+"""The Taylor series of a recorded torque, beside an integration of it by SciPy.
+
+SciPy may pass a short change of the torque. Where the results differ, the steps of the series bound
+SciPy's.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness.engine.stepper import steps_to
+from pyharness.model.array_type import Array
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+
+# SciPy's longest step over the steps of the series. LSODA evaluates a torque once in a step.
+_PART = 0.5
+# Of the series: equations so stiff that it has more are left to SciPy's implicit methods.
+_MOST_STEPS = 20_000
+# Largest ratio of the steps of the series in a span.
+_RATIO = 8.0
+# Tolerance of a step of the series, over that of the result.
+_FINER = 0.01
+
+
+class Span(NamedTuple):
+    """A part of an integration: its end, and its longest step (s)."""
+
+    end: float
+    longest: float
+
+
+class Beside(NamedTuple):
+    """The rows of a series, and the spans that its steps bound."""
+
+    rows: Array  # shape (n, 3) or (n, 7)
+    spans: list[Span]
+
+
+def bounds_of(scene: Scene, end: float) -> list[float]:
+    """Return the times (s) at which a table changes before `end`, and `end`."""
+    torque = scene.torque
+    assert isinstance(torque, StateTorque)
+    breaks = [] if torque.tape is None else torque.tape.breaks
+    return sorted({*(time for time in breaks if 0.0 < time / (end or 1.0) < 1.0), end}, key=abs)
+
+
+def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:
+    """Return the series of a recorded torque at `times` (s); None if it does not reach the end."""
+    end, bounds = times[-1], bounds_of(scene, times[-1])
+    attitude = scene.attitude is not None
+    rows = [[*scene.omega, *(scene.attitude or ())]] if times[0] == 0.0 else []
+    lengths: dict[float, float] = {}
+    reached = 0.0
+    for before, stepper in steps_to(scene, attitude, end, _FINER * tolerance, _MOST_STEPS):
+        reached = stepper.time
+        lengths[reached] = abs(reached - before)
+        after = len(rows)
+        while after < len(times) and abs(times[after]) <= abs(reached):
+            after += 1
+        rows += stepper.at(times[len(rows) : after]).T.tolist()
+    if reached != end:
+        return None
+    return Beside(np.array(rows), _spans(lengths, bounds))
+
+
+def _spans(lengths: dict[float, float], bounds: Sequence[float]) -> list[Span]:
+    spans: list[Span] = []
+    least, most, last = math.inf, 0.0, 0.0
+    for time, length in lengths.items():
+        if time in bounds:
+            # It was cut, and says nothing.
+            spans.append(Span(time, _PART * (length if least == math.inf else least)))
+            least, most, last = math.inf, 0.0, 0.0
+            continue
+        if max(most, length) > _RATIO * min(least, length) and last:
+            spans.append(Span(last, _PART * least))
+            least, most = math.inf, 0.0
+        least, most, last = min(least, length), max(most, length), time
+    return spans

@@ -1,0 +1,360 @@
+"""SciPy's methods for torques that depend on the state, recorded or opaque.
+
+How such a torque amplifies local errors is unknown. Therefore the local tolerance is reduced until
+the difference of two integrations shows that the second meets the tolerance.
+"""
+
+import math
+import warnings
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pyharness.dynamics.system import slopes_of
+from pyharness.engine.scipy_run import (
+    FINEST_STEP,
+    NoNumberError,
+    RightHandSide,
+    Run,
+    rows_of,
+)
+from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
+from pyharness.model.errors import InputError, TimedError, printable
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Array, Trajectory
+
+# Ratio of the tolerance to the first local tolerance: an ordinary ratio of the error to the local
+# error in a motion of a few radians.
+_FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
+# Smallest and largest ratio of a local tolerance to the next.
+_RATIO, _LARGEST_RATIO = 8.0, 1e3
+# Safety factor on the error of the second of two integrations. The error is estimated from their
+# difference, in proportion to the local tolerances, but by no less than a fraction of it. The
+# errors of LSODA, which also changes its order, are not in proportion to the local tolerances, and
+# neither are those under a torque that jumps, as an opaque function may.
+_SAFETY = 4.0
+_LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
+# The longest step is the time span over this number, which grows with each integration, so that two
+# of them can't pass a short pulse or sample a wave in the same way.
+_FEWEST_STEPS, _MORE_STEPS = 32, 7
+_COARSE = 1e-3
+# The preliminary integration of a body at rest is repeated if omega is smaller than expected by
+# this factor.
+_FAR = 4.0
+_MOST_GUESSES = 200
+# LSODA does not return if its steps no longer change the time.
+_MOST_STUCK = 50
+# An omega that has grown by this factor when the phase is too large grows without bound.
+_UNBOUNDED = 1e3
+# Largest difference from the series of a recorded torque, in tolerances.
+_AGREEMENT = 0.5
+_ORDINARY = 1e100  # rad/s; products of such are numbers
+# Local tolerances of the two integrations that determine the smallest tolerance.
+_TRIAL = (1e-7, 1e-8)
+# Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
+# of a tape; and of an opaque function.
+_WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
+
+
+class _Rows(NamedTuple):
+    state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
+    is_complete: bool  # whether there is a row for each time
+    largest: float  # largest abs(omega) of any component from 0 to the end (rad/s)
+
+
+def solve_state(
+    name: str,
+    scene: Scene,
+    times: Sequence[float],
+    tolerance: float,
+    effort: float,
+    most: float,
+) -> Trajectory:
+    """Return the trajectory of a scene whose torque depends on the state, by SciPy's `name`.
+
+    The error at `times` (s), from the difference of two integrations, is at most `tolerance`.
+    `most` is the work limit in right-hand sides of a body without torque.
+
+    It ends with ``overflow`` before omega grows without bound or the torque is singular, and is
+    ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
+    opaque function fails, the attitude is missing, or tolerance or work limit can't be met.
+    """
+    run = _StateRun(scene, times[-1], name, effort, most)
+    nothing = np.empty((0, len(run.start)))
+    if run.is_singular():
+        run.check_undefined()
+        return rows_of([], nothing, 1, len(times), "overflow")
+    if times[-1] == 0.0:
+        return rows_of(times, np.array([run.start]), 1, 0, "complete")
+    found = _solved(run, times, tolerance)
+    is_checked = True
+    if run.is_smooth:
+        beside = series_beside(scene, times, tolerance)
+        is_checked = beside is not None
+        if beside and not _agrees(found, beside.rows, tolerance):
+            run.spans = beside.spans
+            found = _solved(run, times, tolerance)
+    if not found.is_complete:
+        run.check_undefined()
+    count = len(found.state)
+    ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
+    return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+
+
+def _solved(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
+    scale = run.expected_omega()
+    if scale == 0.0:
+        # The body is at rest, and no torque acts.
+        return _Rows(np.tile(run.start, (len(times), 1)), True, 0.0)
+    return _refined(run, times, tolerance, scale)
+
+
+def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
+    if len(found.state) < len(rows):
+        return False
+    largest = max(found.largest, float(np.abs(rows[:, :3]).max()))
+    first, second = found._replace(largest=largest), _Rows(rows, True, largest)
+    return _difference(first, second) <= _AGREEMENT * tolerance
+
+
+def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
+    """Return an estimate of the smallest tolerance to `time` (s); 0 if the end is not reached."""
+    run = _StateRun(scene, time, name, 1.0, most)
+    scale = 0.0 if run.is_singular() else run.expected_omega()
+    if scale == 0.0:
+        return 0.0
+    first, second = (run.rows([time], local, scale) for local in _TRIAL)
+    if not (first.is_complete and second.is_complete):
+        return 0.0
+    return 1.5 * _SAFETY * FINEST_STEP * _difference(first, second) / _TRIAL[0]
+
+
+def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
+    """Return results whose estimated error is at most `tolerance`, or raise InputError."""
+    local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
+    before, ratio = run.rows(times, local, scale), _RATIO
+    while True:
+        finer = max(FINEST_STEP, local / ratio)
+        after = run.rows(times, finer, scale)
+        difference = _difference(before, after)
+        ratio = local / finer
+        least = _LEAST_FRACTION[run.name] if run.is_smooth else 1.0
+        error = difference * min(1.0, max(least, _SAFETY / ratio))
+        same_end = before.is_complete == after.is_complete
+        if error <= tolerance and same_end and len(before.state) == len(after.state):
+            return after
+        if finer == FINEST_STEP:
+            if not (before.is_complete or after.is_complete):
+                # Near the time at which omega becomes infinite no row has the digits.
+                return _agreeing(before, after, tolerance)
+            raise InputError(
+                f"tolerance is {tolerance:g}; {run.label} can't meet it here, because two "
+                "integrations with the smallest local tolerances "
+                + (f"differ by {difference:.2g}; " if same_end else "end at different times; ")
+                + f"allowed for this motion: {_allowed(error)}, or a shorter time"
+            )
+        # The next integration should have a quarter of the allowed error.
+        ratio = min(_LARGEST_RATIO, max(_RATIO, 4.0 * difference / (ratio * tolerance)))
+        before, local = after, finer
+
+
+def _allowed(error: float) -> str:
+    return f"{2.0 * error:.2g} to 1" if 0.0 < error < 0.5 else "a larger tolerance"
+
+
+def _difference(before: _Rows, after: _Rows) -> float:
+    """Return the largest difference, relative or as an angle (rad)."""
+    n = min(len(before.state), len(after.state))
+    return float(_differences(before, after, n).max(initial=0.0))
+
+
+def _differences(before: _Rows, after: _Rows, n: int) -> Array:
+    first, second = before.state[:n], after.state[:n]
+    if before.is_complete and after.is_complete:
+        largest = min(before.largest, after.largest)
+    else:
+        # The largest omega until the end does not exist.
+        largest = float(np.abs(second[:, :3]).max(initial=0.0))
+    apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
+    found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)
+    if first.shape[1] > 3:
+        # The angle is twice the distance of two unit quaternions on the sphere.
+        turned = 2.0 * np.linalg.norm(first[:, 3:] - second[:, 3:], axis=1)
+        found = np.maximum(found, turned)
+    return found
+
+
+def _agreeing(before: _Rows, after: _Rows, tolerance: float) -> _Rows:
+    n = min(len(before.state), len(after.state))
+    while n and _differences(before, after, n).max() > tolerance:
+        n -= 1
+    return after._replace(state=after.state[:n])
+
+
+class _StateRun(Run):
+    def __init__(self, scene: Scene, end: float, name: str, effort: float, most: float) -> None:
+        torque = scene.torque
+        assert isinstance(torque, StateTorque)
+        if torque.needs_attitude and scene.attitude is None:
+            raise InputError(
+                "a torque that depends on the attitude needs it; give attitude=True, or "
+                "--attitude FORM"
+            )
+        work = _OPAQUE_WORK
+        if torque.tape is not None:
+            work = _OPERATION_WORK * (
+                len(torque.tape.operations) + sum(len(each.terms) for each in torque.tape.outputs)
+            )
+        slopes = slopes_of(scene)
+        rate = max(map(abs, scene.euler_coefficients))
+        limit = int(most * _WORK / (_WORK + work))
+        start = (*scene.omega, *(scene.attitude or ()))
+        own = self._between_breaks(slopes)
+        if torque.tape is None:
+            own = self._guarded(slopes)
+        super().__init__(start, own, rate, end, name, effort, limit)
+        self.name = name
+        self.is_smooth = torque.tape is not None
+        self._between = -math.inf, math.inf
+        self._undefined: float | None = None
+        self._integrations = 0
+        self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+        self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
+
+    def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
+        """Return a right-hand side in which a table changes just after a breakpoint."""
+
+        def between(time: float, state: Sequence[float]) -> list[float]:
+            low, high = self._between
+            return slopes(min(max(time, low), high), state)
+
+        return between
+
+    def _guarded(self, slopes: RightHandSide) -> RightHandSide:
+        """Return a right-hand side that raises InputError if an opaque function fails.
+
+        The time of a NaN is kept: it is no failure if SciPy passes it by shorter steps.
+        """
+
+        def guarded(time: float, state: Sequence[float]) -> list[float]:
+            try:
+                found = slopes(time, state)
+            except InputError:
+                raise
+            except Exception as error:
+                raise TimedError(
+                    f"[torque]: the function raised {type(error).__name__} at t = {{time}} s: "
+                    f"{printable(str(error))}; allowed: a function that returns three components "
+                    "in N m",
+                    float(time),
+                ) from error
+            # A large omega may be about to become infinite.
+            if any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY:
+                self._undefined = float(time)
+            return found
+
+        return guarded
+
+    def check_undefined(self) -> None:
+        """Raise InputError after a NaN of an opaque function since the last step."""
+        if self._undefined is not None:
+            raise TimedError(
+                "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
+                "components in N m",
+                self._undefined,
+            )
+
+    def after_step(self, time: float, state: Sequence[float]) -> None:
+        """Raise NoNumberError if the steps are too short."""
+        self._stuck = self._stuck + 1 if time == self._reached else 0
+        if self._stuck > _MOST_STUCK:
+            raise NoNumberError
+        self._reached = time
+        omega = max(map(abs, state[:3]))
+        if math.isfinite(omega):
+            self._largest = max(self._largest, float(omega))
+            if not self._stuck:
+                self._undefined = None
+
+    def is_singular(self) -> bool:
+        """Return whether a rate at 0 is not finite; SciPy's first step would never end."""
+        self.evaluations += 1
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            return not all(map(math.isfinite, self.slopes(0.0, self.start)))
+
+    def expected_omega(self) -> float:
+        """Return the largest |omega| (rad/s) with few digits.
+
+        Where that ends early, it is the initial one, or what the initial torque causes.
+        """
+        scale = max(map(abs, self.start[:3])) or self._pushed()
+        for _ in range(_MOST_GUESSES):
+            found = self.rows([self.end], _COARSE, scale)
+            if not found.is_complete:
+                return scale
+            if not 0.0 < found.largest < scale / _FAR:
+                return found.largest
+            scale = found.largest
+        return scale
+
+    def _pushed(self) -> float:
+        """Return the |omega| (rad/s) to which its largest torque brings a body at rest."""
+        times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            rates = [abs(rate) for time in times for rate in self.slopes(time, self.start)[:3]]
+        self.evaluations += len(times)
+        omega = max(filter(math.isfinite, rates), default=0.0) * abs(self.end)
+        return omega if 0.0 < omega < math.inf else 1.0
+
+    def rows(self, times: Sequence[float], local: float, scale: float) -> _Rows:
+        """Return the states at the first of `times` (s); `local` is relative to `scale` (rad/s)."""
+        self._integrations += 1
+        sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
+        longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
+        rows = np.empty((0, len(self.start)))
+        state, begin, self._largest = self.start, 0.0, 0.0
+        # SciPy does not know where a table changes: each integration ends there.
+        for end, most in self.spans:
+            own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
+            wanted = own if own and own[-1] == end else [*own, end]
+            self._between = _interior(begin, end)
+            found = self._from(begin, state, wanted, local, sizes, min(longest, most), scale)
+            rows = np.concatenate([rows, found[: len(own)]])
+            if len(found) < len(wanted):
+                break
+            state, begin = found[-1].tolist(), end
+        return self._found(rows, len(times))
+
+    def _from(
+        self, begin: float, state: Sequence[float], wanted: list[float], local: float,
+        sizes: Sequence[float], longest: float, scale: float,
+    ) -> Array:  # fmt: skip
+        while wanted:
+            self._reached, self._stuck = begin, 0
+            try:
+                result = self.solved(self.name, local, sizes, wanted, longest, begin, state)
+            except NoNumberError:
+                # SciPy returned no rows. They exist at the times before that of the failure.
+                wanted = [time for time in wanted if abs(time) < abs(self._reached)]
+                continue
+            if result.status == 1 and self._largest < _UNBOUNDED * scale:
+                raise self.phase_error(float(result.t_events[0][0]))
+            # SciPy returns an empty list if it reached no time.
+            return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
+        return np.empty((0, len(self.start)))
+
+    def _found(self, rows: Array, wanted: int) -> _Rows:
+        rows = np.reshape(rows, (-1, len(self.start)))
+        finite = np.isfinite(rows).all(axis=1)
+        rows = rows if finite.all() else rows[: int(np.argmin(finite))]
+        if rows.shape[1] > 3:
+            unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+            rows = np.hstack([rows[:, :3], unit])
+        return _Rows(rows, len(rows) == wanted, self._largest)
+
+
+def _interior(first: float, second: float) -> tuple[float, float]:
+    inner = math.nextafter(first, second), math.nextafter(second, first)
+    return min(inner), max(inner)

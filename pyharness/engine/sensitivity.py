@@ -1,0 +1,104 @@
+"""Sensitivity of a motion to rounding errors."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pyharness.engine.problem import closed_form, known, normalized
+from pyharness.engine.taylor import taylor
+from pyharness.model.errors import InputError
+from pyharness.model.extension import extension
+from pyharness.model.principal import PrincipalScene
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import ROUNDING
+from pyharness.scenes.rescaled import rescaling_factor, scaled
+
+# A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
+# the tolerance. The fraction allows for a factor of three, by which the computed amplification may
+# be too small because of the norm and of the number of perturbations.
+_SHARE = 0.3
+# Relative error of a closed form in addition to an amplified rounding error: the bound that
+# `tests/engine/test_closed_form.py` checks.
+_CLOSED_FORM_ERROR = 16.0 * ROUNDING
+# Settings of a Taylor series that supplies only the error amplification: a large tolerance, and a
+# work limit of a twentieth of a second.
+_COARSE = 1e-3
+_LITTLE_WORK = 5e-3
+
+
+def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
+    """Return whether rounding errors, times `growth` (1 + `noise`), exceed 0.3 tolerances."""
+    return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
+
+
+def torque_noise(
+    scene: Scene,
+    omega0: Triple,
+    t_end: float,
+    steps: float = math.inf,
+    scale: float | None = None,
+) -> float:
+    """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
+
+    It is relative to each term, not to their small sum: the ratio of the omegas which the terms
+    would cause alone until `t_end` (s), with rounding in each of `steps` steps, to `scale`, by
+    default the initial |omega| (rad/s) or that by the whole torque. It is 0 if terms do not nearly
+    cancel, or depend on the state and are unknown.
+    """
+    if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
+        return 0.0
+    if scale is None:
+        scale = -max(map(abs, omega0))
+    return float(
+        extension().torque_noise_ratio(*normalized(scene)[1:], t_end, min(steps, 1e300), scale)
+    )
+
+
+def closed_form_estimate(
+    scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
+) -> tuple[float | None, float | None]:
+    """Return the estimated error of a closed form at `t_end` (s), and the amplification, or None.
+
+    The error is relative to the largest |omega| so far, or the angle (rad) if larger.
+    """
+    growth: float | None = 1.0
+    # A sphere does not amplify perturbations.
+    if any(scene.euler_coefficients):
+        growth = known(extension().torque_free_growth(scene.euler_coefficients, omega0, t_end))
+    if growth is None:
+        return None, None
+    error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
+    if isinstance(scene, PrincipalScene) and scene.attitude is not None:
+        # The initial omega was rounded after the rotation to principal axes. This error of omega
+        # causes an error of the angle that grows with time.
+        error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
+    return error, growth
+
+
+def motion_growth(scene: Scene, t_end: float) -> float | None:
+    """Return the error amplification of a motion to `t_end` (s), or None if unknown.
+
+    It is from the closed form, else from a Taylor series with few digits.
+    """
+    if isinstance(scene.torque, StateTorque):
+        return _recorded_growth(scene, t_end)
+    if closed_form(scene):
+        _, growth = closed_form_estimate(scene, scene.omega, t_end)
+        if growth is not None:
+            return growth
+    factor = rescaling_factor(scene, t_end)
+    near_one = scaled(replace(scene, step_size=1.0, steps=1), factor)
+    work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0, 0.0])
+    _, n_rows, _, _ = extension().taylor_rows(
+        *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
+    )
+    return known(work[3]) if n_rows else None
+
+
+def _recorded_growth(scene: Scene, t_end: float) -> float | None:
+    try:
+        return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
+    except InputError:
+        return None

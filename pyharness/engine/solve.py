@@ -1,0 +1,289 @@
+"""The function `solve`, which computes the trajectory of a scene at given times by any method.
+
+It integrates from 0 in each direction, and rescales time, so that products of two components of
+omega neither overflow nor underflow.
+"""
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pyharness.dynamics.system import with_constant_body
+from pyharness.engine.continuous import solution_of, with_events, with_events_reversed
+from pyharness.engine.event_functions import event_functions
+from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
+from pyharness.engine.plan import plan
+from pyharness.engine.registry import (
+    METHODS,
+    SCIPY_METHODS,
+    Method,
+    check_attitude,
+    check_torque,
+    requested_tolerance,
+)
+from pyharness.engine.scipy_ivp import finest_tolerance
+from pyharness.engine.sides import in_reverse, joined
+from pyharness.engine.stepper import with_reason
+from pyharness.model.array_type import Array
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.effort import checked_effort
+from pyharness.model.errors import InputError, TimedError, unknown
+from pyharness.model.principal import in_scene_axes, principal
+from pyharness.model.scene import Scene, checked_scene, most_steps
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import Number, Numbers, boolean, number, number_list
+from pyharness.model.waves import with_merged_waves
+from pyharness.scenes.rescaled import (
+    has_ordinary_rows,
+    is_ordinary,
+    rescaling_factor,
+    scaled,
+    unscaled,
+)
+
+
+def solve(
+    scene: Scene,
+    times: Number | Numbers,
+    method: str = "auto",
+    tolerance: Number | None = None,
+    *,
+    effort: float = 1.0,
+    attitude: bool = False,
+    dense_output: bool = False,
+    events: object = None,
+    sensitivities: Iterable[str] | None = None,
+) -> Trajectory:
+    """Solve a scene at given times.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    times : float or iterable of float, shape (n,)
+        Times of the results (s), strictly monotonic, on one or both sides of 0.
+    method : str
+        A name in `pyharness.engine.registry.METHODS`.
+    tolerance : float
+        Largest allowed error of a component of omega at `times`, relative to the largest one from 0
+        on. The default depends on the method, 1e-12 for `auto`. A method with a fixed step takes
+        none.
+    effort : float
+        Factor on the work limit; 1 means some ten seconds.
+    attitude : bool
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0); the tolerance also
+        applies to its angle (rad). A torque that depends on it, or is about the axes of space,
+        requires it.
+    dense_output : bool
+        Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
+        within the tolerance. Its polynomials take further integrations; with a fixed step they are
+        cubics on each step.
+    events : callable, Event, or list of these
+        Functions of `(t, omega)` or `(t, omega, attitude)`, perhaps of `pyharness.events`, whose
+        roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
+        as in SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept
+        arrays are called with them.
+    sensitivities : iterable of str
+        Names of parameters; `sensitivities` of the trajectory has the derivatives of omega, and of
+        the quaternion, with respect to each: `omega0`; `moments`, `coefficients`, or `inertia`
+        (columns I11, I22, I33, I12, I13, I23); `attitude`, small initial rotations (rad) about the
+        body axes; `torque.NAME`, with NAME a constant of a scene file's expressions, a keyword
+        argument of a function with a number as its default, or `constant`, `rate`, `sines`,
+        `cosines` of a TorqueLaw (four columns a wave: amplitude, frequency). They need the method
+        `auto`, `taylor` or `closed-form`.
+
+    Returns
+    -------
+    Trajectory
+        One row per time, in the order of `times`, none beyond an overflow. Under a torque about the
+        axes of space, `error` is the difference of two integrations, and `growth` is None.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, or can't take the scene or its attitude; if a torque lacks the
+        attitude it needs; if the times are not in order; if a changing moment reaches 0; if the
+        tolerance can't be met within `effort`; if dense output needs too many polynomials; if an
+        event has other arguments or results; if sensitivities can't be computed.
+    NotBuiltError
+        If the method needs the extension, and it is not built.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, solve
+    >>> solve(case_scene(1), [1.0, 2.0]).omega
+    array([[3.5, 3.5, 3.5],
+           [6. , 6. , 6. ]])
+    """
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    attitude = boolean("attitude", attitude)
+    dense_output = boolean("dense_output", dense_output)
+    if not isinstance(method, str) or method not in METHODS:
+        raise unknown("method", method, METHODS)
+    chosen = METHODS[method]
+    tolerance = requested_tolerance(method, tolerance)
+    if chosen.is_fixed_step and tolerance != 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; {method} has a fixed step and no tolerance; give none"
+        )
+    if not chosen.finest <= tolerance <= 1.0:
+        raise InputError(
+            f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
+        )
+    check_torque(scene, method, attitude)
+    functions = None if events is None else event_functions(events, attitude)
+    names = None if sensitivities is None else checked_names(scene, sensitivities, method, attitude)
+    if attitude:
+        check_attitude(method)
+    given = scene
+    # An attitude that was not requested is not computed.
+    start = (scene.attitude or IDENTITY) if attitude else None
+    if start is not scene.attitude:
+        scene = replace(scene, attitude=start)
+    axes = None
+    if scene.inertia is not None:
+        scene, axes = principal(scene)
+    moments = scene.changing or scene.moments
+    values, turned = _ascending(times)
+    if scene.changing is not None:
+        scene.changing.check((values[0], values[-1]))
+        # The reference has equations of its own for such a scene.
+        scene = scene if method == "reference" else with_constant_body(scene)
+    # The reference rounds no amplitude.
+    if method != "reference" and isinstance(scene.torque, TorqueLaw):
+        scene = with_merged_waves(scene)
+    effort = checked_effort(effort)
+    below = [t for t in values if t < 0.0]
+    # The times on either side of 0, in order away from 0.
+    sides = (below[::-1], values[len(below) :])
+    parts = [
+        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort), each[-1])
+        for each in sides
+        if each
+    ]
+    if below:
+        parts[0] = in_reverse(parts[0])
+    found = parts[0] if len(parts) == 1 else joined(*parts)
+    reported = None if chosen.is_fixed_step else tolerance
+    found = replace(found, moments=moments, tolerance=reported, scene=given)
+    if axes is not None:
+        found = in_scene_axes(found, axes)
+    if found.ended == "unchecked" and (dense_output or functions is not None):
+        raise InputError(
+            f"dense output and events of {method} need the series of a recorded torque, which ends "
+            "before the last time; allowed: a smooth torque, or opaque(function)"
+        )
+    rows = partial(_more_rows, given, method, effort, found.attitude is not None)
+    if dense_output:
+        found = replace(found, sol=solution_of(given, found, rows, method, tolerance))
+    if functions is not None:
+        ends = values[0], values[-1]
+        found = with_events(given, found, functions, ends, rows, method, tolerance)
+        if turned or (len(values) == 1 and values[0] < 0.0):
+            found = with_events_reversed(found)
+    found = in_reverse(found) if turned else found
+    if names is not None:
+        slopes = sensitivities_at(given, found, names, tolerance, effort)
+        found = replace(found, sensitivities=slopes)
+    return found
+
+
+def _more_rows(
+    scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
+) -> Trajectory:
+    return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
+
+
+def finest(method: str, scene: Scene, time: float) -> float:
+    """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
+
+    For SciPy's methods it grows with many local errors, none below some 2e-14, and amplification.
+    """
+    claimed = METHODS[method].finest
+    if method not in SCIPY_METHODS or time == 0.0:
+        return claimed
+    factor = rescaling_factor(scene, time)
+    met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
+    return max(claimed, met)
+
+
+def by_plan(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Return the trajectory at `times` (s) by the method `auto`: the plan's, or its fallback."""
+    chosen = plan(scene, "auto", tolerance, rows=True)
+    method = METHODS[chosen.method]
+    try:
+        # A closed form has only rounding errors. Therefore it is also used for tolerances below
+        # the smallest one that it claims to meet.
+        return method.solve(scene, times, tolerance, effort)
+    except InputError as refusal:
+        if chosen.fallback is None:
+            raise
+        try:
+            return METHODS[chosen.fallback].solve(scene, times, tolerance, effort)
+        except InputError:
+            raise refusal from None
+
+
+def _integrate(
+    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
+) -> Trajectory:
+    """Return the trajectory, on one side of 0, solved in a suitable unit of time."""
+    if not chosen.is_fixed_step and not is_ordinary(scene.omega):
+        # The method does not use the step size, but in the new unit it might not be finite.
+        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
+    factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
+    if factor == 1.0:
+        return chosen.solve(scene, times, tolerance, effort)
+    faster = [t / factor for t in times]
+    try:
+        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
+    except TimedError as refusal:
+        raise refusal.slower(factor) from refusal.__cause__
+    if isinstance(scene.torque, StateTorque) and not has_ordinary_rows(found):
+        # The omega that the torque causes is larger than it was estimated to be.
+        return chosen.solve(scene, times, tolerance, effort)
+    return unscaled(found, times, factor)
+
+
+def _ascending(times: object) -> tuple[list[float], bool]:
+    """Return times (s) in ascending order, and whether reversed, or raise InputError."""
+    if _are_ascending_floats(times):
+        return times.tolist(), False  # type: ignore[attr-defined]
+    if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
+        times = (times,)
+    if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
+        times = times.tolist()
+    entries = number_list("times", times, "allowed: a number, or numbers in order")
+    most = most_steps()
+    values = [number("times", each) for each in itertools.islice(entries, most + 1)]
+    if not values:
+        raise InputError("times: none is given; give at least one time")
+    if len(values) > most:
+        raise InputError(
+            f"times: more than {most} times, which this machine's memory can't hold; use fewer"
+        )
+    if not all(map(math.isfinite, values)):
+        raise InputError("times: a number is not finite; allowed: finite numbers")
+    turned = values[0] > values[-1]
+    if turned:
+        values.reverse()
+    if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
+        raise InputError("times: not strictly monotonic; give increasing or decreasing times")
+    return values, turned
+
+
+def _are_ascending_floats(times: object) -> bool:
+    return (
+        isinstance(times, np.ndarray)
+        and (times.dtype, times.ndim) == (np.float64, 1)
+        and 0 < len(times) <= most_steps()
+        and bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all())
+    )

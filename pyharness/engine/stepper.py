@@ -1,0 +1,363 @@
+"""A motion step by step, while the user changes torque or state."""
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+
+from pyharness.dynamics.system import is_recorded, with_constant_body
+from pyharness.engine.recorded import kernel_tape
+from pyharness.engine.singular import SingularError, undefined_operation
+from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
+from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
+from pyharness.model.errors import InputError
+from pyharness.model.scene import CHANGING, Scene, checked_scene
+from pyharness.model.state_torque import StateTorque, of_law, torque_of
+from pyharness.model.symbols import MOST_OPERATIONS, Recorder
+from pyharness.model.tape import Tape, float_outputs
+from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.values import boolean, finite, number, three_floats, tolerance_of
+
+_FINEST = 1e-14  # smallest tolerance of a step
+_DEFAULT = 1e-9
+_MOST_STEPS = 200_000  # whose lengths are listed
+
+
+class Stepper:
+    """A motion that is computed step by step by Taylor series.
+
+    It is for simulations in which something happens between the steps: a controller changes its
+    torque, a mass is released, an impact changes omega. Otherwise `pyharness.solve` is faster, and
+    estimates its error.
+
+    Parameters
+    ----------
+    scene : Scene
+        The body, its torque and its omega at time 0. Moments or inertia do not change with time,
+        and the torque is not opaque.
+    tolerance : float, optional
+        The largest error of a step: of a component of omega, relative to the largest |omega| so
+        far, and of the attitude's angle (rad). Default is 1e-9.
+    attitude : bool, optional
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0). A torque that depends on
+        it, or is about the axes of space, requires it.
+
+    Attributes
+    ----------
+    time : float
+        The time (s); 0 at first.
+    omega : ndarray, shape (3,)
+        The angular velocity (rad/s). It may be set.
+    attitude : ndarray, shape (4,), or None
+        The quaternion from body to space, scalar first. It may be set.
+    held_torque : ndarray, shape (3,)
+        A torque about the body axes (N m; with Euler coefficients an acceleration, 1/s^2), added to
+        that of the scene and held until it is set again, even if the scene is; 0 at first.
+    scene : Scene
+        The scene. Another one may be set; time, omega and attitude continue.
+    steps : int
+        The number of steps so far.
+
+    Raises
+    ------
+    InputError
+        If the scene can't be computed step by step, or an argument is out of range.
+
+    Examples
+    --------
+    A brake reduces a speed of 2 rad/s, until it is 1 rad/s:
+
+    >>> from pyharness import Scene, Stepper
+    >>> wheel = Stepper(Scene("wheel", (0.0, 0.0, 2.0), moments=(1.0, 1.0, 2.0)))
+    >>> wheel.held_torque = (0.0, 0.0, -0.5)
+    >>> while wheel.omega[2] > 1.0 + 1e-6:
+    ...     wheel.until(wheel.time + 0.25)
+    >>> wheel.held_torque = (0.0, 0.0, 0.0)
+    >>> wheel.until(10.0)
+    >>> wheel.omega.round(6)
+    array([0., 0., 1.])
+    """
+
+    # Another name that is set, such as `torque`, is an error.
+    __slots__ = (
+        "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_packed", "_scene", "_state",
+        "_steps", "_tape", "_time", "_tolerance", "_trial",
+    )  # fmt: skip
+
+    def __init__(
+        self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
+    ) -> None:
+        attitude = boolean("attitude", attitude)
+        self._time = 0.0
+        self._steps = 0
+        self._tolerance = tolerance_of(tolerance, _FINEST)
+        if not _FINEST <= self._tolerance <= 1.0:
+            raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
+        self._n = 7 if attitude else 3
+        self._state = np.zeros(self._n + 3)
+        self._change(scene)
+        self._state[:3] = scene.omega
+        if attitude:
+            self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
+        self._origin = [0.0, *self._state.tolist()]
+        self._trial, self._largest = LONGEST_TRIAL, 0.0
+        self._last = Step(0.0, self._state[None], self._state, 0)
+        self._begin = 0.0
+
+    @property
+    def time(self) -> float:
+        """The time (s)."""
+        return self._time
+
+    @property
+    def steps(self) -> int:
+        """The number of steps so far."""
+        return self._steps
+
+    @property
+    def scene(self) -> Scene:
+        """The scene; its omega and attitude are those of time 0."""
+        return self._scene
+
+    @scene.setter
+    def scene(self, scene: Scene) -> None:
+        self._change(scene)
+
+    @property
+    def omega(self) -> Array:
+        """The angular velocity (rad/s), shape (3,)."""
+        return _fixed(self._state[:3])
+
+    @omega.setter
+    def omega(self, values: Sequence[float] | Array) -> None:
+        self._set(slice(0, 3), _three("omega", values))
+
+    @property
+    def attitude(self) -> Array | None:
+        """The quaternion from body to space, scalar first, shape (4,), or None."""
+        return _fixed(self._state[3:7]) if self._n == 7 else None
+
+    @attitude.setter
+    def attitude(self, values: Sequence[float] | Array) -> None:
+        if self._n == 3:
+            raise InputError("attitude is not computed; allowed: Stepper(scene, attitude=True)")
+        self._set(slice(3, 7), unit_quaternion("attitude", values)[0])
+
+    @property
+    def held_torque(self) -> Array:
+        """The torque that is added to that of the scene (N m, body axes), shape (3,)."""
+        return _fixed(self._state[self._n :])
+
+    @held_torque.setter
+    def held_torque(self, values: Sequence[float] | Array) -> None:
+        self._set(slice(self._n, None), _three("held_torque", values))
+
+    def step(self, longest: float = math.inf) -> float:
+        """Take one step, as long as the tolerance allows, and return the new time (s).
+
+        `longest` is the longest step (s); a negative one leads to earlier times. A step ends where
+        a table of the torque changes. Raise InputError if `longest` is too small to change the
+        time, or not a number, and if the motion or its torque is singular.
+        """
+        longest = number("longest", longest)
+        end = self._time + longest
+        if not abs(end - self._time) > 0.0:
+            least = 0.5 * math.ulp(self._time)
+            raise InputError(
+                f"longest is {longest:g} s; allowed: a positive or negative number, larger than "
+                f"{least:g} at this time"
+            )
+        stop = self._next_break(longest > 0.0)
+        if stop is not None and abs(stop - self._time) < abs(longest):
+            end, longest = stop, stop - self._time
+        taken = self._taken(longest)
+        self._begin, self._last = self._time, taken
+        is_cut = self._time + taken.h == self._time + longest
+        # A step that was cut says nothing of the next one.
+        self._trial = max(self._trial, abs(taken.h)) if is_cut else abs(taken.h)
+        self._time = end if is_cut else self._time + taken.h
+        self._state = taken.state.copy()
+        self._state[3 : self._n] = _normalised(self._state[3 : self._n])
+        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
+        self._steps += 1
+        return self._time
+
+    def _taken(self, longest: float) -> Step:
+        scale = self._scale()
+        while True:
+            tolerances = np.full(len(self._state), math.inf)
+            tolerances[:3] = self._tolerance * scale
+            tolerances[3 : self._n] = 0.5 * self._tolerance
+            trial = math.copysign(min(self._trial, abs(longest)), longest)
+            taken = taylor_step(
+                self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
+            )
+            if taken.h == 0.0:
+                raise self._singular()
+            # The omega that a body at rest is about to reach was a guess.
+            reached = float(np.abs(taken.state[:3]).max())
+            if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
+                return taken
+            scale, self._trial = reached, abs(taken.h)
+
+    def until(self, time: float) -> None:
+        """Take steps to `time` (s), later or earlier; raise InputError as `step` does."""
+        end = finite("time", time)
+        while self._time != end:
+            self.step(end - self._time)
+            # The sum of time and difference is rounded.
+            if abs(self._time - end) <= math.ulp(end):
+                self._time = end
+
+    def at(self, times: float | Sequence[float] | Array) -> Array:
+        """Return the state at times (s) within the last step, before anything was set.
+
+        It is omega (rad/s), shape (3,), or with the quaternion, shape (7,); one column for each of
+        n times. Raise InputError for a time outside the step.
+        """
+        try:
+            given: Array = np.asarray(times, dtype=float)
+        except (OverflowError, TypeError, ValueError):
+            raise InputError(f"times are {times!r}; allowed: numbers") from None
+        low, high = sorted((self._begin, self._begin + self._last.h))
+        # The end of a step is rounded.
+        slack = 4.0 * math.ulp(max(abs(low), abs(high)))
+        if not np.all((given >= low - slack) & (given <= high + slack)):
+            raise InputError(f"t is outside the last step; allowed: {low!r} to {high!r} s")
+        share: Any = (given - self._begin) / (self._last.h or 1.0)
+        state: Array = polyval(share, self._last.terms[:, : self._n])
+        state[3:] = _normalised(state[3:])
+        return state
+
+    def _change(self, scene: Scene) -> None:
+        checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+        if scene.changing is not None:
+            raise InputError(CHANGING)
+        torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
+        if torque.tape is None:
+            raise InputError(
+                "an opaque torque can't be computed step by step; allowed: a torque that can be "
+                "recorded, or held_torque"
+            )
+        if torque.needs_attitude and self._n == 3:
+            raise InputError("the torque depends on the attitude; give attitude=True")
+        self._tape = _equations(scene, torque.tape, self._n == 7)
+        self._packed = kernel_tape(self._tape)
+        self._breaks = self._tape.breaks
+        self._scene = scene
+
+    def _singular(self) -> SingularError:
+        before = [self._begin, *self._last.terms[0].tolist()]
+        end = [self._time, *self._state.tolist()]
+        what = undefined_operation(self._tape, self._origin, before, end)
+        return SingularError(what, self._time)
+
+    def _set(self, place: slice, values: Sequence[float]) -> None:
+        self._state = self._state.copy()
+        self._state[place] = values
+        if self._steps == 0:
+            self._last = Step(0.0, self._state[None], self._state, 0)
+
+    def _scale(self) -> float:
+        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
+        if self._largest > 0.0:
+            return self._largest
+        # The omega that a body at rest is about to reach.
+        try:
+            rates = float_outputs(self._tape, [self._time, *self._state.tolist()])
+        except ArithmeticError:
+            return 1.0
+        return math.sqrt(max(map(abs, rates[:3]))) or 1.0
+
+    def _next_break(self, forward: bool) -> float | None:
+        if forward:
+            place = bisect_right(self._breaks, self._time)
+            return self._breaks[place] if place < len(self._breaks) else None
+        place = bisect_left(self._breaks, self._time)
+        return self._breaks[place - 1] if place else None
+
+
+def steps_to(
+    scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
+) -> Iterator[tuple[float, Stepper]]:
+    """Yield the beginning (s) of each step from 0 to `end`, and the stepper after it.
+
+    They end before a singularity, and after `most` steps.
+    """
+    stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
+    with suppress(SingularError):
+        while abs(stepper.time) < abs(end) and stepper.steps < most:
+            before = stepper.time
+            stepper.step(end - before)
+            yield before, stepper
+
+
+def step_lengths(
+    scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
+) -> dict[float, float]:
+    """Return the lengths (s) of the steps to `end`, by their ends, without those at `bounds`."""
+    cuts = frozenset(bounds)
+    return {
+        stepper.time: abs(stepper.time - before)
+        for before, stepper in steps_to(scene, attitude, end, tolerance)
+        if stepper.time not in cuts
+    }
+
+
+def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
+    """Return a trajectory with the reason if its torque is not defined."""
+    if found.ended != "overflow" or not is_recorded(scene):
+        return found
+    try:
+        stepper = Stepper(with_constant_body(scene), attitude=scene.attitude is not None)
+        while abs(stepper.time) < abs(end) and stepper.steps < _MOST_STEPS:
+            stepper.step(end - stepper.time)
+    except SingularError as error:
+        if error.what:
+            return replace(found, ended="singular", reason=str(error))
+    except InputError:
+        pass
+    return found
+
+
+def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
+    """Return the equations for omega, attitude if computed, and held torque as a tape."""
+    n = 7 if attitude else 3
+    recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
+    time, *unknowns = recorder.inputs()
+    omega: Any = np.array(unknowns[:3], dtype=object)
+    q: Any = unknowns[3:n] or IDENTITY
+    total = torque_of(torque, time, omega, q) + np.array(unknowns[n:], dtype=object)
+    if scene.inertia is None:
+        x, y, z = omega
+        products = np.array([y * z, z * x, x * y], dtype=object)
+        moments = np.array(scene.moments or (1.0, 1.0, 1.0))
+        rates: Any = np.array(scene.euler_coefficients) * products + total / moments
+    else:
+        inertia = np.array(scene.inertia)
+        rates = np.linalg.inv(inertia) @ (total - np.cross(omega, inertia @ omega))
+    rates = list(rates)
+    if attitude:
+        rates += quaternion_rates(omega, q)
+    return recorder.tape([*rates, 0.0, 0.0, 0.0])
+
+
+def _three(name: str, values: object) -> tuple[float, ...]:
+    return tuple(finite(name, each) for each in three_floats(name, values))
+
+
+def _fixed(values: Array) -> Array:
+    """Return a copy that can't be changed, as that would not change the motion."""
+    found = values.copy()
+    found.setflags(write=False)
+    return found
+
+
+def _normalised(q: Array) -> Array:
+    """Return quaternions of norm 1, (4,) or (4, n), or an empty array."""
+    return q / np.sqrt(np.sum(q * q, axis=0)) if len(q) else q

@@ -1,0 +1,57 @@
+"""Integration by Taylor series, with adapted order and step size."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pyharness.engine.problem import known, normalized, normalized_in_space, trajectory_of
+from pyharness.engine.recorded import kernel_tape, system
+from pyharness.model.attitude import IDENTITY
+from pyharness.model.effort import advice
+from pyharness.model.errors import TimedError
+from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.scene import Scene
+from pyharness.model.state_torque import StateTorque
+from pyharness.model.trajectory import Array, Trajectory
+
+
+def taylor(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+) -> Trajectory:
+    """Return the trajectory of a scene at `times` (s) by Taylor series, repeated if inaccurate.
+
+    `evaluations` are the series of all integrations. Under a torque about the axes of space, these
+    differ by the estimated error, and `growth` is unknown. Raise InputError for an opaque torque,
+    and if the work limit is exceeded.
+    """
+    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
+    # The first column is the attitude at time 0. A column for each time follows.
+    n_attitudes = 0 if scene.attitude is None else len(times)
+    joint = np.empty((4, n_attitudes + 1), order="F")
+    joint[:, 0] = scene.attitude or IDENTITY
+    kernel, given = series_kernel(scene)
+    rows, n_rows, status, steps = getattr(extension(), kernel)(
+        *given, scene.omega, times, tolerance,
+        n_attitudes=n_attitudes, attitudes=joint, effort=work,
+    )  # fmt: skip
+    if status == GAVE_UP:
+        # After one step it is a forecast.
+        how = "would exceed" if steps == 1 else "exceeded"
+        count = "" if steps == 1 else f" after {steps} steps"
+        raise TimedError(
+            f"taylor {how} its work limit before t = {{time}} s{count}; "
+            + advice("use a shorter time or a larger tolerance", effort, work[1]),
+            times[n_rows],
+        )
+    error, growth = map(known, work[2:4])
+    attitudes = joint[:, 1:] if n_attitudes else None
+    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
+
+
+def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
+    """Return the name and first arguments of the kernel; raise InputError if opaque."""
+    if isinstance(scene.torque, StateTorque):
+        return "tape_rows", (kernel_tape(system(scene)),)
+    if scene.torque.in_space:
+        return "space_torque_rows", normalized_in_space(scene)
+    return "taylor_rows", normalized(scene)

@@ -1,0 +1,236 @@
+"""Taylor series as a method of `scipy.integrate.solve_ivp`, for any differential equation.
+
+The order is fixed; the last terms decide the step (Jorba and Zou 2005, Experimental Mathematics 14,
+section 3).
+"""
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+from scipy.integrate import DenseOutput, OdeSolver
+
+from pyharness.engine.recorded import kernel_tape
+from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
+from pyharness.model.errors import InputError
+from pyharness.model.symbols import Recorder, called_once, recorded_twice
+from pyharness.model.tape import Tape
+from pyharness.model.trajectory import Array
+from pyharness.model.values import number
+
+_MOST_OPERATIONS = 20_000
+# The least relative tolerance that SciPy's methods allow.
+_LEAST_RTOL = 100.0 * np.finfo(float).eps
+# The least error that is distinguished from 0; its reciprocal is a number too.
+_LEAST_SCALE = 2.0**-1000
+# `solve_ivp` takes an event function that is 0 at the start for one that changes sign in the first
+# step if it has another root there, and misses pairs of roots. The state changes by this part in
+# the first step, and following steps grow at most so many times, as those of SciPy's methods.
+_FIRST_CHANGE = 0.01
+_MOST_GROWTH = 10.0
+_FIRST_PARTS = 1e-12, 1e-2  # of the step that the tolerances allow
+
+
+class Taylor(OdeSolver):  # type: ignore[misc]
+    """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
+
+    It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
+    `fun` is called twice, with symbols, and its arithmetic is recorded; compiled code computes the
+    series, whose order, 8 to 28, follows from the tolerances. The dense output is the series.
+
+    Parameters
+    ----------
+    fun : callable
+        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers by
+        arithmetic operators, integer powers, and NumPy's sqrt, sin, cos, tan, exp, sinh, cosh and
+        tanh, without branches on `t` or `y`; up to 20,000 operations.
+    t0 : float
+        The time of the initial state.
+    y0 : array_like, shape (n,)
+        The initial state, real.
+    t_bound : float
+        The end, before or after `t0`.
+    max_step : float, optional
+        The longest step. Default is inf. Shorter ones find both of two roots of an event within a
+        step.
+    rtol, atol : float or array_like, shape (n,), optional
+        The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. A component
+        that is 0 is compared with the largest if `atol` is 0. Defaults are 1e-3 and 1e-6.
+    vectorized : bool, optional
+        Ignored.
+    first_step : float, optional
+        The longest first step. By default the method chooses it.
+    **extraneous : dict
+        Options of other methods, ignored with a warning.
+
+    Raises
+    ------
+    InputError
+        If `fun` can't be recorded or does not return n numbers, or an option is not allowed.
+    ValueError
+        If `y0` is complex or not one-dimensional.
+
+    Examples
+    --------
+    >>> from scipy.integrate import solve_ivp
+    >>> from pyharness import Taylor
+    >>> found = solve_ivp(lambda t, y: [y[1], -y[0]], (0.0, 10.0), [1.0, 0.0],
+    ...                   method=Taylor, rtol=1e-12, atol=1e-12)
+    >>> found.y[:, -1].round(6)
+    array([-0.839072,  0.544021])
+    """
+
+    t: float
+    t_bound: float
+    y: Array
+
+    def __init__(
+        self,
+        fun: Callable[..., Any],
+        t0: float,
+        y0: Any,
+        t_bound: float,
+        max_step: float = math.inf,
+        rtol: Any = 1e-3,
+        atol: Any = 1e-6,
+        vectorized: bool = False,
+        first_step: float | None = None,
+        **extraneous: Any,
+    ) -> None:
+        if extraneous:
+            names = ", ".join(f"`{name}`" for name in extraneous)
+            warnings.warn(f"the method Taylor ignores {names}", stacklevel=3)
+        super().__init__(fun, t0, y0, t_bound, vectorized)
+        if math.isnan(self.t_bound) or not math.isfinite(self.t):
+            raise InputError(
+                f"the time span is {t0} to {t_bound}; allowed: finite times, or to inf"
+            )
+        self._tape = kernel_tape(recorded_equation(fun, self.n))
+        self.nfev = 1
+        self.max_step = self._longer_than_spacing("max_step", max_step)
+        self.rtol, self.atol = _tolerances(rtol, atol, self.n)
+        longest = np.abs(self.y).max(initial=0.0)
+        share = self.atol.min(initial=math.inf) / longest if longest else 0.0
+        self._relative = min(1.0, float(self.rtol.min(initial=1.0) + share))
+        span = abs(self.t_bound - self.t)
+        self._trial = min(span, LONGEST_TRIAL)
+        self._terms = np.zeros((1, self.n))
+        if first_step is None:
+            self._longest = self._first_step(span)
+        else:
+            self._longest = self._longer_than_spacing("first_step", first_step)
+        if self._longest > span:
+            raise InputError(f"first_step is {first_step}; allowed: up to {span:g}, the time span")
+
+    def _longer_than_spacing(self, name: str, value: Any) -> float:
+        found = number(name, value)
+        if self.t + self.direction * found == self.t or not found > 0.0:
+            least = 0.5 * math.ulp(self.t)
+            raise InputError(f"{name} is {found:g}; allowed: a number larger than {least:g} at t0")
+        return found
+
+    def _first_step(self, span: float) -> float:
+        if not (self.n and span):
+            return span
+        scale = self._scale()
+        step = self._step_of(scale, self._trial, span)
+        if step.h == 0.0:
+            return span
+        change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
+        sizes = np.abs(step.terms[1:] / scale).max(axis=1)
+        # Half the change is in the first term, a quarter in the second, and so on.
+        with np.errstate(divide="ignore", over="ignore"):
+            parts = 0.5 * (change / sizes) ** (1.0 / np.arange(1, len(sizes) + 1))
+        first = float(np.clip(parts.min(), *_FIRST_PARTS)) * abs(step.h)
+        return min(span, max(first, 10.0 * math.ulp(self.t)))
+
+    def _step_of(self, scale: Array, trial: float, longest: float) -> Step:
+        step = taylor_step(
+            self._tape, self.t, self.y, scale, self._relative,
+            self.direction * trial, self.direction * longest,
+        )  # fmt: skip
+        self.nfev += step.expansions
+        return step
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        rest = abs(self.t_bound - self.t)
+        longest = min(rest, self.max_step, self._longest)
+        step = self._step_of(self._scale(), min(self._trial, longest), longest)
+        if step.h == 0.0:
+            return False, self.TOO_SMALL_STEP
+        end = self.t + step.h
+        is_cut = end == self.t + self.direction * longest
+        self._terms = step.terms
+        # A step that was cut says nothing of the next one.
+        self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
+        self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
+        self.t = self.t_bound if is_cut and longest == rest else end
+        self.y = step.state
+        return True, None
+
+    def _scale(self) -> Array:
+        sizes = np.abs(self.y)
+        scale: Array = self.atol + self.rtol * sizes
+        if scale.min(initial=math.inf) >= _LEAST_SCALE:
+            return scale
+        # Without an absolute tolerance, a component that is 0 is compared with the largest.
+        missing = float(self.rtol.min()) * float(sizes.max(initial=0.0)) or 1.0
+        return np.maximum(np.where(scale > 0.0, scale, missing), _LEAST_SCALE)
+
+    def _dense_output_impl(self) -> DenseOutput:
+        assert self.t_old is not None
+        return _Series(self.t_old, self.t, self._terms)
+
+
+class _Series(DenseOutput):  # type: ignore[misc]
+    """The Taylor series of a step; terms include powers of the step."""
+
+    def __init__(self, t_old: float, t: float, terms: Array) -> None:
+        super().__init__(t_old, t)
+        self._terms = terms
+
+    def _call_impl(self, t: Array) -> Array:
+        values: Array = polyval((t - self.t_old) / (self.t - self.t_old), self._terms)
+        return values
+
+
+def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
+    """Return ``fun(t, y)`` of n equations as a tape; raise InputError if it can't be recorded."""
+
+    def record(recorder: Recorder) -> Tape:
+        time, *state = recorder.inputs()
+        # A single equation may return a number.
+        rates = called_once(
+            lambda t, y: np.ravel(np.array(fun(t, y), dtype=object)),
+            (time, np.array(state, dtype=object)),
+            recorder,
+            f"a function of (t, y) that returns {n} numbers",
+        )
+        if len(rates) != n:
+            raise InputError(f"fun returned {len(rates)} values; allowed: {n}, the length of y0")
+        return recorder.tape(rates)
+
+    instead = "another method of solve_ivp"
+    return recorded_twice(record, lambda: Recorder(_MOST_OPERATIONS, n + 1, "fun", instead))
+
+
+def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
+    found = []
+    for name, value in (("rtol", rtol), ("atol", atol)):
+        try:
+            given = np.asarray(value, dtype=float)
+        except (OverflowError, TypeError, ValueError):
+            raise InputError(f"{name} is {value!r}; allowed: a number, or {n} numbers") from None
+        if given.shape not in ((), (n,)):
+            raise InputError(f"{name} has shape {given.shape}; allowed: a number, or shape ({n},)")
+        if not np.all(given >= 0.0):
+            raise InputError(f"{name} is {value}; allowed: numbers of at least 0")
+        found.append(np.broadcast_to(given, (n,)))
+    if not np.isfinite(found[0]).all():
+        raise InputError(f"rtol is {rtol}; allowed: finite numbers")
+    if np.any(found[0] < _LEAST_RTOL):
+        warnings.warn(f"`rtol` is too small; {_LEAST_RTOL:.2g} is used", stacklevel=4)
+    return np.maximum(found[0], _LEAST_RTOL), found[1]

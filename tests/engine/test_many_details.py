@@ -1,0 +1,157 @@
+"""Events and sensitivities of many bodies, against those of single calls of `solve`."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, solve_many
+from pyharness.engine.many_space import scene_of_row
+from pyharness.events import crosses, flip
+from pyharness.model.arrays import unit_quaternions
+from pyharness.model.codes import Statuses
+from pyharness.torques import damping
+
+MANY: Any = solve_many  # whose results may lack events
+TOP = Scene("top", (0.3, -0.4, 1.2), moments=(4.0, 3.0, 2.0))
+N = 5
+RNG = np.random.default_rng(2612)
+STARTS = RNG.standard_normal((N, 3))
+TURNS = RNG.standard_normal((N, 4))
+TIMES = RNG.uniform(2.0, 6.0, N)
+MATRIX: Any = ((3.0, 0.1, 0.1), (0.1, 2.0, 0.1), (0.1, 0.1, 1.0))
+LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.2), 1.5)])
+CASES: dict[str, tuple[Scene, dict[str, Any], list[str]]] = {
+    "free": (TOP, {"moments": RNG.uniform(2.0, 3.0, (N, 3))}, ["omega0", "moments"]),
+    "law": (replace(TOP, torque=LAW), {}, ["torque.constant", "torque.sines"]),
+    "constants": (
+        replace(TOP, torque=LAW), {"torque_constant": RNG.standard_normal((N, 3))}, ["omega0"],
+    ),
+    "coefficients": (TOP, {"coefficients": [[0.3, -0.5, 0.2]]}, ["coefficients"]),
+    "inertia": (TOP, {"inertia": MATRIX, "attitude0": TURNS}, ["inertia", "attitude"]),
+    "in space": (
+        replace(TOP, torque=replace(LAW, frame="space")), {"attitude0": TURNS}, ["attitude"],
+    ),
+    "damped": (replace(TOP, torque=damping(0.1)), {}, ["omega0"]),
+    "body no longer changing": (
+        replace(TOP, moments=None, changing=ChangingMoments([[4.0, 0.1], [3.0], [2.0]])),
+        {"moments": [4.0, 3.0, 2.0]}, ["moments"],
+    ),
+}  # fmt: skip
+
+
+def small(t: Any, omega: Any) -> Any:
+    return omega[0] ** 2 - 0.04
+
+
+@pytest.mark.sampled
+@pytest.mark.parametrize("name", CASES)
+def test_details_are_those_of_single_calls(name: str) -> None:
+    scene, own, names = CASES[name]
+    found = MANY(
+        scene, TIMES, omega0=STARTS, tolerance=1e-10, events=[flip(1), small],
+        sensitivities=names, **own,
+    )  # fmt: skip
+    plain = solve_many(scene, TIMES, omega0=STARTS, tolerance=1e-10, **own)
+    assert found.omega.tobytes() == plain.omega.tobytes()
+    assert found.status.tobytes() == plain.status.tobytes()
+    assert found.refusals == {}
+    attitude = found.attitude is not None
+    rows = {key: np.atleast_2d(each) for key, each in own.items()}
+    if "inertia" in rows:
+        rows["inertia"] = np.array([MATRIX])
+    if attitude:
+        rows["attitude0"] = unit_quaternions(rows["attitude0"])
+    base = replace(scene, changing=None, moments=TOP.moments) if scene.changing else scene
+    some = 0
+    for i in range(N):
+        one = scene_of_row(base, {**rows, "omega0": STARTS}, i)
+        alone: Any = solve(
+            one, float(TIMES[i]), tolerance=1e-10, attitude=attitude, events=[flip(1), small],
+            sensitivities=names,
+        )  # fmt: skip
+        assert np.allclose(alone.omega[0], found.omega[i], rtol=0.0, atol=1e-9)
+        for k in range(2):
+            assert np.array_equal(found.t_events[k][i], alone.t_events[k])
+            assert np.array_equal(found.y_events[k][i], alone.y_events[k])
+            some += len(alone.t_events[k])
+        for each in names:
+            assert np.array_equal(found.sensitivities[each][i], alone.sensitivities[each][0])
+    assert some
+
+
+def test_sequences_of_scenes() -> None:
+    scenes = [
+        replace(TOP, omega=tuple(STARTS[0])),
+        replace(TOP, moments=None, inertia=MATRIX),
+        replace(TOP, torque=damping(0.1)),
+    ]
+    found = MANY(scenes, [1.0, 2.0, 9.0], events=flip(2), sensitivities=["omega0"])
+    for i, (scene, time) in enumerate(zip(scenes, (1.0, 2.0, 9.0), strict=True)):
+        alone: Any = solve(scene, time, events=flip(2), sensitivities=["omega0"])
+        assert np.array_equal(found.t_events[0][i], alone.t_events[0])
+        assert np.array_equal(found.sensitivities["omega0"][i], alone.sensitivities["omega0"][0])
+
+
+def test_a_body_without_result_has_no_details() -> None:
+    moments = np.array([[4.0, 3.0, 2.0], [4.0, -3.0, 2.0], [4.0, 3.0, 2.0]])
+    starts = [STARTS[0], STARTS[1], (np.inf, 0.0, 0.0)]
+    found = MANY(
+        TOP, 5.0, omega0=starts, moments=moments, events=small, sensitivities=["moments"]
+    )  # fmt: skip
+    assert found.status[1] == Statuses.REFUSED
+    assert found.t_events[0][0] is not None
+    assert [each is None for each in found.t_events[0]] == [False, True, True]
+    assert [each is None for each in found.y_events[0]] == [False, True, True]
+    missing = np.isnan(found.sensitivities["moments"]).all(axis=(1, 2))
+    assert missing.tolist() == [False, True, True]
+    assert found.refusals == {}  # `status` has their reasons
+
+
+def test_a_refused_body_has_its_reason_and_no_influence() -> None:
+    def wrong(t: Any, omega: Any) -> Any:
+        return np.where(np.asarray(omega[2]) > 5.0, np.nan, omega[0])
+
+    starts = np.array([STARTS[0], (0.1, 0.2, 6.0), STARTS[1]])
+    found = MANY(TOP, 1.0, omega0=starts, events=wrong, sensitivities=["omega0"])
+    assert list(found.refusals) == [1]
+    assert "the function returned nan" in found.refusals[1]
+    assert found.has_result.all()
+    assert [each is None for each in found.t_events[0]] == [False, True, False]
+    assert np.isnan(found.sensitivities["omega0"]).any(axis=(1, 2)).tolist() == [False, True, False]
+
+
+def test_results_may_be_written_over_the_starts() -> None:
+    starts, turns = STARTS.copy(), TURNS.copy()
+    found = MANY(TOP, 3.0, omega0=starts, attitude0=turns, sensitivities=["omega0"], events=flip(1))
+    again = MANY(
+        TOP, 3.0, omega0=starts, attitude0=turns, sensitivities=["omega0"], events=flip(1),
+        out=replace(found, omega=starts, attitude=turns),
+    )  # fmt: skip
+    assert again.omega is starts
+    assert np.array_equal(again.sensitivities["omega0"], found.sensitivities["omega0"])
+    assert all(map(np.array_equal, again.t_events[0], found.t_events[0]))
+    plain = MANY(TOP, 2.0, omega0=STARTS, attitude0=TURNS, out=again)
+    assert plain.omega is starts
+    assert plain.t_events is plain.y_events is plain.sensitivities is plain.refusals is None
+
+
+def test_no_bodies() -> None:
+    found = MANY(TOP, 1.0, omega0=np.empty((0, 3)), events=flip(1), sensitivities=["omega0"])
+    assert found.t_events == found.y_events == [[]]
+    assert len(found.sensitivities["omega0"]) == 0
+
+
+@pytest.mark.parametrize("given", [{"events": crosses(1, 0.1, terminal=True)},
+                                   {"sensitivities": ["mass"]}])  # fmt: skip
+def test_mistakes_are_refused_before_any_body_is_solved(given: dict[str, Any]) -> None:
+    out = np.full((N, 3), 7.0)
+    with pytest.raises(InputError):
+        MANY(TOP, 1.0, omega0=STARTS, out=out, **given)
+    assert (out == 7.0).all()
+
+
+def test_bar_counts_the_bodies_again(capsys: pytest.CaptureFixture[str]) -> None:
+    MANY(TOP, 1.0, omega0=STARTS, events=flip(1), progress=True)
+    assert capsys.readouterr().err.count("5.00/5.00") >= 2

@@ -1,0 +1,223 @@
+"""Error amplification, estimated errors, and the ending `sensitive`."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyharness.engine.sensitivity as room
+from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
+from pyharness.engine import linearised, taylor
+from pyharness.engine import solver as solver_module
+from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, motion_growth
+from pyharness.model.codes import Statuses
+from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
+from pyharness.scenes.rescaled import scaled, unscaled
+from pyharness.truth.elliptic import torque_free
+from pyharness.truth.reference import reference
+
+BESIDE = Scene("beside the middle axis", (1e-4, 2.0, 1e-4), moments=(3.0, 2.0, 1.2))
+AT_REST = Scene("", (0.0, 0.0, 0.0), moments=(3.0, 2.0, 1.2))
+PUSHED = case_scene(5)
+RUNAWAY = Scene("", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+SPHERE = Scene("", (1.0, 2.0, 3.0), moments=(2.0,) * 3, torque=TorqueLaw((1.0, 0.0, 0.0)))
+
+
+def _along(scene: Scene, time: float) -> float:
+    """Return the amplification by the linearised flow along the closed form."""
+    times = np.linspace(0.0, time, 6000)
+    path = solve(scene, times[1:].tolist(), "closed-form", 1e-9)
+    omega = np.vstack([scene.omega, path.omega])
+    return linearised.growth(linearised.propagators(scene, times, omega))
+
+
+@pytest.mark.parametrize("time", [0.5, 3.0, -3.0, 30.0, -100.0])
+@pytest.mark.parametrize("scene", [case_scene(2), case_scene(3), case_scene(4), BESIDE])
+def test_growth_is_that_of_the_linearised_flow(scene: Scene, time: float) -> None:
+    """Sampled at sixteen times: the largest value between them is at worst three times as large."""
+    ratio = (motion_growth(scene, time) or 0.0) / _along(scene, time)
+    assert 1.0 / 3.0 <= ratio <= 1.3
+
+
+def test_growth_of_a_spin_about_the_middle_axis_is_that_of_what_leaves_it() -> None:
+    scene = replace(BESIDE, omega=(0.0, 2.0, 0.0))
+    a, _, c = scene.euler_coefficients
+    rate = 2.0 * math.sqrt(abs(a * c))
+    grown = math.cosh(10.0 * rate) * (1.0 + max(abs(a / c), abs(c / a)) ** 0.5)
+    assert 0.3 * grown <= (motion_growth(scene, 10.0) or 0.0) <= 1.01 * grown
+    # This is how far a perturbation of 2**-48 can grow.
+    assert 2.0**46 <= (motion_growth(scene, 200.0) or 0.0) <= 2.0**51
+
+
+@pytest.mark.parametrize("power", [-900, -300, 1, 300, 900])
+def test_growth_has_no_unit(power: int) -> None:
+    factor = math.ldexp(1.0, power)
+    assert motion_growth(scaled(BESIDE, factor), 7.0 / factor) == motion_growth(BESIDE, 7.0)
+
+
+def test_growth_is_one_where_nothing_grows_and_unknown_where_no_method_tells() -> None:
+    assert motion_growth(BESIDE, 0.0) == motion_growth(AT_REST, 5.0) == 1.0
+    assert motion_growth(SPHERE, 1e6) == 1.0
+    assert closed_form_estimate(RUNAWAY, (1.0, 1.0, 1.0), 0.5) == (None, None)
+    # The solution grows without bound before the end.
+    assert motion_growth(RUNAWAY, 2.0) is None
+
+
+@pytest.mark.parametrize("time", [1.0, 30.0, 300.0, -1000.0])
+@pytest.mark.parametrize("scene", [case_scene(3), BESIDE, SPHERE])
+def test_error_of_a_closed_form_is_what_it_may_be(scene: Scene, time: float) -> None:
+    """The error is within a few units of rounding A, B and C, which grow like any perturbation."""
+    found: Any = solve(scene, [time], "closed-form", 1e-9)
+    if scene is SPHERE:
+        truth = reference(scene, [time]).omega[-1]
+    else:
+        truth = np.array(torque_free(scene, time), dtype=float)
+    scale = max(np.abs(truth).max(), max(map(abs, scene.omega)))
+    assert np.abs(found.omega[-1] - truth).max() / scale <= 4.0 * found.error
+    assert found.error / ROUNDING == pytest.approx((found.growth or 0.0) + 16.0)
+
+
+def test_ending_is_sensitive_where_rounding_exceeds_the_tolerance() -> None:
+    growth = motion_growth(BESIDE, 60.0)
+    assert growth is not None
+    limit = ROUNDING * growth / 0.3
+    start = np.array(BESIDE.omega)
+    for share, word in ((0.99, "sensitive"), (1.01, "complete")):
+        for method in ("auto", "closed-form"):
+            found = solve(BESIDE, [1.0, 60.0], method, share * limit)
+            solver = prepare(BESIDE, method, share * limit)
+            assert solver(start, 60.0).tolist() == found.omega[-1].tolist()
+            assert (found.ended, solver.status, found.has_all_rows) == (word, word, True)
+            assert (solver.growth, solver.error) == (found.growth, found.error)
+            assert solver.digits == found.digits == digits_left(found.error)
+            assert found.growth == growth
+    # A finer tolerance than a closed form claims may be requested, and is reported.
+    assert solve(case_scene(3), [30.0], tolerance=1e-15).ended == "sensitive"
+    assert solve(case_scene(3), [0.01], tolerance=1e-15).ended == "complete"
+
+
+def test_gauss_collocation_knows_the_growth_of_the_motion() -> None:
+    growth = motion_growth(BESIDE, 12.0)
+    assert growth is not None
+    assert growth > 9e3
+    tolerance = 0.9 * ROUNDING * growth / 0.3
+    for share, word in ((1.0, "sensitive"), (1.2, "complete")):
+        found: Any = solve(BESIDE, [12.0], "gauss-8", share * tolerance)
+        assert (found.ended, found.growth) == (word, growth)
+        assert ROUNDING * growth <= found.error <= share * tolerance + ROUNDING * growth
+        # With the scene's own steps it has no estimate of its own.
+        solver = prepare(BESIDE, "gauss-8", share * tolerance)
+        solver(BESIDE.omega, 12.0)
+        assert (solver.status, solver.error, solver.growth) == (word, None, growth)
+    # The growth is from the start and to the time of the call.
+    solver(case_scene(3).omega, -3.0)
+    assert solver.growth == motion_growth(replace(BESIDE, omega=case_scene(3).omega), -3.0)
+    at_rest = solve(AT_REST, [1.0], "gauss-2", 1e-6)
+    assert (at_rest.error, at_rest.growth) == (ROUNDING, 1.0)
+
+
+@pytest.mark.parametrize("method", ["rk4", "dop853"])
+def test_methods_that_estimate_nothing_say_so(method: str) -> None:
+    found = solve(PUSHED, [1.0], method, 1.0 if method == "rk4" else 1e-6)
+    assert (found.error, found.growth, found.digits) == (None, None, None)
+    run = run_program(PUSHED, subset("two-term"))
+    assert (run.error, run.growth, run.digits) == (None, None, None)
+
+
+def test_solver_knows_nothing_before_a_call_and_without_a_result() -> None:
+    solver = prepare(RUNAWAY, "taylor", 1e-9)
+    assert (solver.status, solver.error, solver.growth, solver.digits) == ("complete", *[None] * 3)
+    assert np.isnan(solver(RUNAWAY.omega, 2.0)).all()
+    assert (solver.status, solver.error, solver.growth, solver.digits) == ("overflow", *[None] * 3)
+    free = prepare(BESIDE)
+    assert np.isnan(free(BESIDE.omega, 1e300)).all()
+    assert (free.status, free.error, free.growth) == ("gave up", None, None)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+def test_quick_tells_its_own_error(tolerance: float) -> None:
+    solver: Any = prepare(PUSHED, "quick", tolerance)
+    found = solver(PUSHED.omega, 3.0)
+    truth = reference(PUSHED, [1.0, 2.0, 3.0]).omega
+    error = np.abs(found - truth[-1]).max() / np.abs(truth).max()
+    assert error <= solver.error <= 0.35 * tolerance
+    assert solver.growth is None
+    assert solver(PUSHED.omega, 0.0).tolist() == list(PUSHED.omega)
+    assert solver.error == 0.0
+    assert solver.digits == pytest.approx(15.95, abs=0.01)
+
+
+def _grown(status: int, error: float, growth: float) -> Callable[..., Any]:
+    """Return a series that ends with a status, and reports an error and a growth."""
+
+    def rows(*given: Any, effort: Any, **_: Any) -> Any:
+        effort[2:4] = error, growth
+        return np.ones((3, len(given[6]))), len(given[6]), status, 7
+
+    return rows
+
+
+def test_what_the_series_finds_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def found(status: int, *estimates: float) -> Trajectory:
+        kernel = SimpleNamespace(taylor_rows=_grown(status, *estimates))
+        monkeypatch.setattr(taylor, "extension", lambda: kernel)
+        return solve(PUSHED, [1.0, 2.0], "taylor", 1e-9)
+
+    sensitive = found(Statuses.SENSITIVE, 1e-6, 3e9)
+    assert (sensitive.ended, sensitive.error, sensitive.growth) == ("sensitive", 1e-6, 3e9)
+    assert sensitive.digits == pytest.approx(6.0)
+    assert len(sensitive.omega) == 2
+    complete = found(Statuses.COMPLETE, 1e-10, -1.0)
+    assert (complete.ended, complete.error, complete.growth) == ("complete", 1e-10, None)
+    overflow = found(Statuses.OVERFLOW, 1e-10, 2.0)
+    assert (overflow.ended, overflow.error, overflow.growth) == ("overflow", None, None)
+    assert not overflow.has_all_rows
+
+    def packed(*given: Any) -> Any:
+        return np.ones(3), Statuses.SENSITIVE, 7, np.array([1e-6, 3e9])
+
+    kernel = SimpleNamespace(solve_packed=packed)
+    monkeypatch.setattr(solver_module, "extension", lambda: kernel)
+    solver = prepare(PUSHED, "taylor")
+    assert solver(PUSHED.omega, 2.0).tolist() == [1.0] * 3
+    assert (solver.status, solver.error, solver.growth) == ("sensitive", 1e-6, 3e9)
+    # Without a closed form, Gauss collocation gets the growth from the series, to three digits.
+    kernel = SimpleNamespace(taylor_rows=_grown(Statuses.COMPLETE, 1e-4, 3e9))
+    monkeypatch.setattr(room, "extension", lambda: kernel)
+    assert motion_growth(PUSHED, 2.0) == 3e9
+    assert solve(PUSHED, [0.1], "gauss-4", 1e-6).ended == "sensitive"
+
+
+def test_both_sides_of_zero_have_the_larger_error_and_growth() -> None:
+    after, before = (solve(BESIDE, [t], tolerance=1e-12) for t in (40.0, -1.0))
+    for times in ([-1.0, 40.0], [40.0, 0.0, -1.0]):
+        both = solve(BESIDE, times, tolerance=1e-12)
+        assert (both.ended, both.error, both.growth) == ("sensitive", after.error, after.growth)
+    assert before.ended == "complete"
+    both, before = (solve(BESIDE, [-40.0, *more], tolerance=1e-12) for more in ([1.0], []))
+    assert (both.ended, both.error, both.growth) == ("sensitive", before.error, before.growth)
+    lost = solve(RUNAWAY, [-0.5, 2.0], "taylor", 1e-9)
+    assert (lost.ended, lost.error, lost.growth) == ("overflow", None, None)
+
+
+def test_digits_are_those_that_the_error_leaves() -> None:
+    found = [digits_left(error) for error in (1.0, 7.0, 0.01, 1e-9, 0.0, None)]
+    assert found == [0.0, 0.0, pytest.approx(2.0), pytest.approx(9.0), 53 * math.log10(2.0), None]
+
+
+def test_is_sensitive_by_a_share_of_the_tolerance() -> None:
+    assert not is_sensitive(None, 1e-15)
+    assert not is_sensitive(0.29e-9 / ROUNDING, 1e-9)
+    assert is_sensitive(0.31e-9 / ROUNDING, 1e-9)
+
+
+def test_what_overflows_in_the_units_of_the_scene_has_no_error() -> None:
+    time = np.array([1.0])
+    found = Trajectory(time, time, np.full((1, 3), 1e300), None, 1, 1, error=1e-9, growth=2.0)
+    slower, lost = (unscaled(found, [1.0], factor) for factor in (2.0, 1e-100))
+    assert (slower.ended, slower.error, slower.growth) == ("complete", 1e-9, 2.0)
+    assert (lost.ended, lost.error, lost.growth) == ("overflow", None, None)

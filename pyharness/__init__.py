@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from pyharness import torques as torques
     from pyharness.checks.compare.comparison import Comparison, compare_programs
     from pyharness.checks.compare.method_comparison import compare_methods
-    from pyharness.dynamics.scene_reader import read_scene
-    from pyharness.dynamics.trajectory_reader import load
     from pyharness.engine.compiled_call import get_include
     from pyharness.engine.many import Ensemble, solve_many
     from pyharness.engine.prepared import prepare
     from pyharness.engine.prepared_attitude import AttitudeSolver
+    from pyharness.engine.scene_reader import read_scene
     from pyharness.engine.solve import solve
     from pyharness.engine.solver import Solver
     from pyharness.engine.stepper import Stepper
     from pyharness.engine.taylor_ivp import Taylor
+    from pyharness.engine.trajectory_reader import load
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError

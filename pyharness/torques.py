@@ -4,14 +4,14 @@ A sum of terms, of torque laws about the body axes, and of Python functions is a
 `pyharness.Scene`. At least one of two summands must be a term.
 """
 
-from pyharness.dynamics.field_terms import (
+from pyharness.engine.field_terms import (
     gravity_gradient,
     in_space,
     magnetic_damping,
     magnetic_dipole,
 )
-from pyharness.dynamics.table_terms import pulses, table
-from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.engine.table_terms import pulses, table
+from pyharness.engine.terms import attitude_control, damping, drag, rate_control, wheels
 from pyharness.model.state_torque import opaque, recorded
 
 __all__ = [

@@ -25,7 +25,7 @@ TESTS = {
     "pyharness/data/": ("history", "original", "edition"), "fortran/original/": ("original",),
 }  # fmt: skip
 # Packages on which nearly all others depend.
-SHARED = ("pyharness/model/", "pyharness/dynamics/", "pyharness/engine/")
+SHARED = ("pyharness/model/", "pyharness/engine/", "pyharness/engine/")
 
 
 def main(arguments: Sequence[str]) -> int:

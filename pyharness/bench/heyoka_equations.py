@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from pyharness.bench import compiled_peers as compiled
-from pyharness.dynamics.system import system_of
+from pyharness.engine.system import system_of
 from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

@@ -11,8 +11,8 @@ from pyharness.bench import compiled_peers as compiled
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, refuse_rounding
 from pyharness.bench.heyoka_equations import Formula, heyoka_equations
 from pyharness.checks.compare.candidates import End, Ready, not_finite
-from pyharness.dynamics.system import slopes_of
 from pyharness.engine.scipy_ivp import RightHandSide, state_of, with_attitude
+from pyharness.engine.system import slopes_of
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 

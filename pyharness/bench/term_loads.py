@@ -9,7 +9,7 @@ import numpy as np
 from pyharness.bench.ensemble_contenders import EnsembleLoad
 from pyharness.bench.heyoka_equations import Formula
 from pyharness.bench.measure import Workload
-from pyharness.dynamics import field_terms, terms
+from pyharness.engine import field_terms, terms
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw

@@ -10,7 +10,7 @@ from typing import Any
 from pyharness.cli import say, shown, write_text
 from pyharness.cli.progress import end_progress as end_progress
 from pyharness.cli.progress import progress as progress
-from pyharness.dynamics.scene_reader import read_scene
+from pyharness.engine.scene_reader import read_scene
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts

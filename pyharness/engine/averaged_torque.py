@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pyharness.dynamics.array_tape import outputs_at
+from pyharness.engine.array_tape import outputs_at
 from pyharness.engine.averaged_coordinates import Torque
 from pyharness.engine.problem import normalized
 from pyharness.model.array_type import Array

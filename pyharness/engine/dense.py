@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.dynamics.rates import rates
+from pyharness.engine.rates import rates
 from pyharness.engine.stepper import step_lengths
 from pyharness.model.array_type import Array
 from pyharness.model.chebyshev import nodes

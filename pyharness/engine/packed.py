@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pyharness.dynamics.system import is_recorded, with_constant_body
 from pyharness.engine.problem import normalized, normalized_in_space, remainders
 from pyharness.engine.recorded import kernel_tape, system
+from pyharness.engine.system import is_recorded, with_constant_body
 from pyharness.model.codes import Places
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array

@@ -7,14 +7,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.dynamics.parameters import (
+from pyharness.engine.closed_form import period_of
+from pyharness.engine.parameters import (
     ATTITUDE,
     OMEGA0,
     initial_state,
     parameters_of,
     varied_equations,
 )
-from pyharness.engine.closed_form import period_of
 from pyharness.engine.recorded import kernel_tape
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.dynamics.system import is_recorded
 from pyharness.engine.last_call import LastCall
 from pyharness.engine.many_attitudes import many_attitudes
 from pyharness.engine.packed import packed_scene
 from pyharness.engine.plan import Plan, plan
 from pyharness.engine.registry import check_attitude
+from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY, Quaternion, unit_quaternion
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import InputError

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.dynamics.system import system_of
+from pyharness.engine.system import system_of
 from pyharness.model.codes import Operations
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

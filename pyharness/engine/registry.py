@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.system import is_recorded
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.scipy_ivp import FINEST, scipy_method
+from pyharness.engine.system import is_recorded
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.principal import PrincipalScene

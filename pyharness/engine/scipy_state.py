@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pyharness.dynamics.system import slopes_of
 from pyharness.engine.scipy_run import (
     FINEST_STEP,
     NoNumberError,
@@ -20,6 +19,7 @@ from pyharness.engine.scipy_run import (
     rows_of,
 )
 from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
+from pyharness.engine.system import slopes_of
 from pyharness.model.errors import InputError, TimedError, printable
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque

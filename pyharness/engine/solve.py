@@ -12,7 +12,6 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.dynamics.system import with_constant_body
 from pyharness.engine.continuous import solution_of, with_events, with_events_reversed
 from pyharness.engine.event_functions import event_functions
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
@@ -28,6 +27,7 @@ from pyharness.engine.registry import (
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
+from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from pyharness.dynamics.system import is_recorded
 from pyharness.engine.last_call import LastCall
 from pyharness.engine.many_starts import many_starts
 from pyharness.engine.packed import packed_scene
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan
 from pyharness.engine.registry import FIXED_STEP
+from pyharness.engine.system import is_recorded
 from pyharness.model.codes import Methods, Places
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.dynamics.system import is_recorded, with_constant_body
 from pyharness.engine.recorded import kernel_tape
 from pyharness.engine.singular import SingularError, undefined_operation
+from pyharness.engine.system import is_recorded, with_constant_body
 from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.errors import InputError

@@ -7,8 +7,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pyharness.dynamics.scene_reader import scene_of
 from pyharness.engine.registry import check_torque
+from pyharness.engine.scene_reader import scene_of
 from pyharness.ensembles.fields import CONSTANTS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene

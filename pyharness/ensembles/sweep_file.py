@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyharness.dynamics.scene_reader import scene_of, scene_of_file
 from pyharness.engine.batch import Solver
 from pyharness.engine.registry import REGISTRY, requested_tolerance
+from pyharness.engine.scene_reader import scene_of, scene_of_file
 from pyharness.engine.solver import PREPARED
 from pyharness.ensembles.axes import Axis, axis_of
 from pyharness.ensembles.batches import listing_of

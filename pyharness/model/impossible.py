@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 # Modules whose stack frames are between the user's call and the creation of the scene.
 _BETWEEN = (
-    *("copy", "dataclasses", "pyharness.dynamics.scene_reader"),
+    *("copy", "dataclasses", "pyharness.engine.scene_reader"),
     *("pyharness.model.scene", "pyharness.model.scene_file", __name__),
 )
 

@@ -1,6 +1,6 @@
 """Scenes of the cases of Table 1 of the thesis, and the text of TOML files of scenes.
 
-`pyharness.dynamics.scene_reader` reads these files. Each InputError begins with `where`.
+`pyharness.engine.scene_reader` reads these files. Each InputError begins with `where`.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Writing of trajectories to files. `pyharness.dynamics.trajectory_reader` reads them.
+"""Writing of trajectories to files. `pyharness.engine.trajectory_reader` reads them.
 
 Of the arrays of `numpy.savez`, `header` is JSON with other attributes and the schema number,
 `scene` the text of a scene file, and `sha256` a digest of all others.

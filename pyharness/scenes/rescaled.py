@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyharness.dynamics.scaled_tape import MULTIPLE, scaled_tape
+from pyharness.engine.scaled_tape import MULTIPLE, scaled_tape
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque

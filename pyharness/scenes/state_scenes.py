@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.field_terms import (
+from pyharness.engine.field_terms import (
     gravity_gradient,
     in_space,
     magnetic_damping,
     magnetic_dipole,
 )
-from pyharness.dynamics.table_terms import pulses, table
-from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.engine.table_terms import pulses, table
+from pyharness.engine.terms import attitude_control, damping, drag, rate_control, wheels
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw

@@ -7,7 +7,7 @@ from typing import Any
 
 from flint import arb
 
-from pyharness.dynamics.system import rates_of_inertia
+from pyharness.engine.system import rates_of_inertia
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.dual import Dual
 from pyharness.model.errors import InputError

@@ -15,8 +15,7 @@ from pyharness.checks.check import Check, made
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_torques import random_torques
 from pyharness.checks.selection import Selection
-from pyharness.dynamics import system
-from pyharness.engine import many_recorded, recorded, solve
+from pyharness.engine import many_recorded, recorded, solve, system
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory

@@ -17,7 +17,7 @@ from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.compare.candidates import End
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
-from pyharness.dynamics.scene_reader import read_scene
+from pyharness.engine.scene_reader import read_scene
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory

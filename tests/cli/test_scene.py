@@ -13,9 +13,9 @@ from jsonschema import Draft202012Validator
 
 from pyharness import InputError, case_scene, read_scene
 from pyharness.cli.main import main
-from pyharness.dynamics.scene_reader import SCENE_TABLES as TABLES
-from pyharness.dynamics.scene_reader import scene_of
-from pyharness.dynamics.term_file import KINDS
+from pyharness.engine.scene_reader import SCENE_TABLES as TABLES
+from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.term_file import KINDS
 from pyharness.model.facts import facts_folder
 from tests.conftest import Printed
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
-from pyharness.dynamics.parameters import parameters_of
-from pyharness.dynamics.rates import rates
-from pyharness.dynamics.scene_reader import scene_of_file
+from pyharness.engine.parameters import parameters_of
+from pyharness.engine.rates import rates
+from pyharness.engine.scene_reader import scene_of_file
 from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments

@@ -22,7 +22,7 @@ from pyharness.torques import (
     table,
     wheels,
 )
-from tests.dynamics.test_terms import INERTIA, LAW, LAW_IN_SPACE, TARGET, H, M, V, matrix, momentum
+from tests.engine.test_terms import INERTIA, LAW, LAW_IN_SPACE, TARGET, H, M, V, matrix, momentum
 
 MOMENTS = (3.0, 4.0, 5.0)
 OMEGA = (0.3, -0.5, 0.8)

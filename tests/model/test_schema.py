@@ -17,9 +17,9 @@ from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
 from pyharness.cli.output import check_tree
-from pyharness.dynamics.scene_reader import read_scene
 from pyharness.edition.crate import PACKAGE_MARK
 from pyharness.edition.report import MARK
+from pyharness.engine.scene_reader import read_scene
 from pyharness.ensembles.run import run_sweep
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError

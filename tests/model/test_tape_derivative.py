@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyharness.dynamics.system import system_of
+from pyharness.engine.system import system_of
 from pyharness.model.state_torque import StateTorque, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
 from pyharness.model.tape_derivative import with_derivatives

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from pyharness import Scene, StateTorque, TorqueLaw, case_scene, opaque, read_scene
-from pyharness.dynamics.scene_reader import scene_of
+from pyharness.engine.scene_reader import scene_of
 from pyharness.model.expressions import FUNCTIONS, INPUTS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
-from tests.dynamics.test_term_file import is_documented, restored
+from tests.engine.test_term_file import is_documented, restored
 
 ROOT = Path(__file__).parent.parent.parent
 BODY: dict[str, Any] = {

@@ -13,7 +13,7 @@ from pyharness import (
     TorqueLaw,
     read_scene,
 )
-from pyharness.dynamics.scene_reader import scene_of
+from pyharness.engine.scene_reader import scene_of
 from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow
-from pyharness.dynamics.array_tape import inputs_of, outputs_at, table_values
+from pyharness.engine.array_tape import inputs_of, outputs_at, table_values
 from pyharness.engine.linearised import transitions
 from pyharness.engine.recorded import system
 from pyharness.engine.solve import solve

@@ -4,7 +4,7 @@ import argparse
 import os
 
 from pyharness.cli import options as shared
-from pyharness.dynamics.scene_reader import read_scene
+from pyharness.engine.scene_reader import read_scene
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts_folder
 from pyharness.model.records import scene_record

@@ -124,7 +124,7 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
 @pytest.mark.campaign
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
-    short = ("dynamics/system.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
+    short = ("engine/system.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
     some = [each for each in files() if each.endswith(short)]
     assert len(some) == len(short)
     monkeypatch.setattr(sample, "files", lambda: some)
@@ -154,7 +154,7 @@ def test_every_language_has_its_share() -> None:
     assert lines["Python"] > lines[FORTRAN] > lines[C]
     core = {"pyharness/engine/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
             "pyharness/original/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
-            "pyharness/dynamics/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
+            "pyharness/engine/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())
 

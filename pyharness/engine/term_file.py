@@ -5,15 +5,15 @@ from dataclasses import replace
 from inspect import Parameter, signature
 from typing import Any
 
-from pyharness.dynamics.field_terms import (
+from pyharness.engine.field_terms import (
     gravity_gradient,
     in_space,
     magnetic_damping,
     magnetic_dipole,
 )
-from pyharness.dynamics.table_terms import pulses, table
-from pyharness.dynamics.term_input import inertia_of
-from pyharness.dynamics.terms import attitude_control, damping, drag, rate_control, wheels
+from pyharness.engine.table_terms import pulses, table
+from pyharness.engine.term_input import inertia_of
+from pyharness.engine.terms import attitude_control, damping, drag, rate_control, wheels
 from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import MOST_TERMS, check_keys, law_of_table

@@ -7,7 +7,7 @@ import pytest
 
 from pyharness import StateTorque, TorqueLaw, opaque
 from pyharness.torques import damping, in_space, magnetic_dipole, recorded
-from tests.dynamics.test_terms import C0, C1, C2, RATE, S1, S2, D, H, M, V, matrix, states
+from tests.engine.test_terms import C0, C1, C2, RATE, S1, S2, D, H, M, V, matrix, states
 
 
 def test_sums() -> None:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyharness.dynamics.array_tape import outputs_at
-from pyharness.dynamics.system import slopes_of, system_of, with_constant_body
+from pyharness.engine.array_tape import outputs_at
+from pyharness.engine.system import slopes_of, system_of, with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
 from pyharness.model.principal import principal

@@ -40,7 +40,7 @@ from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.trajectory_file import archive_of, file_content
 from pyharness.torques import damping, gravity_gradient, recorded
-from tests.dynamics.test_terms import INERTIA
+from tests.engine.test_terms import INERTIA
 from tests.engine.test_work import GENTLE, TIMES, TORQUES, scene_with, switched, written
 
 CHANGING = ChangingMoments([[3.0, 0.1], [4.0], [5.0, 0.0, 0.2]])

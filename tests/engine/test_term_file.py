@@ -14,13 +14,13 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import Scene, StateTorque, TorqueLaw, read_scene, torques
-from pyharness.dynamics.scene_reader import scene_of
-from pyharness.dynamics.term_file import KINDS
+from pyharness.engine.scene_reader import scene_of
+from pyharness.engine.term_file import KINDS
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 from pyharness.model.state_torque import recorded
-from tests.dynamics.test_terms import states
+from tests.engine.test_terms import states
 from tests.json_reference import SCHEMA
 
 ROOT = Path(__file__).parent.parent.parent

@@ -10,8 +10,8 @@ from numpydoc.validate import validate
 from scipy.spatial.transform import Rotation
 
 from pyharness import Scene, StateTorque, TorqueLaw, principal, torques
-from pyharness.dynamics import field_terms, table_terms, terms
-from pyharness.dynamics.system import slopes_of
+from pyharness.engine import field_terms, table_terms, terms
+from pyharness.engine.system import slopes_of
 from pyharness.model.trajectory import Array
 from pyharness.torques import (
     attitude_control,

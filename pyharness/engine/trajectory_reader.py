@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.scene_reader import scene_of_file
+from pyharness.engine.scene_reader import scene_of_file
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, Scene, TorqueLaw, opaque, prepare, solve, solve_many, torques
-from pyharness.dynamics.scaled_tape import scaled_tape
-from pyharness.dynamics.system import with_constant_body
+from pyharness.engine.scaled_tape import scaled_tape
+from pyharness.engine.system import with_constant_body
 from pyharness.model.codes import Statuses
 from pyharness.model.expressions import parsed
 from pyharness.model.state_torque import StateTorque

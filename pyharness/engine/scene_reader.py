@@ -128,7 +128,7 @@ def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTor
     if "terms" not in table:
         return first
     # Few scenes have ready terms.
-    from pyharness.dynamics.term_file import read_terms
+    from pyharness.engine.term_file import read_terms
 
     terms = read_terms(table["terms"], body)
     return sum(terms[1:], terms[0]) + first if terms else first

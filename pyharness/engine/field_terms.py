@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
+from pyharness.engine.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.law_symbols import law_derivative, law_value, to_body
 from pyharness.model.state_torque import StateTorque

@@ -13,8 +13,8 @@ from pyharness.model.expressions import parsed
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import MOST_TERMS
 from pyharness.model.scene_report import heading
-from tests.dynamics.test_term_file import LAW, MATRIX, SPACE, TERMS, is_documented, restored
-from tests.dynamics.test_terms import INERTIA
+from tests.engine.test_term_file import LAW, MATRIX, SPACE, TERMS, is_documented, restored
+from tests.engine.test_terms import INERTIA
 
 WRITTEN = parsed(["-k*w1**3", "q0", "0"], {"k": 0.1})
 

@@ -8,7 +8,7 @@ import pytest
 from pyharness import Scene, solve
 from pyharness.model.trajectory import Array
 from pyharness.torques import attitude_control, gravity_gradient, magnetic_dipole
-from tests.dynamics.test_terms import MOMENTS, ORBIT, TARGET, M, V, matrix
+from tests.engine.test_terms import MOMENTS, ORBIT, TARGET, M, V, matrix
 
 
 def integrated(scene: Scene, end: float) -> tuple[Array, Array]:

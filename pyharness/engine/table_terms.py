@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.term_input import ready_term
+from pyharness.engine.term_input import ready_term
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.state_torque import Function, StateTorque
 from pyharness.model.symbols import SYMBOLS

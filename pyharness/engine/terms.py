@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.dynamics.term_input import law_of_vector, matrix_of, ready_term
+from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
 from pyharness.model.law_symbols import law_integral, law_value

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.dynamics.system import rates_of_changing, rates_of_inertia
+from pyharness.engine.system import rates_of_changing, rates_of_inertia
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, quaternion_rates
 from pyharness.model.changing import Changing

@@ -1,1 +1,0 @@
-"""Right-hand sides of Euler's equations, and ready torques."""

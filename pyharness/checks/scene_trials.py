@@ -35,13 +35,13 @@ from pyharness.engine.registry import (
     check_attitude,
     check_torque,
 )
+from pyharness.engine.rotated import axes_of, restarted_at, rotated
 from pyharness.engine.solve import solve
 from pyharness.model.attitude import IDENTITY, angle_between, product, quaternion_of_axes
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.scenes.rotated import axes_of, restarted_at, rotated
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.engine.problem import normalized, trajectory_of
+from pyharness.engine.rescaled import omega_by_torque
 from pyharness.engine.sensitivity import is_sensitive, motion_growth, torque_noise
 from pyharness.model.effort import Integrator, advice, waves
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, SENSITIVE, extension
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
-from pyharness.scenes.rescaled import omega_by_torque
 
 # Work limit: right-hand sides of all trial integrations together, some ten seconds. A wave of
 # the torque costs half as much as a right-hand side.

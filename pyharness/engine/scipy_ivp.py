@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.engine.linearised import growth, propagators
+from pyharness.engine.rescaled import omega_by_torque
 from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, Run, rows_of
 from pyharness.engine.scipy_run import RightHandSide as RightHandSide
 from pyharness.engine.scipy_state import finest_of_state, solve_state
@@ -21,7 +22,6 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
-from pyharness.scenes.rescaled import omega_by_torque
 
 # Largest ratio of the error at the end to the local error. The first table applies to a motion of a
 # few radians. The second table is added for each radian, multiplied by the error amplification.

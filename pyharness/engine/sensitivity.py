@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.engine.problem import closed_form, known, normalized
+from pyharness.engine.rescaled import rescaling_factor, scaled
 from pyharness.engine.taylor import taylor
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
@@ -13,7 +14,6 @@ from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING
-from pyharness.scenes.rescaled import rescaling_factor, scaled
 
 # A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
 # the tolerance. The fraction allows for a factor of three, by which the computed amplification may

@@ -24,6 +24,13 @@ from pyharness.engine.registry import (
     check_torque,
     requested_tolerance,
 )
+from pyharness.engine.rescaled import (
+    has_ordinary_rows,
+    is_ordinary,
+    rescaling_factor,
+    scaled,
+    unscaled,
+)
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
@@ -39,13 +46,6 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, boolean, number, number_list
 from pyharness.model.waves import with_merged_waves
-from pyharness.scenes.rescaled import (
-    has_ordinary_rows,
-    is_ordinary,
-    rescaling_factor,
-    scaled,
-    unscaled,
-)
 
 
 def solve(

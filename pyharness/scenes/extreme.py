@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+from pyharness.engine.rescaled import scaled
 from pyharness.model.attitude import Quaternion, unit_quaternion
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
-from pyharness.scenes.rescaled import scaled
 
 
 class Circumstance(NamedTuple):

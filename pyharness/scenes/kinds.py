@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
+from pyharness.engine.rescaled import scaled
+from pyharness.engine.rotated import rotated
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import rotated
 
 
 def _body(source: Random) -> list[float]:

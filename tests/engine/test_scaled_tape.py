@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingMoments, Scene, TorqueLaw, opaque, prepare, solve, solve_many, torques
+from pyharness.engine.rescaled import rescaling_factor
 from pyharness.engine.scaled_tape import scaled_tape
 from pyharness.engine.system import with_constant_body
 from pyharness.model.codes import Statuses
 from pyharness.model.expressions import parsed
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import FLOATS, Tape, evaluate
-from pyharness.scenes.rescaled import rescaling_factor
 from pyharness.truth.reference import reference
 
 OMEGA = np.array([0.3, 1.0, 0.2])

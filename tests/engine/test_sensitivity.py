@@ -13,10 +13,10 @@ import pyharness.engine.sensitivity as room
 from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
 from pyharness.engine import linearised, taylor
 from pyharness.engine import solver as solver_module
+from pyharness.engine.rescaled import scaled, unscaled
 from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, motion_growth
 from pyharness.model.codes import Statuses
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
-from pyharness.scenes.rescaled import scaled, unscaled
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, principal, read_scene
+from pyharness.engine.rescaled import scaled
+from pyharness.engine.rotated import restarted_at, rotated
 from pyharness.model.attitude import matrices
 from pyharness.model.records import scene_record
 from pyharness.model.scene import most_steps
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
-from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import restarted_at, rotated
 
 GOOD = """
 name = "spinning brick"

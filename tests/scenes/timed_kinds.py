@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from pyharness.engine.rescaled import scaled
+from pyharness.engine.rotated import rotated
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Array
-from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import rotated
 
 Generator = np.random.Generator
 

@@ -33,6 +33,7 @@ from pyharness.checks.theory.conditioning import (
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.length import CLOSED_FORM
 from pyharness.engine.registry import METHODS
+from pyharness.engine.rotated import rotated
 from pyharness.engine.solve import solve
 from pyharness.model.attitude import (
     SEQUENCES,
@@ -46,7 +47,6 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.scenes.extreme import EXTREMES, POINTED
 from pyharness.scenes.random_scenes import random_scene
-from pyharness.scenes.rotated import rotated
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 

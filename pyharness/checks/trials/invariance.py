@@ -19,6 +19,8 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.conditioning import FLOW, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
 from pyharness.engine.registry import FIXED_STEP, METHODS, SCIPY_METHODS
+from pyharness.engine.rescaled import scaled
+from pyharness.engine.rotated import restarted_at, rotated
 from pyharness.engine.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
@@ -26,8 +28,6 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.scenes.random_scenes import random_scene
-from pyharness.scenes.rescaled import scaled
-from pyharness.scenes.rotated import restarted_at, rotated
 
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")

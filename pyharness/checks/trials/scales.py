@@ -15,12 +15,12 @@ from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import Conditioning, conditioning
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.engine.registry import FIXED_STEP, SCIPY_METHODS
+from pyharness.engine.rescaled import scaled
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
-from pyharness.scenes.rescaled import scaled
 
 _DRIVEN = replace(
     ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.batch import Batch
 from pyharness.engine.many import solve_many
+from pyharness.engine.rotated import restarted_at
 from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, integrate_models
 from pyharness.history.claims.ledger import claim, claims
@@ -25,7 +26,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
 from pyharness.original.many import run_many
-from pyharness.scenes.rotated import restarted_at
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.

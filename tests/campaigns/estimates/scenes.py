@@ -10,11 +10,11 @@ from random import Random
 
 import numpy as np
 
+from pyharness.engine.rotated import rotated
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
-from pyharness.scenes.rotated import rotated
 from tests.campaigns.estimates.truth import Truth, truth_of
 from tests.scenes.timed_kinds import NASTY, timed_scenes, triple
 

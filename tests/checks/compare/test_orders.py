@@ -13,6 +13,7 @@ from pyharness.checks.compare.comparison import compare_programs
 from pyharness.checks.compare.orders import Order, measured_order, order_of
 from pyharness.checks.compare.report import comparison_report
 from pyharness.checks.theory.conditioning import ROUNDING
+from pyharness.engine.rescaled import scaled
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
@@ -20,7 +21,6 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
-from pyharness.scenes.rescaled import scaled
 from pyharness.truth.reference import Reference, reference
 from pyharness.views.render import render
 

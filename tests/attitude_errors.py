@@ -12,8 +12,8 @@ import numpy as np
 
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
+from tests.checks.scenes.free_motions import KINDS, Motion, draw
 from tests.exact_attitude import DIGITS, exact
-from tests.scenes.free_motions import KINDS, Motion, draw
 
 
 def errors(motion: Motion) -> tuple[float, float]:

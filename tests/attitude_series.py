@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness import InputError, solve
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.attitude import angle_between
-from pyharness.scenes.random_scenes import draw
 from tests.campaigns import driver
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)

@@ -36,7 +36,7 @@ def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
 
 def test_a_module_has_the_tests_that_import_it() -> None:
     found = nearest(["pyharness/engine/rescaled.py"], sources())
-    assert found[0] == "tests/scenes/test_rescaled.py"
+    assert found[0] == "tests/checks/scenes/test_rescaled.py"
     assert nearest(["fortran/modern/taylor_march.f90"], sources())
 
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from pyharness.bench.contenders import Contender
+from pyharness.checks.scenes.random_scenes import text_generator
 from pyharness.engine.many import solve_many
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.scenes.random_scenes import text_generator
 from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2

@@ -11,10 +11,10 @@ from random import Random
 import numpy as np
 
 from pyharness.bench.measure import Workload
+from pyharness.checks.scenes.by_torque import BODIES, LAWS, MOST_TURNS, SPEEDS, WAVES, by_torque
 from pyharness.checks.theory.conditioning import along, conditioning
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
-from pyharness.scenes.by_torque import BODIES, LAWS, MOST_TURNS, SPEEDS, WAVES, by_torque
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import Reference
 

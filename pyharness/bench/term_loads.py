@@ -9,13 +9,13 @@ import numpy as np
 from pyharness.bench.ensemble_contenders import EnsembleLoad
 from pyharness.bench.heyoka_equations import Formula
 from pyharness.bench.measure import Workload
+from pyharness.checks.scenes.random_scenes import text_generator
 from pyharness.engine import field_terms, terms
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
-from pyharness.scenes.random_scenes import text_generator
 from pyharness.truth.reference import reference
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s

@@ -11,6 +11,7 @@ import numpy as np
 
 from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.compare.agreement import differences, distance
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.checks.selection import Selection
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
@@ -18,7 +19,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original.cells import all_cells, cell_name, listing_name
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.scenes.random_scenes import draw
 
 # Right-hand sides per step: at the start and at each collocation point, or at four stages. The
 # step in which a run overflows is counted as well.

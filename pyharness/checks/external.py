@@ -21,6 +21,7 @@ from pyharness.checks.compare.candidates import (
     program_candidate,
 )
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
+from pyharness.checks.scenes.perturbed import perturbed
 from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import METHODS, REGISTRY
 from pyharness.engine.solve import finest
@@ -31,7 +32,6 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.scenes.perturbed import perturbed
 
 __all__ = ["external_checks", "problems"]
 

@@ -31,6 +31,7 @@ from pyharness.checks.judge import (
     of_end,
     reference_truth,
 )
+from pyharness.checks.scenes.extreme import EXTREMES, Circumstance, speed
 from pyharness.checks.stress import LISTINGS, named
 from pyharness.checks.theory import promises
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
@@ -39,7 +40,6 @@ from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.scenes.extreme import EXTREMES, Circumstance, speed
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 

@@ -19,6 +19,7 @@ from pyharness.checks.check import BITS, Check, Name, selected
 from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess, refuse_other
 from pyharness.checks.port_protocol import VARIABLES, Answer, read_answer, request
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import counted
 from pyharness.model.scene import Scene
@@ -26,7 +27,6 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.scenes.random_scenes import draw
 
 _DECK_LIPSCHITZ = 500.0  # 1/s, on the author's cards
 _DRAWN = re.compile(r"random/(\d{1,9})(?:/|$)")

@@ -29,6 +29,7 @@ from pyharness.checks.judge import (
     tolerance_of,
 )
 from pyharness.checks.methods import START, run_of_call, run_of_solve
+from pyharness.checks.scenes.random_scenes import Draw, draw
 from pyharness.checks.selection import Selection
 from pyharness.checks.theory.conditioning import along
 from pyharness.engine.problem import closed_form
@@ -36,7 +37,6 @@ from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.solve import finest
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
-from pyharness.scenes.random_scenes import Draw, draw
 from pyharness.truth.integer_series import integer_series
 
 # Of each pair of draws, one has a plain scene, and the other a scene of a kind in `NASTY`. Methods

@@ -22,6 +22,8 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.methods import run_of_call
 from pyharness.checks.random_methods import CAMPAIGN, ROUNDING, sample
+from pyharness.checks.scenes.random_scenes import COARSEST
+from pyharness.checks.scenes.state_scenes import draw, draw_ready
 from pyharness.checks.selection import Selection
 from pyharness.engine.many import solve_many
 from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, SCIPY_METHODS
@@ -29,8 +31,6 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
-from pyharness.scenes.random_scenes import COARSEST
-from pyharness.scenes.state_scenes import draw, draw_ready
 
 # One of 20 draws of a run has such a scene, and in one of 80 the methods in Python are tried too.
 _EVERY, _EVERY_SLOW = 20, 80

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pyharness.checks.check import Name, may_hold, selected
-from pyharness.scenes.random_scenes import weekly_seed
+from pyharness.checks.scenes.random_scenes import weekly_seed
 
 if TYPE_CHECKING:
     from pyharness.checks.external_file import Problem

@@ -5,13 +5,13 @@ A work limit, in right-hand sides, decides which tolerances are affordable, and 
 
 import math
 
+from pyharness.checks.scenes.extreme import speed
 from pyharness.checks.theory.conditioning import Conditioning
 from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.scipy_ivp import steps_sum
 from pyharness.engine.solve import finest as finest_of
 from pyharness.model.scene import Scene
-from pyharness.scenes.extreme import speed
 
 # Tolerances in the cases. Methods of solve_ivp are tried only at tolerances that take less than a
 # second.

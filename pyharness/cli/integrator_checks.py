@@ -6,11 +6,11 @@ import re
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
 from pyharness.checks.integrators.problem import DRAWS, Problem, problems
 from pyharness.checks.port import refuse_port
+from pyharness.checks.scenes.moderate import KINDS
 from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import Cost, check_count
 from pyharness.model.errors import InputError
-from pyharness.scenes.moderate import KINDS
 
 _REFUSED = ("only", "external", "update", "record", "port", "program", "case")
 _SCENES = Cost("random scenes of each kind", 1.0, 1e5, 1000)

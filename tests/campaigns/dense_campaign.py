@@ -13,9 +13,9 @@ from random import Random
 import numpy as np
 
 from pyharness import InputError, Scene, solve
+from pyharness.checks.scenes.random_scenes import draw as draw_law
+from pyharness.checks.scenes.state_scenes import SUDDEN, draw, draw_ready
 from pyharness.model.attitude import angle_between
-from pyharness.scenes.random_scenes import draw as draw_law
-from pyharness.scenes.state_scenes import SUDDEN, draw, draw_ready
 from tests.campaigns import driver
 
 TIMES = 500

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from pyharness import InputError, Scene, TorqueLaw, solve
+from pyharness.checks.scenes.state_scenes import STEADY, TURNING, draw, draw_ready
 from pyharness.model.state_torque import of_law
 from pyharness.model.trajectory import Array
-from pyharness.scenes.state_scenes import STEADY, TURNING, draw, draw_ready
 from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.reference import exact_coefficients
 from tests.campaigns import driver

@@ -33,18 +33,18 @@ import numpy as np
 from docs.campaign.page import DATA, write_page
 from docs.campaign.tally import Run, Tally, command, merged
 from pyharness import ImpossibleBodyWarning, InputError, Scene, solve
+from pyharness.checks.scenes.random_scenes import draw as draw_law
+from pyharness.checks.scenes.state_scenes import draw as draw_state
 from pyharness.model.attitude import product
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
-from pyharness.scenes.random_scenes import draw as draw_law
-from pyharness.scenes.state_scenes import draw as draw_state
 from pyharness.truth.certificate import prove
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius
 from pyharness.truth.enclosure import enclose
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import exact_coefficients, reference
-from tests.scenes.free_motions import KINDS as FREE
-from tests.scenes.free_motions import draw as draw_free
+from tests.checks.scenes.free_motions import KINDS as FREE
+from tests.checks.scenes.free_motions import draw as draw_free
 
 GROUPS = ("free", "short", "law", "state")
 MOST_GROWTH = 1e6

@@ -16,7 +16,7 @@ from dataclasses import replace
 from random import Random
 
 from pyharness import InputError, Scene, solve
-from pyharness.scenes.state_scenes import (
+from pyharness.checks.scenes.state_scenes import (
     READY,
     STEADY,
     SUDDEN,

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from pyharness import Scene
+from pyharness.checks.scenes.state_scenes import draw, draw_ready
 from pyharness.model.trajectory import Array
-from pyharness.scenes.state_scenes import draw, draw_ready
 from pyharness.truth.reference import reference
 from tests.campaigns import driver, entries
 from tests.campaigns.driver import Tally

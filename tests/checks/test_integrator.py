@@ -19,9 +19,9 @@ from pyharness.checks.integrators.problem import LEVELS, convergence, problems
 from pyharness.checks.integrators.protocol import read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER
 from pyharness.checks.port_process import PortError
+from pyharness.checks.scenes.moderate import KINDS, draw_moderate
 from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
-from pyharness.scenes.moderate import KINDS, draw_moderate
 from tests.campaigns import integrator_campaign as campaign
 from tests.campaigns.integrator_campaign import METHODS, Drawn, drawn, is_right, right, solve_of
 from tests.json_reference import schema_of

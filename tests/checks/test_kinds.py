@@ -27,6 +27,7 @@ from pyharness.checks.orders import judged_order
 from pyharness.checks.plants import self_test
 from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
+from pyharness.checks.scenes.random_scenes import draw, weekly_seed
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli.main import main
 from pyharness.engine import problem
@@ -39,7 +40,6 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.original import compiled
 from pyharness.original.cells import all_cells, cell_name
 from pyharness.original.programs import PROGRAM_REGISTRY, Program
-from pyharness.scenes.random_scenes import draw, weekly_seed
 
 Capture = pytest.CaptureFixture[str]
 BY_NAME = {plant.name: plant for plant in PLANTS}

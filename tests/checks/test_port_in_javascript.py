@@ -13,11 +13,11 @@ from pyharness import run_program
 from pyharness.checks.port import differences, port
 from pyharness.checks.port_process import PortProcess
 from pyharness.checks.port_protocol import ENDINGS, read_answer, request
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.original.linear_solver import leqt1f
-from pyharness.scenes.random_scenes import draw
 from tests.ports import WEB, node, run_javascript, sample
 
 

@@ -14,11 +14,11 @@ import pytest
 from pyharness import Scene, read_scene, solve, torques
 from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
+from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
 from pyharness.cli.main import main
 from pyharness.engine.registry import METHODS
 from pyharness.model.scene_file import scene_text
-from pyharness.scenes.random_scenes import random_scene
 
 DAMPED = "docs/damped.toml"
 MOMENTS = (4.0, 3.0, 2.0)

@@ -15,6 +15,7 @@ import pytest
 from pyharness.checks import hold as truth
 from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.compare.candidates import End
+from pyharness.checks.scenes.extreme import EXTREMES, in_steps
 from pyharness.checks.stress import named, stress, worst
 from pyharness.cli.main import main
 from pyharness.engine.scene_reader import read_scene
@@ -22,7 +23,6 @@ from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.original.programs import PROGRAM_REGISTRY
-from pyharness.scenes.extreme import EXTREMES, in_steps
 from tests.checks.stressed import checks_of, failed
 
 

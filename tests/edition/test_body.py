@@ -21,10 +21,10 @@ from pyharness.edition.bundle import bundle
 from pyharness.model.extension import extension
 from pyharness.truth.free_attitude import free_attitude, is_steady, period_of
 from tests.attitude_errors import largest_error
+from tests.checks.scenes.free_motions import KINDS, Motion, draw
 from tests.conftest import Printed
 from tests.exact_attitude import exact
 from tests.ports import WEB, run_javascript
-from tests.scenes.free_motions import KINDS, Motion, draw
 
 BODY = WEB / "body"
 IDENTITY = [1.0, 0.0, 0.0, 0.0]

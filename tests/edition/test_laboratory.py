@@ -16,6 +16,7 @@ import pytest
 from pyharness import case_scene, run_program
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.port_protocol import requested_scene
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.edition.laboratory import MOST_STEPS, context, data
 from pyharness.engine.solve import solve
 from pyharness.history.limits import limit_solution
@@ -25,7 +26,6 @@ from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
 from pyharness.original.printer import page
-from pyharness.scenes.random_scenes import draw
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
 from tests.ports import WEB, run_javascript

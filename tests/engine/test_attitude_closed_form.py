@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from pyharness import Scene
+from pyharness.checks.scenes.extreme import quarter
 from pyharness.engine.closed_form import known_solution
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
-from pyharness.scenes.extreme import quarter
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude
 from tests.attitude_errors import errors, largest_error
+from tests.checks.scenes.free_motions import KINDS, Motion, draw
 from tests.exact_attitude import exact, joint, times
-from tests.scenes.free_motions import KINDS, Motion, draw
 
 _BOUND = 2e-15
 _OMEGA_BOUND = 2e-14

@@ -14,8 +14,8 @@ import pytest
 
 from pyharness import Scene, prepare, solve
 from pyharness.model.trajectory import Array
+from tests.checks.scenes.timed_kinds import SPINS, timed_scenes
 from tests.exact_attitude import times as hamilton
-from tests.scenes.timed_kinds import SPINS, timed_scenes
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 ROUNDING = 2.0**-53

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from pyharness import TorqueLaw, solve
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.engine import averaged_step
 from pyharness.engine.averaged_coordinates import Coordinates
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.scenes.random_scenes import draw
 from pyharness.torques import damping, rate_control, recorded
 from pyharness.truth.integer_series import integer_series
-from tests.scenes.weak_torques import MOTIONS, TORQUES, draw_weak
+from tests.checks.scenes.weak_torques import MOTIONS, TORQUES, draw_weak
 
 MOMENTS = (3.0, 2.0, 1.2)
 PUSH = TorqueLaw((1e-6, 2e-6, 1e-6))

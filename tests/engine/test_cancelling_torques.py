@@ -16,7 +16,7 @@ from pyharness.engine.sensitivity import torque_noise
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave
 from pyharness.truth.reference import reference
-from tests.scenes.cancelling import LEFT, MERGED, cancelling
+from tests.checks.scenes.cancelling import LEFT, MERGED, cancelling
 
 
 def _triple(source: random.Random, size: float) -> Triple:

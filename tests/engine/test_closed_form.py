@@ -21,8 +21,8 @@ from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
+from tests.checks.scenes.free_motions import draw, draw_top
 from tests.exact_tops import DIGITS, exact_top
-from tests.scenes.free_motions import draw, draw_top
 
 _UNIT = 2.0**-53
 _BOUND = 16 * _UNIT

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.cli.main import main
 from pyharness.engine.batch import Solver
 from pyharness.engine.plan import plan
 from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
 from pyharness.engine.solver import PREPARED
 from pyharness.model.listing import Listing
-from pyharness.scenes.random_scenes import draw
 from tests.conftest import Printed
 
 # Even numbers are possible bodies with a torque of any kind, which turn a few radians a second.

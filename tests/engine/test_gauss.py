@@ -20,8 +20,8 @@ from pyharness.engine.solve import solve
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
+from tests.checks.scenes.timed_kinds import timed_scenes
 from tests.engine.tolerance_scenes import motions
-from tests.scenes.timed_kinds import timed_scenes
 from tests.within import check_error
 
 _MAKER = Path(__file__).parent.parent.parent / "fortran/make_gauss.py"

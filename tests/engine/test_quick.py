@@ -12,7 +12,7 @@ from pyharness.engine.problem import normalized
 from pyharness.model.extension import extension
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
-from tests.scenes.timed_kinds import NASTY, timed_scenes
+from tests.checks.scenes.timed_kinds import NASTY, timed_scenes
 
 
 @cache

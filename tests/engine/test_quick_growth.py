@@ -14,7 +14,7 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare
 from pyharness.engine.solver import Solver
-from tests.scenes.timed_kinds import KINDS, NASTY, timed_scenes
+from tests.checks.scenes.timed_kinds import KINDS, NASTY, timed_scenes
 
 ROUNDING = 2.0**-53
 _UNSURE = 0.3  # rounding times growth, in tolerances, above which the series reports sensitive

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many, torques
+from pyharness.checks.scenes.random_scenes import draw as draw_law
+from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.taylor import taylor
 from pyharness.model.codes import Operations
 from pyharness.model.state_torque import replayed
-from pyharness.scenes.random_scenes import draw as draw_law
-from pyharness.scenes.state_scenes import draw
 
 MOMENTS = (1.0, 2.0, 2.5)
 SPHERE = (2.0, 2.0, 2.0)

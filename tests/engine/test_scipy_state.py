@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from pyharness import TorqueLaw, solve
+from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.scipy_ivp import FINEST, finest_tolerance, scipy_method
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, opaque, replayed
 from pyharness.model.trajectory import Trajectory
-from pyharness.scenes.state_scenes import draw
 from pyharness.torques import table
 from pyharness.truth.reference import Reference, reference
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.engine.plan import plan
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.trajectory import Array, turned_to_space
-from pyharness.scenes.random_scenes import draw
 
 TURNED = (0.5, -0.1, 0.7, 0.5)
 BODY = (40.0, 30.0, 20.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve_many, torques
+from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.ensemble import Ensemble
 from pyharness.engine.many_recorded import solve_side_by_side
 from pyharness.model.arrays import unit_quaternions
-from pyharness.scenes.state_scenes import draw
 
 MOMENTS = (1.0, 2.0, 2.5)
 

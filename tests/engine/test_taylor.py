@@ -21,8 +21,8 @@ from pyharness.model.values import Triple
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 from tests.as_written import as_written, compiler_here
+from tests.checks.scenes.timed_kinds import NASTY, timed_scenes
 from tests.instruction_sets import BEST, level_here
-from tests.scenes.timed_kinds import NASTY, timed_scenes
 
 RUNS = [(case, 3.0) for case in range(1, 8)] + [(3, 100.0), (4, 100.0)]
 REST = Scene("", (0.0, 0.0, 0.0), moments=(40.0, 30.0, 20.0))

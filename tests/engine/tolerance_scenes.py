@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, torques
+from pyharness.checks.scenes import state_scenes
+from pyharness.checks.scenes.kinds import KINDS as DRAWN
+from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.model.attitude import IDENTITY
-from pyharness.scenes import state_scenes
-from pyharness.scenes.kinds import KINDS as DRAWN
-from pyharness.scenes.random_scenes import random_scene
-from tests.scenes.cancelling import MERGED, cancelling
-from tests.scenes.free_motions import KINDS as FREE
-from tests.scenes.free_motions import draw as draw_free
-from tests.scenes.timed_kinds import KINDS as TIMED
-from tests.scenes.timed_kinds import timed_scenes
+from tests.checks.scenes.cancelling import MERGED, cancelling
+from tests.checks.scenes.free_motions import KINDS as FREE
+from tests.checks.scenes.free_motions import draw as draw_free
+from tests.checks.scenes.timed_kinds import KINDS as TIMED
+from tests.checks.scenes.timed_kinds import timed_scenes
 from tests.within import Motion, true_motion
 
 Timed = tuple[Scene, float]

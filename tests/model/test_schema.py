@@ -16,6 +16,7 @@ from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
+from pyharness.checks.scenes.moderate import draw_moderate
 from pyharness.cli.output import check_tree
 from pyharness.edition.crate import PACKAGE_MARK
 from pyharness.edition.report import MARK
@@ -27,7 +28,6 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
 from pyharness.original.vectors import OURS, answers
-from pyharness.scenes.moderate import draw_moderate
 from tests.ensembles.sweeps import TILT, files, text, written
 from tests.ports import engine
 

@@ -7,11 +7,11 @@ import mpmath
 import numpy as np
 import pytest
 
+from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.system import system_of
 from pyharness.model.state_torque import StateTorque, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
 from pyharness.model.tape_derivative import with_derivatives
-from pyharness.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 
 SLOTS = (TIME, *OMEGA, *ATTITUDE)
 

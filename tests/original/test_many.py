@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.original import many
 from pyharness.original.cells import all_listings
 from pyharness.original.many import run_many
-from pyharness.scenes.random_scenes import draw
 from tests.original.single_runs import Options, assert_alike, assert_same, same_bits
 from tests.original.test_programs import NASTY
 

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, principal
-from pyharness.scenes.random_scenes import random_scene
+from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.truth import certificate_checker
 from pyharness.truth.certificate import prove
 from pyharness.truth.certificate_checker import NotProvedError, System, check, check_file

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, principal
+from pyharness.checks.scenes import state_scenes
+from pyharness.checks.scenes.random_scenes import random_scene
+from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING
 from pyharness.model.errors import InputError
 from pyharness.model.state_torque import of_law
-from pyharness.scenes import state_scenes
-from pyharness.scenes.random_scenes import random_scene
-from pyharness.scenes.state_scenes import READY, STEADY, TURNING
 from pyharness.torques import table
 from pyharness.truth import enclosure
 from pyharness.truth.certificate import prove

@@ -16,7 +16,7 @@ from pyharness.model.attitude import product
 from pyharness.model.scene import Triple
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude
-from tests.scenes.free_motions import KINDS, draw, draw_top
+from tests.checks.scenes.free_motions import KINDS, draw, draw_top
 
 flint: Any = pytest.importorskip("flint")
 enclosure: Any = pytest.importorskip("pyharness.truth.enclosure_free")

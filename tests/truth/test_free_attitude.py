@@ -10,8 +10,8 @@ from pyharness import Scene
 from pyharness.model.attitude import product
 from pyharness.model.scene import Triple
 from pyharness.truth.free_attitude import conjugate, free_attitude, is_steady, period_of
+from tests.checks.scenes.free_motions import KINDS, draw
 from tests.exact_attitude import DIGITS, exact
-from tests.scenes.free_motions import KINDS, draw
 
 
 @pytest.mark.sampled

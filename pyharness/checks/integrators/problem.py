@@ -13,10 +13,10 @@ import numpy as np
 from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import Fault, State, motions
 from pyharness.checks.integrators.protocol import Motion, request
+from pyharness.checks.scenes.moderate import KINDS, draw_moderate
 from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.scenes.moderate import KINDS, draw_moderate
 from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 

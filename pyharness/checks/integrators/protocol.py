@@ -10,11 +10,11 @@ import numpy as np
 
 from pyharness.checks.port_process import PortError, refuse_other
 from pyharness.checks.port_protocol import read_list, read_number, read_object
+from pyharness.checks.scenes.moderate import KINDS, draw_moderate
 from pyharness.model.records import scene_record
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import Array
-from pyharness.scenes.moderate import KINDS, draw_moderate
 
 CONTROLS = ("step_size", "tolerance")
 """The field of a request that determines the accuracy of an integrator."""

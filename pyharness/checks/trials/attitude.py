@@ -22,6 +22,8 @@ from pyharness.checks.judge import (
     tolerance_of,
     unknown_flow,
 )
+from pyharness.checks.scenes.extreme import EXTREMES, POINTED
+from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import (
     ATTITUDE,
@@ -45,8 +47,6 @@ from pyharness.model.attitude import (
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
-from pyharness.scenes.extreme import EXTREMES, POINTED
-from pyharness.scenes.random_scenes import random_scene
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 

@@ -15,6 +15,7 @@ import numpy as np
 from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.compare.candidates import unstopped
 from pyharness.checks.hold import OURS, apart, run_method, scene_of
+from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.conditioning import FLOW, Conditioning, conditioning
 from pyharness.checks.tolerances import finest_and_middling
@@ -27,7 +28,6 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.scenes.random_scenes import random_scene
 
 _ADAPTIVE = (*OURS, "quick", "auto", "dop853", "rk45", "lsoda", "radau")
 _PREPARED = ("quick", "auto")

@@ -15,6 +15,7 @@ import numpy as np
 from pyharness.checks.check import BITS, Attempt, Check, Name
 from pyharness.checks.compare.candidates import method_candidate, prepared_candidate, unstopped
 from pyharness.checks.hold import scene_of
+from pyharness.checks.scenes.extreme import speed
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory import brouwer
 from pyharness.checks.theory.brouwer import LAWS, POWER, WALK, Noise, Orbit
@@ -28,7 +29,6 @@ from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.scenes.extreme import speed
 from pyharness.truth.elliptic import torque_free
 
 # Numbers of revolutions. A revolution is the time 2 pi over the largest component of omega, as for

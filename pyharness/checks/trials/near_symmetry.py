@@ -6,8 +6,8 @@ from functools import partial
 from pyharness.checks.check import Attempt, Name
 from pyharness.checks.hold import FORMS, check_all, check_methods, truth_of
 from pyharness.checks.judge import unknown_flow
+from pyharness.checks.scenes.extreme import LONG, SYMMETRIC_START
 from pyharness.checks.stress import Trial
-from pyharness.scenes.extreme import LONG, SYMMETRIC_START
 
 # The long time is tried only with closed forms, because their limits need no bound on the error
 # amplification.

@@ -11,6 +11,7 @@ from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
 from pyharness.checks.compare.candidates import End, not_finite
 from pyharness.checks.hold import ALL, check_all, check_methods, run_method, scene_of, truth_of
 from pyharness.checks.judge import Truth
+from pyharness.checks.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import Conditioning, conditioning
 from pyharness.checks.tolerances import MIDDLING
@@ -20,7 +21,6 @@ from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.scenes.extreme import ORDINARY, ORDINARY_TIME, TWOS, in_steps
 
 _DRIVEN = replace(
     ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))

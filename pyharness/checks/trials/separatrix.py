@@ -6,12 +6,12 @@ import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import ALL, check_all, run_method
+from pyharness.checks.scenes.extreme import MIDDLE_AXIS, in_steps
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
-from pyharness.scenes.extreme import MIDDLE_AXIS, in_steps
 
 _STAYS = 50.0  # s
 _UNDISTURBED = Basis(

@@ -11,12 +11,12 @@ from pyharness.bench.contenders import Contender, SceneContender, own
 from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
+from pyharness.checks.scenes.random_scenes import weekly_seed
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import SCENES, check_count
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene_file import case_numbers
-from pyharness.scenes.random_scenes import weekly_seed
 
 _Named = TypeVar("_Named", bound=Contender)
 # Longest horizon, s; beyond it the reference solution, in decimal arithmetic, takes too long.

@@ -10,13 +10,13 @@ from random import Random
 
 import numpy as np
 
+from pyharness.checks.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.engine.rotated import rotated
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from tests.campaigns.estimates.truth import Truth, truth_of
-from tests.scenes.timed_kinds import NASTY, timed_scenes, triple
+from tests.checks.scenes.timed_kinds import NASTY, timed_scenes, triple
 
 _MOST_TURNS = 330.0
 _SHORT = 0.3  # fraction of scenes that end within a revolution or a few

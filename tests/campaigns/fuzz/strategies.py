@@ -12,12 +12,12 @@ from random import Random
 from typing import Any
 
 from pyharness import InputError, Scene, TorqueLaw
+from pyharness.checks.scenes.random_scenes import Draw, draw
 from pyharness.engine.registry import METHODS
 from pyharness.engine.solver import PREPARED
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Triple
 from pyharness.model.torque_law import Wave
-from pyharness.scenes.random_scenes import Draw, draw
 
 _CORNERS = (
     0.0, -0.0, 1.0, -1.0, 0.5, 1 / 3, 5e-324, -5e-324, 2.2250738585072014e-308, 1e-300, 1e-160,

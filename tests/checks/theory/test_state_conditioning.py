@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, solve, torques
+from pyharness.checks.scenes.random_scenes import draw as draw_law
+from pyharness.checks.scenes.state_scenes import draw, draw_ready
 from pyharness.checks.theory.conditioning import conditioning
 from pyharness.checks.theory.state_conditioning import conditioning_at
 from pyharness.model.state_torque import of_law
-from pyharness.scenes.random_scenes import draw as draw_law
-from pyharness.scenes.state_scenes import draw, draw_ready
 
 
 @pytest.mark.sampled

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, solve, torques
+from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.rotated import axes_of, later, restarted_at, rotated
 from pyharness.model.scene import Triple
 from pyharness.model.state_torque import StateTorque
-from pyharness.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 
 MOMENTS = [4.0, 3.0, 2.0]
 

@@ -6,9 +6,9 @@ from random import Random
 
 import numpy as np
 
+from pyharness.checks.scenes.kinds import KINDS, NASTY
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene import Scene
-from pyharness.scenes.kinds import KINDS, NASTY
 
 COARSEST = 1e-3
 # Defects that were added to the project later. They are drawn last, so that the draws of a seed

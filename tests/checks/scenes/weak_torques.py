@@ -5,8 +5,8 @@ from random import Random
 
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw, Wave
-from tests.scenes.free_motions import KINDS
-from tests.scenes.free_motions import draw as draw_motion
+from tests.checks.scenes.free_motions import KINDS
+from tests.checks.scenes.free_motions import draw as draw_motion
 
 MOTIONS = tuple(kind for kind in KINDS if kind not in ("needle", "sphere"))
 TORQUES = ("constant", "linear", "slow waves", "fast wave", "sum")

@@ -7,12 +7,12 @@ from random import Random
 
 import pytest
 
-from pyharness.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
-from pyharness.scenes.kinds import KINDS, NASTY
-from pyharness.scenes.random_scenes import draw, random_scene, text_generator
-from tests.scenes import free_motions, timed_kinds
-from tests.scenes.cancelling import LEFT, MERGED, cancelling
-from tests.scenes.timed_kinds import timed_scenes
+from pyharness.checks.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
+from pyharness.checks.scenes.kinds import KINDS, NASTY
+from pyharness.checks.scenes.random_scenes import draw, random_scene, text_generator
+from tests.checks.scenes import free_motions, timed_kinds
+from tests.checks.scenes.cancelling import LEFT, MERGED, cancelling
+from tests.checks.scenes.timed_kinds import timed_scenes
 
 
 def digest(*found: object) -> str:

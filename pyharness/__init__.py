@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from pyharness.model.state_torque import StateTorque, opaque
     from pyharness.model.torque_law import TorqueLaw
     from pyharness.model.trajectory import Stop, Trajectory
-    from pyharness.original.many import ProgramEnsemble, run_many
-    from pyharness.original.programs import run_program
+    from pyharness.thesis.many import ProgramEnsemble, run_many
+    from pyharness.thesis.programs import run_program
 
     __version__: str
     # Modules that the build generates.

@@ -22,7 +22,7 @@ SECONDS = 26.0
 _WELL = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 # Tests of a file that no test names, by the beginning of its path. Those of a package follow.
 USERS = {
-    "fortran/original": "tests/original", "fortran/many/lanes": "tests/original",
+    "fortran/original": "tests/thesis", "fortran/many/lanes": "tests/thesis",
     "fortran": "tests/engine", "web": "tests/edition", "pyharness/edition": "tests/edition",
     "pyharness/data": "tests/history", "pyharness/__main__": "tests/cli",
 }  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 
 from pyharness.checks.plants.port_plants import PLANTS
 from pyharness.cli.main import main
-from pyharness.original.cells import all_cells
+from pyharness.thesis.cells import all_cells
 from tests.checks.test_port_in_c import FAULTS, SOURCE
 from tests.ports import ROOT, TEMPLATE, compiled_port, engine
 

@@ -33,9 +33,9 @@ from pyharness.model.report import Column, Report, Table, words
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Stop
-from pyharness.original.cells import all_cells
-from pyharness.original.programs import run_program
-from pyharness.original.word import WORDS
+from pyharness.thesis.cells import all_cells
+from pyharness.thesis.programs import run_program
+from pyharness.thesis.word import WORDS
 from pyharness.truth import reference
 from pyharness.views import markdown
 

@@ -19,7 +19,7 @@ from pyharness.history.claims.laboratory import starts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.truth.enclosed import Balls, rounded_up
 
 PAGE = "explanation/proofs.md"

@@ -22,8 +22,8 @@ from pyharness.history.tei_header import CERTAINTY, KINDS
 from pyharness.history.timeline import gaps, timeline
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import deck
-from pyharness.original.deck_collation import rows
+from pyharness.thesis.cards import deck
+from pyharness.thesis.deck_collation import rows
 
 HERE = Path(__file__).parent
 PAGE = "explanation/about-the-text.md"

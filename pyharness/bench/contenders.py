@@ -16,7 +16,7 @@ from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 # Three tolerances per decade. The tolerances are so close that a method is compared by its error,
 # even if its error is far below its tolerance.

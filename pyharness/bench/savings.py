@@ -16,7 +16,7 @@ from pyharness.engine.prepared import prepare
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 
 _BATCHES = 9  # number of batches of calls that are timed
 _SECONDS = 2e-3  # duration of a batch

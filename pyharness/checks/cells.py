@@ -17,8 +17,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.original.cells import all_cells, cell_name, listing_name
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.cells import all_cells, cell_name, listing_name
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 # Right-hand sides per step: at the start and at each collocation point, or at four stages. The
 # step in which a run overflows is counted as well.

@@ -18,10 +18,10 @@ from pyharness.checks.check import BITS, Check, Name
 from pyharness.checks.selection import Selection
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.original.cells import cell_name
-from pyharness.original.decks import Run, compiler, deck_text, run_deck, solver_object
-from pyharness.original.printer import page
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.cells import cell_name
+from pyharness.thesis.decks import Run, compiler, deck_text, run_deck, solver_object
+from pyharness.thesis.printer import page
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 _AT_ONCE = 2
 _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/case-2/original")

@@ -25,9 +25,9 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.original import collocation
-from pyharness.original.equations import omega_rate
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis import collocation
+from pyharness.thesis.equations import omega_rate
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 # Degree of a step as a polynomial of omega: each product of stages doubles it.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}

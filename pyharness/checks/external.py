@@ -31,7 +31,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 __all__ = ["external_checks", "problems"]
 

@@ -23,7 +23,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 # solve_ivp gives the true solution here. The finest tolerance that it meets is requested.

@@ -25,8 +25,8 @@ from pyharness.model.report import counted
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.cells import all_cells, cell_name
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.cells import all_cells, cell_name
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 _DECK_LIPSCHITZ = 500.0  # 1/s, on the author's cards
 _DRAWN = re.compile(r"random/(\d{1,9})(?:/|$)")

@@ -15,7 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop
 from pyharness.model.values import parsed_float
-from pyharness.original.equations import card_torque
+from pyharness.thesis.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
 """Columns of each row of results, in the order of TAPE5; their units are s, rad/s and m/s."""

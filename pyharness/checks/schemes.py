@@ -20,7 +20,7 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 # Roundings of a rate, including the stages that lead to it, and of the sum to which it is added.
 _ROUNDINGS = 32.0

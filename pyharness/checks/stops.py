@@ -21,8 +21,8 @@ from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
-from pyharness.original.cells import listing_name, subsets
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.cells import listing_name, subsets
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 _PROGRAM = "runge-kutta"
 _QUOTIENT = Basis(

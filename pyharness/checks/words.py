@@ -15,17 +15,17 @@ from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original import compiled_in_word, in_word
-from pyharness.original.cells import all_cells
-from pyharness.original.programs import BINARY64, run_program
-from pyharness.original.vectors import answers
-from pyharness.original.word import WORDS
+from pyharness.thesis import compiled_in_word, in_word
+from pyharness.thesis.cells import all_cells
+from pyharness.thesis.programs import BINARY64, run_program
+from pyharness.thesis.vectors import answers
+from pyharness.thesis.word import WORDS
 
 _THIN_CASE = 3
 _VECTORS = Basis(
     "derived",
     "no test vector of the CDC arithmetic may differ",
-    "the rules of the CYBER 170 hardware reference, CDC 60463560 (`original/vectors.py`)",
+    "the rules of the CYBER 170 hardware reference, CDC 60463560 (`thesis/vectors.py`)",
 )
 
 

@@ -30,7 +30,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import numbers
 from pyharness.model.schema import SCHEMAS
-from pyharness.original.cards import deck
+from pyharness.thesis.cards import deck
 from pyharness.views.csv import csv_text
 from pyharness.views.json import json_text
 from pyharness.views.json import write as json_of

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 from pyharness.history.ablation import entries
 from pyharness.model.facts import facts
-from pyharness.original.cards import Card, deck, numbers, parallels, tight
-from pyharness.original.collation import witness_lines
-from pyharness.original.decks import corrected_cards, corrections
-from pyharness.original.port_lines import Place, switch_at
+from pyharness.thesis.cards import Card, deck, numbers, parallels, tight
+from pyharness.thesis.collation import witness_lines
+from pyharness.thesis.decks import corrected_cards, corrections
+from pyharness.thesis.port_lines import Place, switch_at
 
 TITLES = {
     "two-term": "Two-term collocation",

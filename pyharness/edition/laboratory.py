@@ -17,9 +17,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import ending, heading
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.cards import deck, numbers
-from pyharness.original.printer import formats_of, page
-from pyharness.original.programs import run_program
+from pyharness.thesis.cards import deck, numbers
+from pyharness.thesis.printer import formats_of, page
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}

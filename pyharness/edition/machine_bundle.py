@@ -16,8 +16,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.report import numbers
 from pyharness.model.scene_file import case_scene
-from pyharness.original.decks import SYSTEMS, card_steps, deck_text, job_text
-from pyharness.original.programs import WORD_NAMES
+from pyharness.thesis.decks import SYSTEMS, card_steps, deck_text, job_text
+from pyharness.thesis.programs import WORD_NAMES
 from pyharness.views.csv import csv_text
 
 # The arithmetics of the machine, one for each of its two ways to compile a program.

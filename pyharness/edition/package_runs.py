@@ -14,7 +14,7 @@ from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.report import numbers
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.views.csv import csv_text
 
 FAULTS_CASE = 5

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from pyharness.edition.decks import Run
 from pyharness.model.listing import PROGRAMS
-from pyharness.original import deck_collation
-from pyharness.original.cards import Card, deck, numbers
+from pyharness.thesis import deck_collation
+from pyharness.thesis.cards import Card, deck, numbers
 
 # Parts of a statement: a relation such as .GT., a power, a name, a number, or any other character.
 _PART = re.compile(r"\.[A-Z]+\.|\*\*|[A-Z][A-Z0-9]*|\d+\.?\d*|\.\d+|\S")

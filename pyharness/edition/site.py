@@ -41,7 +41,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
-from pyharness.original.cards import deck
+from pyharness.thesis.cards import deck
 from pyharness.views.json import json_text
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 # The programs under the letters of the first scene, which does not tell their names at once.

@@ -22,7 +22,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.original.many import ProgramEnsemble, run_many
+from pyharness.thesis.many import ProgramEnsemble, run_many
 
 # Quantities that may be arrays for a program, but not for a method.
 OF_PROGRAMS = ("step_size", "lipschitz")

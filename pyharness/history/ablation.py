@@ -14,8 +14,8 @@ from pyharness.model.listing import Listing, names_of, subset, switches
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Stop
-from pyharness.original.cells import subsets
-from pyharness.original.programs import run_program
+from pyharness.thesis.cells import subsets
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 

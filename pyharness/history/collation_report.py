@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table, counted, words
 from pyharness.model.report import numbers as columns
-from pyharness.original.deck_collation import Row, faults
+from pyharness.thesis.deck_collation import Row, faults
 
 _SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
 _COLUMNS = (

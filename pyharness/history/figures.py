@@ -18,7 +18,7 @@ from pyharness.model.report import Picture, Report, Table, numbers, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from pyharness.model.facts import SHIPPED, facts_folder, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import Card
-from pyharness.original.port_lines import PORT, port_file
+from pyharness.thesis.cards import Card
+from pyharness.thesis.port_lines import PORT, port_file
 
 DATA = "pyharness/data"
 """The folder of the edition's data in the source repository."""

@@ -20,7 +20,7 @@ from pyharness.model.report import Column, Report, Section, Table, digits, short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Array
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11

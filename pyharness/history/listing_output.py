@@ -24,9 +24,9 @@ from pyharness.model.pipes import read_input
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import Column, Report, Section, Table, words
 from pyharness.model.scene_file import case_scene
-from pyharness.original.decks import card_steps
-from pyharness.original.printer import page
-from pyharness.original.programs import BINARY64, WORD_NAMES, run_program
+from pyharness.thesis.decks import card_steps
+from pyharness.thesis.printer import page
+from pyharness.thesis.programs import BINARY64, WORD_NAMES, run_program
 
 _LARGEST = 1 << 24  # largest size of a page's file, in bytes
 

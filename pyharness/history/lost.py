@@ -20,9 +20,9 @@ from pyharness.model.report import Column, Report, Section, Table, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
-from pyharness.original.in_word import WORDS, scene_in
-from pyharness.original.linear_solver import leqt1f
-from pyharness.original.programs import BINARY64
+from pyharness.thesis.in_word import WORDS, scene_in
+from pyharness.thesis.linear_solver import leqt1f
+from pyharness.thesis.programs import BINARY64
 from pyharness.truth.reference import reference
 
 WEIGHTINGS = ("subdomain", "galerkin", "least-squares")

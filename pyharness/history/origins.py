@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from pyharness.history.tei_header import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import deck, numbers, tight
-from pyharness.original.deck_collation import Row, rows
+from pyharness.thesis.cards import deck, numbers, tight
+from pyharness.thesis.deck_collation import Row, rows
 
 CERTAINTIES = tuple(CERTAINTY)
 """The degrees of certainty of an inference, which are those of the apparatus."""

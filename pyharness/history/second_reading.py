@@ -15,8 +15,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table, counted, digits, words
 from pyharness.model.report import numbers as columns
-from pyharness.original.cards import Card, chosen, deck, tight
-from pyharness.original.collation import witness_lines
+from pyharness.thesis.cards import Card, chosen, deck, tight
+from pyharness.thesis.collation import witness_lines
 
 _TAIL = 0.025  # probability beyond each end of a 95 % interval
 _COLUMNS = (

@@ -7,7 +7,7 @@ from xml.etree import ElementTree as xml
 import pyharness
 from pyharness.history.revisions import Revision, revisions
 from pyharness.model.facts import facts
-from pyharness.original.cards import deck, numbers
+from pyharness.thesis.cards import deck, numbers
 
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"

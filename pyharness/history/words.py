@@ -14,10 +14,10 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original import in_word
-from pyharness.original.linear_solver import SINGULAR
-from pyharness.original.printer import page
-from pyharness.original.word import RULES, Word
+from pyharness.thesis import in_word
+from pyharness.thesis.linear_solver import SINGULAR
+from pyharness.thesis.printer import page
+from pyharness.thesis.word import RULES, Word
 from pyharness.truth.reference import reference
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from pyharness.history.words import WordCell, WordRun
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Picture, Report, Section, Table, numbers, short, words
-from pyharness.original.word import RULES
+from pyharness.thesis.word import RULES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

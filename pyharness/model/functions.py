@@ -1,6 +1,6 @@
 """Elementary functions of floats, by the C library, and of numbers in other formats.
 
-The latter are of a class in `pyharness.original.word`, whose methods round correctly.
+The latter are of a class in `pyharness.thesis.word`, whose methods round correctly.
 """
 
 import math

@@ -14,7 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
-from pyharness.original.printer import page
+from pyharness.thesis.printer import page
 from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
 
 Open = Callable[[str], None]

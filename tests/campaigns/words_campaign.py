@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.original.word import RULES, WORDS, Number, Word
-from tests.original.exact_words import disagreements
+from pyharness.thesis.word import RULES, WORDS, Number, Word
+from tests.thesis.exact_words import disagreements
 
 OPERATIONS: tuple[Callable[[Any, Any], Any], ...] = (
     operator.add, operator.sub, operator.mul, operator.truediv,

@@ -37,9 +37,9 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.original import compiled
-from pyharness.original.cells import all_cells, cell_name
-from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.thesis import compiled
+from pyharness.thesis.cells import all_cells, cell_name
+from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 
 Capture = pytest.CaptureFixture[str]
 BY_NAME = {plant.name: plant for plant in PLANTS}

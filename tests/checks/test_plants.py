@@ -16,8 +16,8 @@ from pyharness.engine.prepared import prepare
 from pyharness.engine.solve import solve
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original import compiled
-from pyharness.original.programs import run_program
+from pyharness.thesis import compiled
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 # Enough steps for the measured orders to settle.

@@ -22,7 +22,7 @@ from pyharness.checks.port_protocol import Answer, read_answer, request
 from pyharness.cli.main import main
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_numbers
-from pyharness.original.cells import all_cells
+from pyharness.thesis.cells import all_cells
 from tests.ports import ROOT, SAMPLE, WEB, answering, documented, node, sample
 
 Capture = pytest.CaptureFixture[str]

@@ -17,7 +17,7 @@ from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.original.linear_solver import leqt1f
+from pyharness.thesis.linear_solver import leqt1f
 from tests.ports import WEB, node, run_javascript, sample
 
 

@@ -18,8 +18,8 @@ from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original import collocation
-from pyharness.original.linear_solver import leqt1f
+from pyharness.thesis import collocation
+from pyharness.thesis.linear_solver import leqt1f
 from pyharness.views.pictures import saved
 from tests.checks.stressed import checks_of
 

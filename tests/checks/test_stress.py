@@ -22,7 +22,7 @@ from pyharness.engine.scene_reader import read_scene
 from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 from tests.checks.stressed import checks_of, failed
 
 

@@ -25,7 +25,7 @@ from pyharness.model import build, extension
 from pyharness.model.errors import NotBuiltError
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 from tests.conftest import Printed
 from tests.instruction_sets import LEVELS, level_here
 
@@ -240,7 +240,7 @@ def test_extension_that_is_not_built_is_exit_code_3(capsys: Capture, monkeypatch
     def missing() -> None:
         raise NotBuiltError("the Fortran extension is not built; run 'make compare'")
 
-    monkeypatch.setattr("pyharness.original.compiled.extension", missing)
+    monkeypatch.setattr("pyharness.thesis.compiled.extension", missing)
     run = ["run", "--case", "3", "--program", "two-term"]
     assert main(run) == 3
     captured = capsys.readouterr()

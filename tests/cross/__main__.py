@@ -18,7 +18,7 @@ from pathlib import Path
 from pyharness.checks.check import Check, Name
 from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
-from pyharness.original.compiled_in_word import compiled_words
+from pyharness.thesis.compiled_in_word import compiled_words
 from pyharness.views.render import render
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
 from tests.cross.comparison import CHECKOUT, compared, inside
@@ -27,7 +27,7 @@ from tests.instruction_sets import fuses_here
 FOLDER = ROOT / "build" / "cross"
 # Tests of the kernels that are compared with the truth, not bit for bit.
 MODERN = (
-    "tests/original/test_linear_solver.py",
+    "tests/thesis/test_linear_solver.py",
     *(
         f"tests/engine/test_{name}.py"
         for name in ("closed_form", "fixed_step", "gauss", "quick", "prepared", "taylor")
@@ -39,7 +39,7 @@ CALLING = (
     "tests/campaigns/fuzz",
     "tests/engine",
     *(f"tests/model/test_{name}.py" for name in ("attitude", "conversions", "effort", "values")),
-    "tests/original",
+    "tests/thesis",
     "tests/checks/compare/test_candidates.py",
     "tests/checks/test_motions.py::test_bounds_hold",
     "tests/checks/test_stress.py::test_bounds_hold",

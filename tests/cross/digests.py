@@ -13,12 +13,12 @@ from pyharness import _build, _kernels  # noqa: PLC2701
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original import compiled_in_word, in_word
-from pyharness.original.cells import all_cells, all_listings, cell_name, listing_name
-from pyharness.original.compiled_in_word import compiled_words
-from pyharness.original.programs import BINARY64, COMPILED_WORDS, PROGRAM_REGISTRY
-from pyharness.original.word import WORDS
-from tests.original.test_programs import NASTY
+from pyharness.thesis import compiled_in_word, in_word
+from pyharness.thesis.cells import all_cells, all_listings, cell_name, listing_name
+from pyharness.thesis.compiled_in_word import compiled_words
+from pyharness.thesis.programs import BINARY64, COMPILED_WORDS, PROGRAM_REGISTRY
+from pyharness.thesis.word import WORDS
+from tests.thesis.test_programs import NASTY
 
 
 def digest(run: Trajectory) -> str:
@@ -84,7 +84,7 @@ def replay(cell: str) -> str:
         return f"pyharness verify --only {cell}"
     _, program, name = cell.split("/")[:3]
     return (
-        "pytest -q 'tests/original/test_programs.py::test_nasty_scenes_agree_to_the_last_bit"
+        "pytest -q 'tests/thesis/test_programs.py::test_nasty_scenes_agree_to_the_last_bit"
         f"[{program}-{name}]'"
     )
 

@@ -15,7 +15,7 @@ from pyharness import case_scene
 from pyharness.model.extension import COMPLETE, GAVE_UP, OVERFLOW
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Stop
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 from tests import traps
 from tests.cross.builds import ROOT, Build, false_claims
 from tests.cross.comparison import CHECKOUT, compared

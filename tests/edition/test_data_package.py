@@ -34,7 +34,7 @@ from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.programs import WORD_NAMES
+from pyharness.thesis.programs import WORD_NAMES
 from pyharness.views.render import render
 from tests.conftest import Printed
 from tests.json_reference import schema_of

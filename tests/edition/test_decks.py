@@ -9,9 +9,9 @@ from pyharness.edition import decks, parallel_decks
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
-from pyharness.original.cards import deck, find, numbers, tight
-from pyharness.original.collation import expected_lines, witness_lines
-from pyharness.original.decks import corrections
+from pyharness.thesis.cards import deck, find, numbers, tight
+from pyharness.thesis.collation import expected_lines, witness_lines
+from pyharness.thesis.decks import corrections
 from tests.edition.pages import pages
 
 

@@ -10,7 +10,7 @@ from pyharness.edition.formulas import formulas
 from pyharness.history.ablation import entries, entry
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import deck, numbers
+from pyharness.thesis.cards import deck, numbers
 
 FORMULAS: list[dict[str, Any]] = facts("formulas")["formula"]
 THESIS = Path(__file__).parents[3] / "shared/thesis/thesis.txt"

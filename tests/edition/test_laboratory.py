@@ -25,7 +25,7 @@ from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers
-from pyharness.original.printer import page
+from pyharness.thesis.printer import page
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
 from tests.ports import WEB, run_javascript

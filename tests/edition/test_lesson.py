@@ -18,7 +18,7 @@ from pyharness.edition.laboratory import data
 from pyharness.history.ablation import entries
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original.decks import compiler, deck_text, run_deck
+from pyharness.thesis.decks import compiler, deck_text, run_deck
 from tests.conftest import Printed
 from tests.ports import WEB, run_javascript
 

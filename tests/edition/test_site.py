@@ -20,7 +20,7 @@ from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Picture
-from pyharness.original.cards import deck, tight
+from pyharness.thesis.cards import deck, tight
 from pyharness.views import html, pictures
 from tests.edition.pages import dead, pages
 

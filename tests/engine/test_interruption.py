@@ -23,8 +23,8 @@ from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.original.compiled import run
-from pyharness.original.many import run_many
+from pyharness.thesis.compiled import run
+from pyharness.thesis.many import run_many
 from tests.cli.interrupts import hearing
 
 # An idle machine needs some hundredths of a second; uninterrupted, each call takes many seconds.

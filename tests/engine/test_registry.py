@@ -12,7 +12,7 @@ from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.rescaled import scaled
 from pyharness.engine.solve import solve
 from pyharness.model.errors import TimedError
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 
 def test_properties_of_the_registry_are_those_of_its_methods() -> None:

@@ -17,10 +17,10 @@ from pyharness.history.limits import limit
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switches
 from pyharness.model.scene_file import case_scene
-from pyharness.original.cards import deck
-from pyharness.original.cells import subsets
-from pyharness.original.printer import page
-from pyharness.original.programs import PROGRAM_REGISTRY, run_program
+from pyharness.thesis.cards import deck
+from pyharness.thesis.cells import subsets
+from pyharness.thesis.printer import page
+from pyharness.thesis.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
 
 ROOT = Path(__file__).parents[2]
@@ -121,7 +121,7 @@ RESET = "            point[1] = result\n"
     ids=["U alone", "V alone", "both"],
 )
 def test_growing_tells_that_u_is_not_reset(reset: str, told: str, step: int, exceeds: bool) -> None:
-    source = (ROOT / "pyharness/original/runge_kutta.py").read_text()
+    source = (ROOT / "pyharness/thesis/runge_kutta.py").read_text()
     assert source.count(RESET) == 1
     altered = ModuleType("altered")
     exec(source.replace(RESET, RESET.replace("result\n", f"{reset}\n")), vars(altered))

@@ -12,8 +12,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.original.cards import chosen, deck, numbers
-from pyharness.original.programs import PROGRAM_REGISTRY, run_program
+from pyharness.thesis.cards import chosen, deck, numbers
+from pyharness.thesis.programs import PROGRAM_REGISTRY, run_program
 from pyharness.truth.reference import reference
 
 

@@ -17,8 +17,8 @@ from pyharness.history.family.orders import SCHEMES, SLACK, family_members, orde
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.model.trajectory import Array
-from pyharness.original import compiled
-from pyharness.original.linear_solver import SINGULAR, leqt1f
+from pyharness.thesis import compiled
+from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 from pyharness.truth.reference import reference
 from tests.conftest import Printed
 

@@ -17,7 +17,7 @@ from pyharness.history import figures
 from pyharness.history.claims.rules import share_of_range
 from pyharness.history.figures import Curve, FigureFinding, curve_numbers
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
 from pyharness.views.csv import csv_text

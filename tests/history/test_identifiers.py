@@ -14,7 +14,7 @@ from pyharness.history.identifiers import DATA, content_identifier, directory_id
 from pyharness.model import facts as tables
 from pyharness.model.facts import SHIPPED
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import deck
+from pyharness.thesis.cards import deck
 from tests.test_packaging import ROOT
 
 EMPTY = "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"

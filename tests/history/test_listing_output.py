@@ -9,8 +9,8 @@ from pyharness.cli.main import main
 from pyharness.history.listing_output import fits, our_page, read_page
 from pyharness.history.printed_page import Difference, Fit, printed_numbers, split_page
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.original.decks import card_steps
-from pyharness.original.printer import page
+from pyharness.thesis.decks import card_steps
+from pyharness.thesis.printer import page
 
 MACHINE = Path(__file__).parents[2] / "docs" / "machine"
 PAGES = sorted(MACHINE.glob("*.txt"))

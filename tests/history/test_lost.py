@@ -8,7 +8,7 @@ import pytest
 from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, integrate, ranked
 from pyharness.model.facts import facts
 from pyharness.model.scene_file import case_scene
-from pyharness.original.in_word import WORDS, scene_in
+from pyharness.thesis.in_word import WORDS, scene_in
 
 
 @pytest.fixture(scope="module")

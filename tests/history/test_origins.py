@@ -19,7 +19,7 @@ from pyharness.history.origins import disagreements, mistakes, unexplained_defec
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original.cards import deck
+from pyharness.thesis.cards import deck
 from tests.conftest import Printed
 
 

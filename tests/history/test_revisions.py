@@ -9,7 +9,7 @@ from pyharness.history.revisions import CHANGES, revisions
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
-from pyharness.original.cards import find, numbers
+from pyharness.thesis.cards import find, numbers
 
 TEI = "{http://www.tei-c.org/ns/1.0}"
 

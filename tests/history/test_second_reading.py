@@ -9,7 +9,7 @@ import pytest
 
 from pyharness.history import second_reading
 from pyharness.history.second_reading import chapman, misread_places, read_cards, recaptures
-from pyharness.original.cards import tight
+from pyharness.thesis.cards import tight
 from tests.conftest import Printed
 
 

@@ -10,7 +10,7 @@ from pyharness import case_scene
 from pyharness.cli.main import main
 from pyharness.history.tape5 import records
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

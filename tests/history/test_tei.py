@@ -21,8 +21,8 @@ from pyharness.history.tei import SCHEMA, tei_document
 from pyharness.history.tei_header import AUTHOR, TITLE
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.original.cards import chosen, tight
-from pyharness.original.collation import expected_lines
+from pyharness.thesis.cards import chosen, tight
+from pyharness.thesis.collation import expected_lines
 
 HERE = Path(__file__).parent
 SOURCE = tomllib.loads((HERE / "tei_all.toml").read_text())

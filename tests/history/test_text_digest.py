@@ -12,7 +12,7 @@ import pytest
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import TABLES, text_digest
 from pyharness.model.facts import facts, shipped
-from pyharness.original import cards, port_lines
+from pyharness.thesis import cards, port_lines
 from tests.conftest import Printed
 
 

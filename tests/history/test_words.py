@@ -16,10 +16,10 @@ from pyharness.history.words import WordCell, WordRun, cells
 from pyharness.history.words_report import words_report
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original.printer import page
-from pyharness.original.programs import run_program
-from pyharness.original.vectors import OURS
-from pyharness.original.word import RULES
+from pyharness.thesis.printer import page
+from pyharness.thesis.programs import run_program
+from pyharness.thesis.vectors import OURS
+from pyharness.thesis.word import RULES
 from pyharness.views.csv import csv_text
 from tests.conftest import Printed
 from tests.json_reference import schema_of

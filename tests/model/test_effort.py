@@ -21,7 +21,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 
 WAVES: tuple[Wave, ...] = (((1.0, 0.0, 2.0), 5.0), ((0.0, 2.0, 2.0), 3.0))

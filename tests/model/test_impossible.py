@@ -12,7 +12,7 @@ from pyharness import ImpossibleBodyWarning, Scene, compare_programs, read_scene
 from pyharness.cli.main import main
 from pyharness.model.impossible import breaks_triangle
 from pyharness.model.scene_file import case_scene
-from pyharness.original.programs import run_program
+from pyharness.thesis.programs import run_program
 
 IMPOSSIBLE = (200.0, 10.0, 20.0)
 

@@ -27,7 +27,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
-from pyharness.original.vectors import OURS, answers
+from pyharness.thesis.vectors import OURS, answers
 from tests.ensembles.sweeps import TILT, files, text, written
 from tests.ports import engine
 

@@ -20,7 +20,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
-from pyharness.original import compiled
+from pyharness.thesis import compiled
 from pyharness.views.json import json_text
 from pyharness.views.render import render
 

@@ -11,9 +11,9 @@ from pyharness import ChangingMoments, Scene, subset, torques
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.theory.rotations import steady_rotations
 from pyharness.history.family.members import Member
-from pyharness.original.cards import chosen
-from pyharness.original.decks import deck_text
-from pyharness.original.vectors import answers
+from pyharness.thesis.cards import chosen
+from pyharness.thesis.decks import deck_text
+from pyharness.thesis.vectors import answers
 from pyharness.truth.certificate import prove
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.enclosure import enclose

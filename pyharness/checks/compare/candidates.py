@@ -21,8 +21,8 @@ from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, WITH_ALL_ROWS, Array, Trajectory
-from pyharness.original.compiled import program_arguments
-from pyharness.original.programs import BINARY64, PROGRAM_REGISTRY
+from pyharness.thesis.compiled import program_arguments
+from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY
 
 _SAME = 1e-9  # relative difference up to which two times are equal; the step size is rounded
 

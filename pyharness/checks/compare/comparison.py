@@ -34,8 +34,8 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.shown import short_repr
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
 from pyharness.model.values import boolean
-from pyharness.original.compiled_in_word import compiled_words
-from pyharness.original.programs import (
+from pyharness.thesis.compiled_in_word import compiled_words
+from pyharness.thesis.programs import (
     BINARY64,
     IMPLEMENTATIONS,
     PROGRAM_REGISTRY,
@@ -218,7 +218,7 @@ def compare_programs(
         Whether attitudes are compared too, from the scene's or from parallel axes of body and
         space. A program's is integrated from its rows of omega by a method of order 4.
     word : str
-        The arithmetic of the programs, one of `pyharness.original.programs.WORD_NAMES`. Without
+        The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
         compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
 
     Returns

@@ -16,7 +16,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.original.programs import Program
+from pyharness.thesis.programs import Program
 from pyharness.truth.reference import Reference
 
 # A measured order may be below the expected one by at most this.

@@ -23,7 +23,7 @@ from pyharness.model.report import (
 )
 from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import BINARY64
+from pyharness.thesis.programs import BINARY64
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _PROGRAMS_LEGEND = (

@@ -17,8 +17,8 @@ import numpy as np
 from pyharness.engine.registry import METHODS
 from pyharness.model.trajectory import Array
 
-COMPILED = "pyharness.original.compiled.run"
-PROGRAM = "pyharness.original.programs.Program.run"  # in either language
+COMPILED = "pyharness.thesis.compiled.run"
+PROGRAM = "pyharness.thesis.programs.Program.run"  # in either language
 
 Fault = Callable[[float], AbstractContextManager[Any]]
 """A function that takes the size of a fault, and returns a context in which the fault is present.

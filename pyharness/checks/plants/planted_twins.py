@@ -19,7 +19,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 
 
 class TwinFault(NamedTuple):
@@ -81,7 +81,7 @@ def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> M
     assert original.__file__ is not None
     shutil.copytree(Path(original.__file__).parent, target, ignore=ignore)
     for path in target.glob("*.py"):
-        text = path.read_text().replace("pyharness.original", package)
+        text = path.read_text().replace("pyharness.thesis", package)
         if path.name == file:
             assert text.count(right) == 1, f"{right!r} stands {text.count(right)} times in {file}"
             text = text.replace(right, wrong)

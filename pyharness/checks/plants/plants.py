@@ -39,7 +39,7 @@ from pyharness.model.codes import Methods, Places
 from pyharness.model.listing import Listing, flagged
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import Program
+from pyharness.thesis.programs import Program
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from pyharness.checks.theory.rational import (
 )
 from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array
-from pyharness.original import collocation
-from pyharness.original.linear_solver import SINGULAR, leqt1f
+from pyharness.thesis import collocation
+from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 
 # The collocation points of each program, at which the residual is zero, in units of the step size.
 PARTS = {

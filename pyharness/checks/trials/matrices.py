@@ -20,8 +20,8 @@ from pyharness.checks.theory.collocation_matrices import (
 )
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
-from pyharness.original import compiled
-from pyharness.original.linear_solver import SINGULAR
+from pyharness.thesis import compiled
+from pyharness.thesis.linear_solver import SINGULAR
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
 # Step sizes (s) of runs. With some of them the matrix of the four-term program is singular.

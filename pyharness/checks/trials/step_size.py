@@ -24,7 +24,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.linear_solver import SINGULAR
+from pyharness.thesis.linear_solver import SINGULAR
 from pyharness.truth.reference import reference
 
 CASES = (2, 3, 4, 5, 6)

@@ -25,7 +25,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.original.programs import IMPLEMENTATIONS
+from pyharness.thesis.programs import IMPLEMENTATIONS
 
 THREADS = 8
 _REPEATS = 30

@@ -11,9 +11,9 @@ from pyharness.history.origins_report import origins_report
 from pyharness.history.second_reading import second_reading_report
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input
-from pyharness.original.cards import chosen
-from pyharness.original.collation import expected_lines, undeclared, unexplained
-from pyharness.original.deck_collation import faults, rows
+from pyharness.thesis.cards import chosen
+from pyharness.thesis.collation import expected_lines, undeclared, unexplained
+from pyharness.thesis.deck_collation import faults, rows
 
 _LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")

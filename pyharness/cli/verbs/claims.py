@@ -6,7 +6,7 @@ from pyharness.cli import options as shared
 from pyharness.history.claims.ledger import assignments, claim, claims, judgement
 from pyharness.history.claims.report import assignments_report, claims_report, explanation
 from pyharness.model.errors import InputError
-from pyharness.original.programs import BINARY64, WORD_NAMES
+from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     "--explain ID": "Explain the verdict on the claim with this identifier, as in "

@@ -11,7 +11,7 @@ from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.listing import PROGRAMS, names_of
 from pyharness.model.scene import Scene
-from pyharness.original.programs import BINARY64, WORD_NAMES
+from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
     **shared.SCENE,

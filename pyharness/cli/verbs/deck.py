@@ -8,7 +8,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import listing_record
 from pyharness.model.report import Line, Report
 from pyharness.model.scene_file import case_numbers, case_scene
-from pyharness.original.decks import DIALECTS, SYSTEMS, deck_text, job_text
+from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
 OPTIONS = {

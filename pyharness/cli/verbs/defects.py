@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
 def _card(options: argparse.Namespace) -> int:
     """Print the card `options.name`, our findings about it, and their effects."""
     from pyharness.history.cards_report import cards_report
-    from pyharness.original.cards import chosen
+    from pyharness.thesis.cards import chosen
 
     cards = chosen([options.name])
     shared.check_outputs(options)

@@ -6,7 +6,7 @@ from pyharness.cli import options as shared
 from pyharness.history.family.members import POINTS, WEIGHTINGS, Member
 from pyharness.history.family.orders import order_table
 from pyharness.history.family.report import family_report
-from pyharness.original.programs import BINARY64, WORD_NAMES
+from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"

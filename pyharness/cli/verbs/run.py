@@ -11,7 +11,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.original.programs import (
+from pyharness.thesis.programs import (
     BINARY64,
     COMPILED_WORDS,
     IMPLEMENTATIONS,
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
             bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 
     def page() -> str:
-        from pyharness.original.printer import page
+        from pyharness.thesis.printer import page
 
         return page(scene, name, trajectory)
 

@@ -13,7 +13,7 @@ from pyharness.cli import options as shared
 from pyharness.cli.forecast import CHECKS, check_count
 from pyharness.model.errors import InputError
 from pyharness.model.scene_file import case_numbers
-from pyharness.original.decks import compiler
+from pyharness.thesis.decks import compiler
 
 FORMATS = ("table", "json", "junit", "markdown")
 # Options that apply to only one kind of check, by the name of the kind.

@@ -13,7 +13,7 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table
 from pyharness.model.report import words as columns
 from pyharness.model.scene_file import case_numbers
-from pyharness.original.vectors import Answer, answers
+from pyharness.thesis.vectors import Answer, answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {

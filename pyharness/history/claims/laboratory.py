@@ -13,10 +13,10 @@ from pyharness.model.listing import Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.collocation import interval
-from pyharness.original.equations import Vector, omega_rate
-from pyharness.original.in_word import WORDS, scene_in
-from pyharness.original.programs import BINARY64, run_program
+from pyharness.thesis.collocation import interval
+from pyharness.thesis.equations import Vector, omega_rate
+from pyharness.thesis.in_word import WORDS, scene_in
+from pyharness.thesis.programs import BINARY64, run_program
 from pyharness.truth.reference import Reference, reference
 
 

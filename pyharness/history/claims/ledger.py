@@ -15,7 +15,7 @@ from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Triple
-from pyharness.original.programs import BINARY64
+from pyharness.thesis.programs import BINARY64
 
 _ROOMS = (verdicts, methods, theory)
 

@@ -32,10 +32,10 @@ from pyharness.history.lost import integrate
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene
-from pyharness.original.cells import subsets
-from pyharness.original.decks import deck_text, solver_cards
-from pyharness.original.in_word import WORDS, scene_in
-from pyharness.original.operations import operations_per_step
+from pyharness.thesis.cells import subsets
+from pyharness.thesis.decks import deck_text, solver_cards
+from pyharness.thesis.in_word import WORDS, scene_in
+from pyharness.thesis.operations import operations_per_step
 
 _OTHERS = WEIGHTINGS[1:]
 

@@ -25,7 +25,7 @@ from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
-from pyharness.original.many import run_many
+from pyharness.thesis.many import run_many
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.

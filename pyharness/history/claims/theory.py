@@ -21,7 +21,7 @@ from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
 from pyharness.history.family.members import Member, run
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
-from pyharness.original.cards import deck
+from pyharness.thesis.cards import deck
 from pyharness.truth.reference import reference
 
 Weights = Sequence[Callable[[Array], Any]]

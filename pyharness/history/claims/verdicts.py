@@ -20,7 +20,7 @@ from pyharness.history.claims.laboratory import Laboratory, distance, largest, r
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.scene import Triple
-from pyharness.original.cells import subsets
+from pyharness.thesis.cells import subsets
 
 REPRODUCED = "reproduced"
 IN_PART = "reproduced in part"

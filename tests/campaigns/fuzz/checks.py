@@ -24,7 +24,7 @@ from pyharness.cli.main import main
 from pyharness.model.extension import ENDS
 from pyharness.model.listing import names_of, subset
 from pyharness.model.trajectory import WITH_ALL_ROWS
-from pyharness.original.programs import PROGRAM_REGISTRY
+from pyharness.thesis.programs import PROGRAM_REGISTRY
 from tests.campaigns.fuzz import strategies
 from tests.campaigns.fuzz.command_lines import CommandLine, command_line, furnish
 

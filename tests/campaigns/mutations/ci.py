@@ -12,7 +12,7 @@ from tests.campaigns.mutations.trial import first_failure, put_in, take_out
 PLANTED = (
     (
         "fortran/original/linear_solver.fypp", "bound 1: if (scaled > biggest) then",
-        "tests/original/test_linear_solver.py::"
+        "tests/thesis/test_linear_solver.py::"
         "test_rows_are_scaled_and_the_first_of_equal_maxima_is_the_pivot",
     ),
     (

@@ -153,7 +153,7 @@ def test_every_language_has_its_share() -> None:
     assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
     assert lines["Python"] > lines[FORTRAN] > lines[C]
     core = {"pyharness/engine/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
-            "pyharness/original/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
+            "pyharness/thesis/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
             "pyharness/engine/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())

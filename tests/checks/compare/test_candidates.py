@@ -10,7 +10,7 @@ from pyharness.checks.compare.candidates import (
     program_candidate,
 )
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.original.programs import IMPLEMENTATIONS
+from pyharness.thesis.programs import IMPLEMENTATIONS
 
 SCENE = case_scene(5)
 END = SCENE.step_size * SCENE.steps

@@ -21,7 +21,7 @@ from pyharness.engine.report import trajectory_report
 from pyharness.model.attitude import product
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Trajectory, turned_to_space
-from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
 from pyharness.views.json import json_text
 from pyharness.views.pictures import saved

@@ -20,7 +20,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array, Trajectory
-from pyharness.original.programs import PROGRAM_REGISTRY, Program
+from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import Reference, reference
 from pyharness.views.render import render
 

@@ -1,0 +1,300 @@
+"""The text of the edition: every card of the three decks, and how the scan shows it.
+
+A card is a line of a printed program, a deck the cards of one. A line of the scan is card number,
+dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and the twin's
+lines of each card; `data/apparatus.toml`, the critical apparatus, explains the deviations of the
+scan.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache, cached_property
+from typing import NamedTuple
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
+from pyharness.thesis.port_lines import Place, port_lines, twin_line
+
+_SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
+
+
+class Difference(NamedTuple):
+    """A passage of a card that differs between our text and the scan.
+
+    `ours` and `scans` are without blanks. `entry` identifies the explanation in the apparatus.
+    """
+
+    ours: str
+    scans: str
+    entry: str
+
+
+class Card(NamedTuple):
+    """A card of a printed program, and how the scan shows it.
+
+    `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
+    occurrence of its characters after the one before. `printed` is another number that the scan
+    shows, with the apparatus entry that explains it; `lost` the entry about a card that the scan
+    lacks; else None.
+    """
+
+    program: str
+    number: int
+    text: str
+    differences: tuple[Difference, ...] = ()
+    printed: tuple[str, str] | None = None
+    lost: str | None = None
+
+    @property
+    def name(self) -> str:
+        """Return the name of the card, as in ``two-term:1660``."""
+        return f"{self.program}:{self.number}"
+
+    @property
+    def statement(self) -> str:
+        """Return the text with each run of blanks reduced to one."""
+        return " ".join(self.text.split())
+
+    @property
+    def is_comment(self) -> bool:
+        """Return whether column 1 has a C."""
+        return self.text.startswith("C")
+
+    @property
+    def continues(self) -> bool:
+        """Return whether column 6 marks a continuation."""
+        return not self.is_comment and self.text[5:6].strip() != ""
+
+    @property
+    def scan(self) -> str | None:
+        """Return the scan's number, dash and text without blanks; None if the card is lost."""
+        if self.lost:
+            return None
+        number = self.printed[0] if self.printed else str(self.number)
+        shown = (each.scans if each else tight(text) for text, each in self.passages())
+        return f"{number}-{''.join(shown)}"
+
+    def passages(self) -> Iterator[tuple[str, Difference | None]]:
+        """Yield each passage of the text with its difference from the scan, or None."""
+        return passages(self.text, self.differences)
+
+    @property
+    def text_with_scanned_names(self) -> str:
+        """Return the text with the scan's names where ours are a normalization."""
+        kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
+        return "".join(
+            each.scans if each and kinds[each.entry] == "normalization" else text
+            for text, each in self.passages()
+        )
+
+    @property
+    def deviates(self) -> bool:
+        """Return whether the scan lacks the card or differs from our text."""
+        return bool(self.lost or self.printed or self.differences)
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Return the identifiers of the apparatus entries that name the card."""
+        return tuple(
+            each["id"]
+            for each in facts("apparatus")["entry"]
+            if self.number in numbers(each["cards"].get(self.program, ""))
+        )
+
+
+class Deck:
+    """The cards of a program by number, and the source lines of port and twin for each card."""
+
+    def __init__(self, program: str) -> None:
+        """Read the table of cards of the program from `data/cards`."""
+        self.program = program
+        self._places = facts("cards/places")[program]
+        self.cards = {
+            int(number): Card(
+                program,
+                int(number),
+                row["text"],
+                tuple(Difference(*each) for each in row.get("scan", ())),
+                tuple(row["printed"]) if "printed" in row else None,
+                row.get("lost"),
+            )
+            for number, row in facts(f"cards/{program}")["cards"].items()
+        }
+
+    @cached_property
+    def executable(self) -> frozenset[int]:
+        """Return the numbers of the cards with executable statements.
+
+        The others are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
+        """
+        found, computes = set(), False
+        for card in self.cards.values():
+            if not card.continues:
+                computes = not (card.is_comment or _SPECIFICATION.match(card.text[6:]))
+            if computes:
+                found.add(card.number)
+        return frozenset(found)
+
+    def statement_kind(self, card: Card) -> str:
+        """Return the kind of a card: ``comment``, ``executable`` or ``specification``."""
+        if card.is_comment:
+            return "comment"
+        return "executable" if card.number in self.executable else "specification"
+
+    @cached_property
+    def absent(self) -> dict[int, str]:
+        """Return, by card number, why the Fortran port omits executable cards."""
+        return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
+
+    @cached_property
+    def otherwise(self) -> dict[int, str]:
+        """Return, by card number, why the port has the card's statement in another form."""
+        return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
+
+    @cached_property
+    def port(self) -> dict[int, list[Place]]:
+        """Return, by card number, the lines of the Fortran port that correspond to the card."""
+        return _by_card((cards, place) for place, cards in port_lines(self.program))
+
+    @cached_property
+    def twin(self) -> dict[int, list[Place]]:
+        """Return, by card number, the lines of the twin that correspond to the card."""
+        places = self._places["twin"]
+        return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
+
+
+@cache
+def deck(program: str) -> Deck:
+    """Return the deck of a program; it is shared, so callers must not change it."""
+    return Deck(program)
+
+
+def numbers(ranges: str) -> list[int]:
+    """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
+    found: list[int] = []
+    for each in ranges.split(",") if ranges else ():
+        first, _, last = each.strip().partition("-")
+        found += range(int(first), int(last or first) + 1, 10)
+    return found
+
+
+def find(program: str, number: int) -> Card:
+    """Return the card of a program with a number."""
+    cards = deck(program).cards
+    if number not in cards:
+        near = sorted(cards, key=lambda each: abs(each - number))[:2]
+        told = " and ".join(str(each) for each in sorted(near))
+        raise InputError(
+            f"card {number}: the {program} deck has no such card; the nearest are {told}"
+        )
+    return cards[number]
+
+
+def chosen(asked: Iterable[str]) -> list[Card]:
+    """Return the cards that `asked` names; all cards if it is empty.
+
+    Items are programs, numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
+    that has such cards), ``two-term:1660``. Raise InputError for any other item, and for a range
+    without cards.
+    """
+    found: dict[Card, None] = {}
+    for each in list(asked) or PROGRAMS:
+        found.update(dict.fromkeys(_cards_of(each)))
+    return list(found)
+
+
+def parallels(card: Card) -> list[Card]:
+    """Return the cards of the other programs with the same text, blanks ignored.
+
+    The list is empty for a comment or a blank card.
+    """
+    if card.is_comment or not card.text[6:].strip():
+        return []
+    return [
+        other
+        for program in PROGRAMS
+        if program != card.program
+        for other in _by_text(program).get(tight(card.text), [])
+    ]
+
+
+@cache
+def _by_text(program: str) -> dict[str, list[Card]]:
+    found: dict[str, list[Card]] = {}
+    for card in deck(program).cards.values():
+        found.setdefault(tight(card.text), []).append(card)
+    return found
+
+
+def _cards_of(asked: str) -> list[Card]:
+    program, colon, ranges = asked.rpartition(":")
+    if asked in PROGRAMS:
+        return list(deck(asked).cards.values())
+    if colon and program not in PROGRAMS:
+        raise unknown("program", program, PROGRAMS, f"cards {asked!r}")
+    programs = (program,) if colon else PROGRAMS
+    if not (match := re.fullmatch(r"(\d{1,6})(?:-(\d{1,6}))?", ranges)):
+        raise InputError(
+            f"cards {asked!r}: neither a program ({', '.join(PROGRAMS)}) nor a card or a range of "
+            "cards, as 1660, 1040-1090, two-term:1660"
+        )
+    first, last = int(match[1]), match[2]
+    if last is None:
+        having = [each for each in programs if first in deck(each).cards]
+        if having:
+            return [find(each, first) for each in having]
+        every = [card for each in programs for card in deck(each).cards.values()]
+        near = sorted(every, key=lambda card: abs(card.number - first))[:2]
+        told = " and ".join(card.name for card in sorted(near, key=lambda card: card.number))
+        raise InputError(f"card {first}: there is no such card; the nearest are {told}")
+    found = [
+        card
+        for each in programs
+        for card in deck(each).cards.values()
+        if first <= card.number <= int(last)
+    ]
+    if not found:
+        ends = ", ".join(
+            f"{each} {min(c)}-{max(c)}" for each in programs for c in [deck(each).cards]
+        )
+        raise InputError(f"cards {asked!r}: the range is empty; the decks have {ends}")
+    return found
+
+
+def passages(
+    text: str, differences: Iterable[Difference]
+) -> Iterator[tuple[str, Difference | None]]:
+    """Yield each passage of a card's text with its difference from the scan, or None.
+
+    `differences` are all of the card's, in order; else ValueError is raised.
+    """
+    # Indices of all characters that are not blanks. Blanks are ignored.
+    places = [n for n, letter in enumerate(text) if not letter.isspace()]
+    letters = tight(text)
+    done = at = 0
+    for each in differences:
+        first = letters.find(each.ours, at)
+        if first < 0:
+            raise ValueError(f"{each.ours!r} does not stand in {text!r} where it should")
+        at = first + len(each.ours)
+        begin, end = places[first], places[at - 1] + 1
+        if done < begin:
+            yield text[done:begin], None
+        yield text[begin:end], each
+        done = end
+    if text[done:]:
+        yield text[done:], None
+
+
+def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
+    found: dict[int, list[Place]] = {}
+    for cards, place in places:
+        for number in numbers(cards):
+            found.setdefault(number, []).append(place)
+    return found
+
+
+def tight(text: str) -> str:
+    """Return a text without its blanks."""
+    return "".join(text.split())

@@ -1,0 +1,56 @@
+"""Combinations of a listing and a case, for which Fortran port and twin are compared.
+
+A listing is a program with a choice of defects, readings and conjectures, a case a scene of Table
+1.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.thesis.equations import initial_torque
+
+
+def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
+    """Yield every subset of `names`, the empty one first."""
+    for bits in range(2 ** len(names)):
+        yield frozenset(name for i, name in enumerate(names) if bits >> i & 1)
+
+
+def all_listings(program: str) -> Iterator[Listing]:
+    """Yield every listing: each subset of defects, some conjectures and readings."""
+    for readings in subsets(names_of("reading", program)):
+        for defects in subsets(switches(program)):
+            yield Listing(program, defects, readings)
+
+
+def all_cells() -> Iterator[tuple[Listing, int]]:
+    """Yield every pair of a listing and a case number, for all programs.
+
+    For a case with an initial torque, each listing also comes with the conjecture `initial-torque`.
+    """
+    cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
+    for program in PROGRAMS:
+        for listing in all_listings(program):
+            for case, has_torque in cases.items():
+                yield listing, case
+                if has_torque:
+                    conjectures = listing.conjectures | {"initial-torque"}
+                    yield replace(listing, conjectures=conjectures), case
+
+
+def cell_name(listing: Listing, case: int) -> str:
+    """Return a name such as ``two-term/case-3/dt-accumulates+torque-held``."""
+    return f"{listing.program}/case-{case}/{listing_name(listing)}"
+
+
+def listing_name(listing: Listing) -> str:
+    """Return a name, without blanks, for a listing.
+
+    ``corrected``; ``original`` and readings, each after a colon; or all switches and readings,
+    joined by ``+``.
+    """
+    if listing.label == "custom":
+        return "+".join(sorted(listing.active))
+    return ":".join([listing.label, *sorted(listing.readings)])

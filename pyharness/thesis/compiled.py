@@ -1,0 +1,122 @@
+"""Runs of the compiled programs of the thesis's appendix on a scene."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.extension import ENDS, columns, extension
+from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
+from pyharness.thesis.equations import initial_torque
+
+
+def run(
+    scene: Scene,
+    listing: Listing,
+    lipschitz: float = 500.0,
+    may_stop: bool = True,
+    velocity: bool = True,
+) -> Trajectory:
+    """Run the compiled program of a listing on a scene, and return its trajectory.
+
+    The arguments are those of `run_program`, and are not checked.
+    """
+    rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
+        *program_arguments(scene, listing, lipschitz, may_stop, velocity)
+    )
+    ended = ENDS[status], variable, quotient
+    found = read_rows(listing, rows.T[:n_rows], ier, evaluations, *ended)
+    return found if velocity else replace(found, velocity=None)
+
+
+def read_rows(
+    listing: Listing, rows: Array, ier: NDArray[np.int32], evaluations: int,
+    ended: str, stop_variable: int, stop_quotient: float,
+) -> Trajectory:  # fmt: skip
+    """Return the output of a compiled program as a trajectory.
+
+    `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
+    velocity (m/s). `ier` has at least n codes. `stop_variable` is the number, from 1 in
+    `STOP_VARIABLES`, of the variable that failed the stop test, or 0. `stop_quotient` is the change
+    of the right-hand side over that of the variable (1/s).
+    """
+    n = len(rows)
+    is_stopped = stop_variable > 0
+    return Trajectory(
+        time=rows[:, 0],
+        recorded_time=rows[:, 1],
+        omega=rows[:, 2:5],
+        velocity=rows[:, 5:8],
+        steps=n,
+        evaluations=evaluations,
+        ended=ended,
+        stop=Stop(n, STOP_VARIABLES[stop_variable - 1], stop_quotient) if is_stopped else None,
+        ier=None if listing.program == "runge-kutta" else ier[:n],
+    )
+
+
+class Arguments(NamedTuple):
+    """The arguments of the compiled function `run_program`, in its order.
+
+    `flags` is a bit mask of defects, readings and conjectures. `body` contains the moments (kg m2)
+    if `by_moments`, else A, B and C of Euler's equations. `torque_first` is the initial torque
+    divided by the moments (1/s2), or zeros.
+    """
+
+    program: int
+    flags: int
+    by_moments: bool
+    body: Any
+    omega: Any
+    masses: Any
+    forces: Any
+    torque_constant: Any
+    torque_rate: Any
+    torque_first: Any
+    torque_varies: bool
+    sines: Any
+    cosines: Any
+    step_size: float
+    n_steps: int
+    lipschitz: float
+    may_stop: bool
+    with_velocity: bool
+
+
+def program_arguments(
+    scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
+) -> Arguments:
+    """Return the arguments of the compiled function `run_program`."""
+    first = initial_torque(scene) if listing.has("initial-torque") else None
+    if first is None and listing.has("initial-torque"):
+        conjectures = listing.conjectures - {"initial-torque"}
+        listing = replace(listing, conjectures=conjectures)
+    law = scene.body_torque
+    return Arguments(
+        PROGRAMS.index(listing.program) + 1,
+        listing.flags,
+        scene.moments is not None,
+        scene.moments or scene.coefficients,
+        scene.omega,
+        scene.masses,
+        scene.forces,
+        law.constant,
+        law.rate,
+        first or (0.0, 0.0, 0.0),
+        law.varies,
+        columns(law.sines),
+        columns(law.cosines),
+        scene.step_size,
+        scene.steps,
+        lipschitz,
+        may_stop,
+        velocity or stop_reads_velocity(listing, may_stop),
+    )
+
+
+def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
+    """Return whether the stop test needs the velocity: defect `lipschitz-tests-velocity`."""
+    return may_stop and listing.has("lipschitz-tests-velocity")

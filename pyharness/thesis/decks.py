@@ -1,0 +1,314 @@
+"""Decks as fixed-form FORTRAN, and runs of them after compilation.
+
+They are a third, independent way from the cards to the results: the author's statements, compiled
+with a separate LEQT1F (`data/cards/leqt1f.f`). They share no code with port and twin.
+"""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.thesis.cards import deck, numbers
+
+DIALECTS = ("1982", "gfortran", "ftn")
+SYSTEMS = ("nos", "nosbe")
+# Numbers of terms of two further collocation programs, which V.2 of the thesis used in Case 6. The
+# thesis does not print their decks.
+MODELS = (3, 5)
+COMPILER = "gfortran"
+# REAL is binary64, variables are 0 until they are set, and no operations are fused.
+FLAGS = (
+    "-std=legacy", "-fdefault-real-8", "-fno-automatic", "-finit-real=zero", "-ffp-contract=off",
+    "-fno-sign-zero",
+)  # fmt: skip
+_SOLVER = Path(__file__).parent.parent / "data" / "cards" / "leqt1f.f"
+_MARK = "+"
+
+
+class Run(NamedTuple):
+    """The output of a compiled deck.
+
+    `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s). `page` is the text of
+    TAPE6, without carriage-control characters and trailing blanks.
+    """
+
+    tape5: np.ndarray
+    page: str
+
+
+def deck_text(
+    listing: Listing,
+    scene: Scene | None = None,
+    dialect: str = "1982",
+    terms: int | None = None,
+) -> str:
+    """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
+
+    By default it is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
+    with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
+    DO statement. `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7,
+    "gfortran" also what a modern compiler needs; column 73 marks these cards. `terms`, 3 or 5,
+    requests the conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card
+    can express the request.
+    """
+    if dialect not in DIALECTS:
+        raise unknown("dialect", dialect, DIALECTS, "--dialect")
+    if listing.has("initial-torque"):
+        raise InputError(
+            "'initial-torque' can't be written as cards; allowed: --conjecture torque-held, none"
+        )
+    cards = {number: card.text for number, card in deck(listing.program).cards.items()}
+    if terms is not None:
+        cards = _model(terms, listing, scene)
+    if scene is not None:
+        cards |= _case_cards(listing.program, scene)
+    marked = set()
+    for each in facts("cards/alterations")["alteration"]:
+        if terms is not None and "dialect" not in each:
+            continue
+        if _is_made(each, listing, dialect, scene.case if scene else None):
+            for number in numbers(each.get("delete", "")):
+                cards.pop(number, None)
+            new = {
+                n: f"      {text}" for n, text in each.get("replace", []) + each.get("insert", [])
+            }
+            cards |= new
+            if "dialect" in each:
+                marked |= set(new)
+    return "".join(f"{cards[n]:72}{_MARK if n in marked else '':1}{n:7d}\n" for n in sorted(cards))
+
+
+def card_steps(program: str) -> int:
+    """Return the number of steps in the DO statement of a program's cards."""
+    number = facts("cards/alterations")["case"][program]["steps"]
+    return int(deck(program).cards[number].text.split(",")[1])
+
+
+def corrected_cards(program: str) -> dict[int, str]:
+    """Return each card of the corrected program by number, inserted ones in between."""
+    lines = deck_text(Listing.corrected(program)).splitlines()
+    return {int(line[73:]): line[:72].rstrip() for line in lines}
+
+
+def corrections(program: str) -> dict[int, list[str]]:
+    """Return the defects whose correction replaces, deletes or inserts a card, by number."""
+    found: dict[int, list[str]] = {}
+    for each in facts("cards/alterations")["alteration"]:
+        if each["program"] == program and "corrects" in each and "case" not in each:
+            new = [number for number, _ in each.get("replace", []) + each.get("insert", [])]
+            for number in {*numbers(each.get("delete", "")), *new}:
+                if each["corrects"] not in (names := found.setdefault(number, [])):
+                    names.append(each["corrects"])
+    return found
+
+
+def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
+    """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
+
+    It includes our LEQT1F if needed. `system` is "nos" or "nosbe"; `rounds` sets FTN's option ROUND
+    for sums, products and quotients.
+    """
+    if system not in SYSTEMS:
+        raise unknown("system", system, SYSTEMS, "--system")
+    jobs = facts("cards/jobs")
+    job = jobs[system]
+    compiles = job["compile"].format(rounds=jobs["rounds"] if rounds else "")
+    control = [*job["before"], compiles, *job["after"], jobs["record"]]
+    statements = "".join(f"{each}\n" for each in control)
+    named = statements.format(user="USERNAME", password="PASSWORD")  # the site assigns them
+    return named + deck + (_SOLVER.read_text() if "LEQT1F" in deck else "")
+
+
+def _is_made(
+    alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
+) -> bool:
+    """Return whether all conditions of an entry of `data/cards/alterations.toml` hold.
+
+    `case` is None for the case on the published cards.
+    """
+    named = alteration.get
+    return (
+        named("program") == listing.program
+        and dialect in named("dialect", [dialect])
+        and named("case", case) == case
+        and not ("corrects" in alteration and listing.has(named("corrects", "")))
+        and named("listing", listing.label) == listing.label
+        and not any(name == listing.label or listing.has(name) for name in named("unless", ()))
+        and all(listing.has(alteration[key]) for key in ("keeps", "reading") if key in alteration)
+    )
+
+
+def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
+    if listing.program != "four-term" or terms not in MODELS:
+        raise InputError(f"terms is {terms}; allowed: 3 or 5, with program four-term")
+    if scene is not None and scene.torque.varies:
+        raise InputError("--terms writes no torque that varies with time; allowed: --case 1 to 6")
+    cards = model_cards(terms)
+    if not listing.has("dt-accumulates"):
+        cards = {n: each for n, each in cards.items() if each.strip() != "DT=DT+.01"}
+    return cards
+
+
+def model_cards(terms: int) -> dict[int, str]:
+    """Return the cards, by new number, of a collocation deck with `terms` terms.
+
+    A conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such deck. The n
+    collocation points are at k/(n+1) of the interval, k = 1 to n.
+    """
+    text = [card.text for card in deck("four-term").cards.values()]
+    terms_range = range(1, terms + 1)
+    end = f"T{terms + 1}"
+
+    def made(start: str, last: str, new: list[str]) -> None:
+        """Replace the cards from the text `start` to the text `last` by the statements `new`."""
+        first = next(n for n, each in enumerate(text) if each.strip() == start)
+        after = next(n for n in range(first, len(text)) if text[n].strip() == last)
+        text[first : after + 1] = [f"      {each}" for each in new]
+
+    def polynomial(name: str, column: int, at: str, time: str) -> list[str]:
+        powers = [f"B({k},{column})*{time}" + (f"**{k}" if k > 1 else "") for k in terms_range]
+        head = f"{name}({at})={name}(1)+" + "+".join(powers[:3])
+        more = ["+".join(powers[3:])] if terms > 3 else []
+        return [head + "+", *more] if more else [head]
+
+    matrix = [
+        f"A({j},{k})={k}." + (f"*T{j}" if k > 1 else "") + (f"**{k - 1}" if k > 2 else "")
+        for j in terms_range
+        for k in terms_range
+    ]
+    names = [f"{kind}{axis}" for kind in "UV" for axis in (1, 2, 3)]
+    inside = [(n, c, "L", "T(L)") for c, n in enumerate(names, 1)]
+    at_end = [(n, c, str(terms + 2), end) for c, n in enumerate(names, 1)]
+    made(
+        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
+        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
+        [f"DIMENSION A({terms},{terms}),B({terms},6),WKA({6 * terms}),T(8),F(8),G(8),H(8),"],
+    )
+    text = [each.replace("X(6),Y(6),Z(6)", "X(8),Y(8),Z(8)") for each in text]
+    made(
+        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
+        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
+        ["DIMENSION U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"],
+    )
+    name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")
+    text[text.index("C FOUR TERM APPROXIMATION")] = f"C {name} TERM APPROXIMATION, A CONJECTURE"
+    made("T1=DT*.2", "T5=.01", [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range] + [f"{end}=.01"])
+    made("A(1,1)=1.", "A(4,4)=4.*T4**3", matrix)
+    made(
+        "B(1,1)=F1",
+        "B(4,6)=Z1",
+        [f"B({k},{c})={n}1" for c, n in enumerate("FGHXYZ", 1) for k in terms_range],
+    )
+    made("N=4", "IA=4", [f"N={terms}", f"IA={terms}"])
+    made(
+        "DO 400 L=2,5,1",
+        "CB(4,6)*T(L)**4",
+        [
+            f"DO 400 L=2,{terms + 1},1",
+            *(f"T({k + 1})=T{k}" for k in terms_range),
+            *(line for each in inside for line in polynomial(*each)),
+        ],
+    )
+    second = text.index("C NOW REDO INTERVAL") + 1
+    head, text = text[:second], text[second:]
+    made("A(1,1)=1.", "A(4,4)=4.*T4**3", matrix)
+    made(
+        "B(1,1)=F(2)",
+        "B(4,6)=Z(5)",
+        [f"B({k},{c})={n}({k + 1})" for c, n in enumerate("FGHXYZ", 1) for k in terms_range],
+    )
+    made(
+        "U1(6)=U1(1)+B(1,1)*T5+B(2,1)*T5**2+B(3,1)*T5**3+",
+        "CB(4,6)*T5**4",
+        [line for each in at_end for line in polynomial(*each)],
+    )
+    tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
+    ending = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]
+    text = [*head, *text[:tail], *ending]
+    # A statement whose card ends with an operator continues on the next card.
+    for n, each in enumerate(text[:-1]):
+        if each.rstrip().endswith("+"):
+            text[n + 1] = "     C" + text[n + 1].strip().removeprefix("C")
+    return {100 + 10 * n: each for n, each in enumerate(text)}
+
+
+def _case_cards(program: str, scene: Scene) -> dict[int, str]:
+    if scene.case is None or scene.moments is None:
+        raise InputError("a deck holds one of the cases of Table 1; allowed: --case 1 to 7")
+    first = facts("cards/alterations")["case"][program]
+    torque = scene.body_torque.constant
+    for each in facts("printer")["initial_torque"]:
+        if each["case"] == scene.case:
+            torque = tuple(each["torque"])
+    found = {}
+    for name, values in (("moments", scene.moments), ("torque", torque), ("omega", scene.omega)):
+        for axis, value in enumerate(values):
+            number = first[name] + 10 * axis
+            left = deck(program).cards[number].text.partition("=")[0]
+            found[number] = f"{left}={_literal(value)}"
+    loop = deck(program).cards[first["steps"]].text
+    found[first["steps"]] = re.sub(r",\d+,", f",{scene.steps},", loop)
+    return found
+
+
+def _literal(value: float) -> str:
+    return f"{value!r}".removesuffix("0") if value == int(value) else repr(value)
+
+
+def solver_cards() -> int:
+    """Return the number of cards, except comments, in our LEQT1F."""
+    return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
+
+
+def compiler() -> str | None:
+    """Return the path of gfortran; None if it is not installed."""
+    return shutil.which(COMPILER)
+
+
+def run_deck(text: str, folder: Path | None = None) -> Run:
+    """Compile and run a deck in the dialect `gfortran`, and return its output.
+
+    `folder` keeps the compiled solver for later calls. Raise RuntimeError if compiler or program
+    fails.
+    """
+    with TemporaryDirectory() as place:
+        here = Path(place)
+        solver = solver_object(folder or here)
+        (here / "deck.f").write_text(text)
+        _command([COMPILER, *FLAGS, "deck.f", str(solver), "-o", "deck"], here)
+        _command([str(here / "deck")], here)
+        return Run(_records(here / "TAPE5"), _page((here / "TAPE6").read_text()))
+
+
+def solver_object(folder: Path) -> Path:
+    """Return the path of the compiled solver in `folder`; compile it if it is missing."""
+    found = folder / "leqt1f.o"
+    if not found.exists():
+        _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)
+    return found
+
+
+def _command(words: list[str], folder: Path) -> None:
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{Path(words[0]).name}: {done.stderr.strip()[:600]}")
+
+
+def _records(path: Path) -> np.ndarray:
+    """Return TAPE5, shape (n, 7): records between copies of their lengths."""
+    record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
+    return np.fromfile(path, dtype=record)["values"]
+
+
+def _page(text: str) -> str:
+    return "".join(line[1:].rstrip() + "\n" for line in text.splitlines())

@@ -1,0 +1,217 @@
+"""Counts of the floating-point operations in a step of a program, made on the cards.
+
+The author's statements are interpreted with numbers that count operations; LEQT1F is our own
+version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each; subscripts, jumps, ABS
+and WRITE do not count.
+"""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from pyharness.model.listing import Listing
+from pyharness.thesis.decks import deck_text
+from pyharness.thesis.linear_solver import leqt1f
+
+_NOTHING = re.compile(r"PROGRAM|DIMENSION|REAL|FORMAT|WRITE|CONTINUE|END$")
+_DO = re.compile(r"DO(\d+)([A-Z]+)=(\d+),(\d+)")
+_IF = re.compile(r"IF\((\w+)\.EQ\.(\d+)\)(.*)")
+_TEST = re.compile(r"IF\((.*)\.GT\.(.*)\)GOTO8")
+_CALL = re.compile(r"CALLLEQT1F\(A,M,N,")
+_TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
+ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
+
+
+class Count(NamedTuple):
+    """The number of additions, subtractions, multiplications and divisions in a step.
+
+    `written` counts all on the cards; `once` no repetition on the same operands. With unit times
+    they are times in sequence.
+    """
+
+    written: int
+    once: int
+
+
+class _Counter:
+    """A counter that stores the result of each distinct operation."""
+
+    def __init__(self, times: Mapping[str, int]) -> None:
+        self.times, self.written = times, 0
+        self.known: dict[tuple[Any, ...], _Number] = {}
+        self.constants: dict[float, _Number] = {}
+
+    def operate(self, name: str, left: Any, right: Any) -> "_Number":
+        self.written += self.times[name]
+        key = (name, _identity(left), _identity(right))
+        if key not in self.known:
+            x, y = _value(left), _value(right)
+            value = {"+": x + y, "-": x - y, "*": x * y}[name] if name != "/" else x / y
+            self.known[key] = _Number(self, value)
+        return self.known[key]
+
+
+def _identity(x: Any) -> Any:
+    return id(x) if isinstance(x, _Number) else float(x)
+
+
+def _value(x: Any) -> float:
+    return x.value if isinstance(x, _Number) else float(x)
+
+
+class _Number:
+    """A floating-point value, with the counter of the operations on it.
+
+    A repeated operation on the same operands returns the same object, so that objects are identical
+    exactly if computed in the same way.
+    """
+
+    def __init__(self, counter: _Counter, value: float) -> None:
+        self.counter, self.value = counter, value
+
+    def __add__(self, other: Any) -> "_Number":
+        return self.counter.operate("+", self, other)
+
+    def __radd__(self, other: Any) -> "_Number":
+        return self.counter.operate("+", other, self)
+
+    def __sub__(self, other: Any) -> "_Number":
+        return self.counter.operate("-", self, other)
+
+    def __rsub__(self, other: Any) -> "_Number":
+        return self.counter.operate("-", other, self)
+
+    def __mul__(self, other: Any) -> "_Number":
+        return self.counter.operate("*", self, other)
+
+    def __rmul__(self, other: Any) -> "_Number":
+        return self.counter.operate("*", other, self)
+
+    def __truediv__(self, other: Any) -> "_Number":
+        return self.counter.operate("/", self, other)
+
+    def __rtruediv__(self, other: Any) -> "_Number":
+        return self.counter.operate("/", other, self)
+
+    def __pow__(self, exponent: int) -> "_Number":
+        square = self * self
+        return {2: lambda: square, 3: lambda: square * self, 4: lambda: square * square}[exponent]()
+
+    def __abs__(self) -> "_Number":
+        return self if self.value >= 0.0 else _Number(self.counter, -self.value)
+
+    def __gt__(self, other: Any) -> bool:
+        return self.value > _value(other)
+
+    def __lt__(self, other: Any) -> bool:
+        return self.value < _value(other)
+
+    def __eq__(self, other: object) -> bool:
+        return self.value == _value(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class _Array(defaultdict[tuple[int, ...], Any]):
+    def __call__(self, *subscripts: int) -> Any:
+        return self[subscripts]
+
+
+def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
+    """Return the operations of a listing's program in its first step.
+
+    The scene is the case on the published cards. `times` has the weight of each operation, for
+    example its unit time on a machine.
+    """
+    statements = list(_statements(deck_text(listing)))
+    begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
+    label = _DO.match(statements[begin][1])
+    assert label is not None
+    end = next(n for n, (name, _) in enumerate(statements) if name == label[1])
+    names: dict[str, Any] = {"ABS": abs, "SQRT": lambda x: x}
+    before = _Counter(times)
+    _run(statements[:begin], names, before)
+    counter = _Counter(times)
+    for name, value in names.items():
+        names[name] = _moved(value, counter)
+    names[label[2]] = 1
+    _run(statements[begin + 1 : end], names, counter)
+    return Count(counter.written, sum(times[name] for name, _, _ in counter.known))
+
+
+def _moved(value: Any, counter: _Counter) -> Any:
+    """Return a copy of a value from before a step, whose operations `counter` counts.
+
+    Anything but a number or an array of numbers is returned unchanged.
+    """
+    if isinstance(value, _Array):
+        moved = {k: _moved(x, counter) for k, x in value.items()}
+        return _Array(lambda: _Number(counter, 0.0), moved)
+    return _Number(counter, value.value) if isinstance(value, _Number) else value
+
+
+def _statements(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the label and the text of every statement of a deck, without blanks."""
+    found: list[list[str]] = []
+    for line in text.splitlines():
+        label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())
+        if line.startswith("C"):
+            continue
+        if goes_on != " ":
+            found[-1][1] += rest
+        else:
+            found.append([label, rest])
+    return ((label, rest) for label, rest in found)
+
+
+def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Counter) -> None:
+    position = 0
+    while position < len(statements):
+        _, text = statements[position]
+        position += 1
+        if match := _DO.match(text):
+            end = next(n for n, each in enumerate(statements) if each[0] == match[1])
+            for value in range(int(match[3]), int(match[4]) + 1):
+                names[match[2]] = value
+                _run(statements[position:end], names, counter)
+            position = end + 1
+        elif match := _TEST.match(text):
+            for side in match.groups():
+                _evaluated(side, names)
+        elif match := _IF.match(text):
+            if names[match[1]] == int(match[2]):
+                _run([("", match[3])], names, counter)
+        elif _CALL.match(text):
+            _solve(names, counter)
+        elif not _NOTHING.match(text):
+            _assign(text, names, counter)
+
+
+def _assign(text: str, names: dict[str, Any], counter: _Counter) -> None:
+    match = _TARGET.fullmatch(text)
+    assert match is not None, text
+    name, subscripts, expression = match.groups()
+    value = _evaluated(expression, names)
+    if isinstance(value, float):
+        value = counter.constants.setdefault(value, _Number(counter, value))
+    if subscripts is None:
+        names[name] = value
+    else:
+        array = names.setdefault(name, _Array(lambda: _Number(counter, 0.0)))
+        array[tuple(_evaluated(each, names) for each in subscripts.split(","))] = value
+
+
+def _evaluated(expression: str, names: dict[str, Any]) -> Any:
+    return eval(expression, {"__builtins__": {}}, names)
+
+
+def _solve(names: dict[str, Any], counter: _Counter) -> None:
+    n, m = names["N"], names["M"]
+    a, b = names["A"], names["B"]
+    matrix = [[a(i, j) for j in range(1, n + 1)] for i in range(1, n + 1)]
+    right = [[b(i, j) for i in range(1, n + 1)] for j in range(1, m + 1)]
+    solutions, _ = leqt1f(matrix, right)
+    for j, column in enumerate(solutions, 1):
+        for i, value in enumerate(column, 1):
+            b[i, j] = value

@@ -1,0 +1,291 @@
+"""Words: floating-point formats of p bits with a rounding rule, for runs of the twins.
+
+A number of a word has the operators of a float, also with integers, floats and numbers of the same
+word. A float is treated as a literal of a source text: its shortest decimal representation is
+rounded, not its exact binary value.
+"""
+
+import math
+import operator
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from pyharness.model.errors import InputError, unknown
+from pyharness.thesis.cdc import cdc
+from pyharness.thesis.rounding import Pair, Rules, ieee
+
+RULES = ("nearest-even", "chop", "FX", "RX")
+# Additional bits with which a sine or cosine is computed before it is rounded to the word.
+_GUARD_BITS = 40
+
+
+class Number:
+    """An immutable number of a word: the integer `m` times 2**`e`.
+
+    If `m` is 0, `e` is the value as a float: 0.0, -0.0, inf, -inf or nan. `Word` makes a subclass
+    for each word. Square roots, sines and cosines are rounded to nearest even if the word
+    truncates.
+    """
+
+    __slots__ = ("e", "m")
+    word: ClassVar["Word"]
+    rules: ClassVar[Rules]
+
+    def __init__(self, m: int, e: Any) -> None:
+        self.m, self.e = m, e
+
+    def __add__(self, other: Any) -> "Number":
+        """Return the rounded sum."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.add(self.m, self.e, other.m, other.e))
+        return self._special(operator.add, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> "Number":
+        """Return the sum with the negative of `other`."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.add(self.m, self.e, -other.m, other.e))
+        return self._special(operator.add, -other)
+
+    def __rsub__(self, other: Any) -> "Number":
+        """Return `other`, converted to the word, minus this number."""
+        return self.word(other) - self
+
+    def __mul__(self, other: Any) -> "Number":
+        """Return the rounded product."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.multiply(self.m, self.e, other.m, other.e))
+        return self._special(operator.mul, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> "Number":
+        """Return the rounded quotient: infinite for x/0, nan for 0/0."""
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*own.rules.divide(self.m, self.e, other.m, other.e))
+        return self._special(_quotient, other)
+
+    def __rtruediv__(self, other: Any) -> "Number":
+        """Return `other`, converted to the word, divided by this number."""
+        return self.word(other) / self
+
+    def __neg__(self) -> "Number":
+        """Return the number with the opposite sign."""
+        return self.__class__(-self.m, self.e) if self.m else self._plain(-self.e)
+
+    def __abs__(self) -> "Number":
+        """Return the magnitude."""
+        return self.__class__(abs(self.m), self.e if self.m else abs(self.e))
+
+    def __bool__(self) -> bool:
+        """Return whether the number is not zero; True for nan."""
+        return bool(self.m or self.e)
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the difference computed in the word is zero.
+
+        In a CDC word it can be zero for two neighbouring numbers, which are then regarded as equal.
+        """
+        x, y = self, self.word(other)
+        if x.m and y.m:
+            m, e = self.rules.difference(x.m, x.e, -y.m, y.e)
+            return not m and bool(e == 0.0)
+        return x._shadow == y._shadow
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __lt__(self, other: Any) -> bool:
+        """Return whether the exact difference is below zero."""
+        return self._order(other) < 0
+
+    def __gt__(self, other: Any) -> bool:
+        """Return whether the exact difference is above zero."""
+        return self._order(other) > 0
+
+    def __le__(self, other: Any) -> bool:
+        """Return whether the exact difference is at most zero; False for nan."""
+        return self._order(other) <= 0
+
+    def __ge__(self, other: Any) -> bool:
+        """Return whether the exact difference is at least zero; False for nan."""
+        return self._order(other) >= 0
+
+    def __float__(self) -> float:
+        """Return the nearest float, or infinity with the same sign."""
+        if not self.m:
+            return float(self.e)
+        try:
+            return float(self.m << self.e) if self.e >= 0 else self.m / (1 << -self.e)
+        except OverflowError:
+            return math.copysign(math.inf, self.m)
+
+    def __repr__(self) -> str:
+        """Return the word and the value: ``Word(48, 'FX')(m * 2**e)``."""
+        value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
+        return f"{self.word}({value})"
+
+    @property
+    def is_finite(self) -> bool:
+        """Return whether the number is neither nan nor infinite."""
+        return bool(self.m) or self.e == 0.0
+
+    def fraction(self) -> Fraction:
+        """Return the exact value of a finite number as a fraction."""
+        return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
+
+    def sqrt(self) -> "Number":
+        """Return the square root, rounded to nearest; nan below zero."""
+        if self.m <= 0:
+            return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
+        shift = 2 * self.word.p + 4 + (self.e & 1)
+        root = math.isqrt(self.m << shift)
+        rest = root * root != self.m << shift
+        return self.__class__(*self.rules.nearest(root << 1 | rest, (self.e - shift) // 2 - 1))
+
+    def sin(self) -> "Number":
+        """Return the sine of this number (rad), rounded to nearest."""
+        return self._wave("mpf_sin")
+
+    def cos(self) -> "Number":
+        """Return the cosine of this number (rad), rounded to nearest."""
+        return self._wave("mpf_cos")
+
+    def _wave(self, name: str) -> "Number":
+        if not self.m:
+            at_zero = self.e if name == "mpf_sin" else 1.0
+            return self.word(at_zero if self.e == 0.0 else math.nan)
+        from mpmath import libmp
+
+        function = getattr(libmp, name)
+        angle = libmp.from_man_exp(self.m, self.e)
+        sign, m, e, _ = function(angle, self.word.p + _GUARD_BITS)
+        return self.__class__(*self.rules.nearest(-int(m) if sign else int(m), e))
+
+    def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
+        """Return the result of an operation with an operand that is zero, infinite or nan.
+
+        `operation` is applied to floats that stand for the operands. If it yields zero, infinity or
+        nan, so is the result. Otherwise zero was added to a number, which is the result.
+        """
+        found = operation(self._shadow, other._shadow)
+        if found and math.isfinite(found):
+            return self if self.m else other  # a zero was added
+        return self._plain(found)
+
+    def _plain(self, value: float) -> "Number":
+        return self.__class__(0, value if value or self.rules.signed_zero else 0.0)
+
+    @property
+    def _shadow(self) -> float:
+        """Return the zero, infinity or nan of this number, else 1.0 or -1.0."""
+        if self.m:
+            return 1.0 if self.m > 0 else -1.0
+        return float(self.e)
+
+    def _order(self, other: Any) -> float:
+        """Return a number with the sign of the exact difference; nan if an operand is nan."""
+        x, y = self, self.word(other)
+        if not (x.m and y.m):
+            return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
+        apart: int = x.e - y.e
+        return (x.m << apart) - y.m if apart >= 0 else x.m - (y.m << -apart)
+
+
+def _quotient(x: float, y: float) -> float:
+    if y:
+        return x / y
+    return math.nan if math.isnan(x) or not x else math.copysign(math.inf, x) * math.copysign(1, y)
+
+
+class Word:
+    """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
+
+    `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
+    (rounding). Except for these two, numbers are below 2**(largest + 1), and the smallest exponent
+    follows as in IEEE 754; the default is binary64's if p is at most 53, else binary128's. With
+    `cut_literals` converted values are truncated. Raise InputError if the rule is unknown, or if p
+    is below 4.
+    """
+
+    def __init__(
+        self,
+        p: int,
+        rule: str = "nearest-even",
+        largest: int | None = None,
+        cut_literals: bool = False,
+    ) -> None:
+        if rule not in RULES:
+            raise unknown("rounding", rule, RULES)
+        if p < 4:
+            raise InputError(f"word: {p} bits; allowed: 4 or more")
+        self.p, self.rule = p, rule
+        if rule in ("FX", "RX"):
+            rules = cdc(p, rounds=rule == "RX")
+        else:
+            exponent = largest or (1023 if p <= 53 else 16383)
+            rules = ieee(p, exponent, cut=rule == "chop")
+        self.rules = rules
+        self._literal = rules.cut if cut_literals else rules.nearest
+        fields = {"__slots__": (), "word": self, "rules": rules}
+        self.number: type[Number] = type("Number", (Number,), fields)
+        self._literals: dict[float, Number] = {}
+
+    def __repr__(self) -> str:
+        """Return bits and rounding rule: ``Word(48, 'FX')``."""
+        return f"Word({self.p}, {self.rule!r})"
+
+    def __call__(self, value: Any) -> Number:
+        """Return a float, integer, fraction, decimal text or own number as a number of the word.
+
+        A float is converted from its shortest decimal representation. Raise TypeError for any other
+        type, and for a number of another word.
+        """
+        if isinstance(value, Number) and value.word is self:
+            return value
+        if isinstance(value, float):
+            known = self._literals.get(value) if value else None
+            if known is None:
+                known = self.number(*self._nearest(value))
+                if value and math.isfinite(value):
+                    self._literals[value] = known
+            return known
+        if isinstance(value, int):
+            return self.number(*self._literal(value, 0))
+        if isinstance(value, Fraction | str):
+            return self.number(*self._of_fraction(Fraction(value)))
+        raise TypeError(f"{value!r} is no number of {self}")
+
+    def _nearest(self, value: float) -> Pair:
+        if not value or not math.isfinite(value):
+            return 0, value if value or self.rules.signed_zero else 0.0
+        return self._of_fraction(Fraction(float.__repr__(value)))
+
+    def _of_fraction(self, value: Fraction) -> Pair:
+        above, below = abs(value.numerator), value.denominator
+        shift = max(0, self.p + 2 + below.bit_length() - above.bit_length())
+        quotient, rest = divmod(above << shift, below)
+        quotient = quotient << 1 | (rest > 0)
+        return self._literal(quotient if value > 0 else -quotient, -shift - 1)
+
+
+WORDS: dict[str, Word] = {
+    "binary64": Word(53),
+    "binary32": Word(24, largest=127),
+    "binary128": Word(113),
+    "cdc48": Word(48, "FX"),
+    "cdc48-rounded": Word(48, "RX"),
+}

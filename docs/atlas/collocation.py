@@ -8,10 +8,10 @@ import numpy as np
 from docs.atlas.maps import region_panels, thinned, values_of
 from pyharness.checks.theory.regions import regions
 from pyharness.checks.theory.rotations import rates
-from pyharness.ensembles.store import Store
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
+from pyharness.sweep.store import Store
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

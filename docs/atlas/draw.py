@@ -11,9 +11,9 @@ from docs.atlas.collocation import collocation_picture
 from docs.atlas.stability import stability_picture
 from docs.atlas.stops import stops_picture
 from docs.atlas.torque import torque_picture
-from pyharness.ensembles.store import check_store, opened
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
+from pyharness.sweep.store import check_store, opened
+from pyharness.sweep.sweep_file import read_sweep
 from pyharness.views.pictures import saved
 
 PICTURES = {

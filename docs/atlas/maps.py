@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.checks.theory.regions import Regions
-from pyharness.ensembles.axes import Axis
-from pyharness.ensembles.store import Store
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
+from pyharness.sweep.axes import Axis
+from pyharness.sweep.store import Store
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from docs.atlas.maps import COLORS, nearest, square_map, square_rows, values_of
-from pyharness.ensembles.store import Store
 from pyharness.model.report import Picture, numbers
 from pyharness.model.trajectory import Array
+from pyharness.sweep.store import Store
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,15 +10,15 @@ from pyharness.checks.theory.regions import regions
 from pyharness.checks.theory.rotations import rates
 from pyharness.engine.linearised import jacobians
 from pyharness.engine.solve import solve
-from pyharness.ensembles.batches import batches
-from pyharness.ensembles.store import Store
-from pyharness.ensembles.sweep import Sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array
+from pyharness.sweep.batches import batches
+from pyharness.sweep.store import Store
+from pyharness.sweep.sweep import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

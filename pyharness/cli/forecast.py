@@ -29,7 +29,7 @@ def check_count(option: str, count: int, least: int, cost: Cost) -> None:
 
     If they will take more than a minute, print a forecast.
     """
-    from pyharness.ensembles.forecast import duration
+    from pyharness.sweep.forecast import duration
 
     if not least <= count <= cost.most:
         shown = str(count) if abs(count) < 10**18 else "a number of more than 18 digits"

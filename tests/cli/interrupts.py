@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.ensembles.sweeps import text
+from tests.sweep.sweeps import text
 
 _PATIENCE = 20.0  # s, within which an interrupted command must end
 _MOURNING = 10.0  # s, within which the workers of a killed command must end

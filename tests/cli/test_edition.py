@@ -13,7 +13,7 @@ from pyharness.cli.main import main
 from pyharness.edition import site
 from pyharness.edition.libraries import LIBRARIES
 from pyharness.edition.report import MARK
-from tests.ensembles.sweeps import files
+from tests.sweep.sweeps import files
 
 Capture = pytest.CaptureFixture[str]
 LISTED = {"schema": 1, "files": {"index.html": 3, "docs/a.html": 1, "docs/old.html": 2}}

@@ -17,7 +17,7 @@ from pyharness.model import pipes
 from pyharness.model.errors import printable
 from pyharness.model.output_files import check_writable
 from pyharness.model.pipes import read_input
-from tests.ensembles.sweeps import axis
+from tests.sweep.sweeps import axis
 
 Capture = pytest.CaptureFixture[str]
 

@@ -101,7 +101,7 @@ def test_what_is_left_to_the_resource_tracker_is_removed_without_a_word() -> Non
     script = (
         "import os\n"
         "from multiprocessing import get_context, resource_tracker\n"
-        "from pyharness.ensembles import executors\n"
+        "from pyharness.sweep import executors\n"
         "def interrupted(*_):\n"
         "    print(get_context('spawn').Lock()._semlock.name)\n"
         "    resource_tracker.register('/mp-none-of-this-name', 'semaphore')\n"

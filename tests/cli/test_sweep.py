@@ -9,8 +9,8 @@ import pytest
 from pyharness.cli.main import main
 from pyharness.cli.verbs import sweep as verb
 from tests.conftest import Printed
-from tests.ensembles.claims import CLAIMS
-from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, text, written
+from tests.sweep.claims import CLAIMS
+from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, text, written
 
 Capture = pytest.CaptureFixture[str]
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, run_many, solve_many, subset
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep_file import read_sweep
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep_file import read_sweep
 from pyharness.torques import damping
-from tests.ensembles.sweeps import SQUARE, text, written
+from tests.sweep.sweeps import SQUARE, text, written
 
 BRICK = Scene("brick", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2))
 STARTS = np.random.default_rng(5).uniform(-1.0, 1.0, (700, 3))

@@ -9,10 +9,10 @@ import pytest
 
 from pyharness import InputError
 from pyharness.cli.main import main
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims.atlas import atlas_of, bits, shares, sum_of_points
 from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.sweep_file import read_sweep
 from tests.conftest import Printed
 
 pytestmark = pytest.mark.claims

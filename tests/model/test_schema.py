@@ -21,15 +21,15 @@ from pyharness.cli.output import check_tree
 from pyharness.edition.crate import PACKAGE_MARK
 from pyharness.edition.report import MARK
 from pyharness.engine.scene_reader import read_scene
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep_file import read_sweep
 from pyharness.thesis.vectors import OURS, answers
-from tests.ensembles.sweeps import TILT, files, text, written
 from tests.ports import engine
+from tests.sweep.sweeps import TILT, files, text, written
 
 ROOT = Path(__file__).parent.parent.parent
 EXTERNAL = ROOT / "pyharness" / "data" / "external" / "nasa-brick.toml"

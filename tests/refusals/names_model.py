@@ -14,10 +14,10 @@ from pyharness import (
     read_scene,
 )
 from pyharness.engine.scene_reader import scene_of
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text
-from tests.ensembles.sweeps import BASE, PROGRAM, TILT, text
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import BASE, PROGRAM, TILT, text
 
 __all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GRAVITY", "LAW",
            "PROGRAM", "READINGS", "START", "TILT", "TILTED", "Decimal", "Fraction",

@@ -72,11 +72,11 @@ def _evidence(options: argparse.Namespace) -> int:
 
 
 def _atlas(options: argparse.Namespace) -> int:
-    from pyharness.ensembles.store import check_store, opened
-    from pyharness.ensembles.sweep_file import read_sweep
     from pyharness.history.claims import over_starts
     from pyharness.history.claims.atlas import atlas_of
     from pyharness.history.claims.atlas_report import atlas_report
+    from pyharness.sweep.store import check_store, opened
+    from pyharness.sweep.sweep_file import read_sweep
 
     shared.refuse(options, "--atlas", ("explain", "assignments", "evidence", "word"))
     if options.sweep is None:

@@ -8,13 +8,13 @@ from functools import partial
 
 from pyharness.cli import options as shared
 from pyharness.cli import say
-from pyharness.ensembles.executors import EXECUTORS, check_dask
-from pyharness.ensembles.forecast import format_estimate
-from pyharness.ensembles.run import swept
-from pyharness.ensembles.store import check_zarr
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
+from pyharness.sweep.executors import EXECUTORS, check_dask
+from pyharness.sweep.forecast import format_estimate
+from pyharness.sweep.run import swept
+from pyharness.sweep.store import check_zarr
+from pyharness.sweep.sweep_file import read_sweep
 
 # The name of the function that judges a claim for many initial conditions, by the claim's
 # identifier.
@@ -60,13 +60,13 @@ def run(options: argparse.Namespace) -> int:
     # the standard output.
     shown = argparse.Namespace(**{**vars(options), "out": None})
     if options.plot is not None:
-        from pyharness.ensembles.picture import chosen_quantity
+        from pyharness.sweep.picture import chosen_quantity
 
         quantity = chosen_quantity(sweep, options.quantity)
     elif options.quantity is not None:
         raise InputError("--quantity has no meaning without --plot")
     shared.check_outputs(shown)
-    from pyharness.ensembles.report import sweep_report
+    from pyharness.sweep.report import sweep_report
 
     with swept(
         sweep,
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         shared.end_progress()
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
-            from pyharness.ensembles.picture import sweep_picture
+            from pyharness.sweep.picture import sweep_picture
 
             report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
         shared.show(report, shown)

@@ -152,7 +152,7 @@ def test_every_language_has_its_share() -> None:
         lines[language_of(file)] += lines_of_code(file)
     assert set(lines) == {"Python", FORTRAN, C, JAVASCRIPT}
     assert lines["Python"] > lines[FORTRAN] > lines[C]
-    core = {"pyharness/engine/gauss.py", "pyharness/ensembles/store.py", "web/port.js",
+    core = {"pyharness/engine/gauss.py", "pyharness/sweep/store.py", "web/port.js",
             "pyharness/thesis/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
             "pyharness/engine/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())

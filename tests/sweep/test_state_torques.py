@@ -11,16 +11,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, read_scene, solve, torques
-from pyharness.ensembles.batches import batches
-from pyharness.ensembles.chunk import solve_points
-from pyharness.ensembles.executors import EXECUTORS
-from pyharness.ensembles.forecast import places_of_a_chunk
-from pyharness.ensembles.run import swept
-from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep import Sweep, spread
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
-from tests.ensembles.sweeps import axis, every, written
+from pyharness.sweep.batches import batches
+from pyharness.sweep.chunk import solve_points
+from pyharness.sweep.executors import EXECUTORS
+from pyharness.sweep.forecast import places_of_a_chunk
+from pyharness.sweep.run import swept
+from pyharness.sweep.store import opened
+from pyharness.sweep.sweep import Sweep, spread
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import axis, every, written
 
 SCENE = """
 [scene.body]

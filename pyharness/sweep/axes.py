@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.ensembles.fields import CHOICES, CONSTANTS, field_names, number_field
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, integer
+from pyharness.sweep.fields import CHOICES, CONSTANTS, field_names, number_field
 
 Floats = NDArray[np.float64]
 

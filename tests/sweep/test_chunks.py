@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.ensembles.chunk import solve_points
-from pyharness.ensembles.sweep_file import read_sweep
-from tests.ensembles.sweeps import TILT, axis, every, text, written
+from pyharness.sweep.chunk import solve_points
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import TILT, axis, every, text, written
 
 TORQUE, RATE = axis("torque.constant.1", [0.0, 0.3, 0.7]), axis("torque.rate.2", [0.0, 0.1])
 TIME = '[[axis]]\nfield = "t_end"\nfrom = 0.5\nto = 40.0\ncount = 4'

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.ensembles.axes import Axis
-from pyharness.ensembles.fields import units_of
-from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.store import Store
-from pyharness.ensembles.sweep import ReductionSpec, Sweep
 from pyharness.model.errors import unknown
 from pyharness.model.report import Column, Picture, Table
 from pyharness.model.trajectory import Array
+from pyharness.sweep.axes import Axis
+from pyharness.sweep.fields import units_of
+from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.store import Store
+from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.ensembles.batches import looped_fields
-from pyharness.ensembles.chunk import solve_chunk, solve_points
-from pyharness.ensembles.executors import Engine
-from pyharness.ensembles.reductions import empty
-from pyharness.ensembles.store import scratch
-from pyharness.ensembles.sweep import Arrays, Indices, Sweep, spread
+from pyharness.sweep.batches import looped_fields
+from pyharness.sweep.chunk import solve_chunk, solve_points
+from pyharness.sweep.executors import Engine
+from pyharness.sweep.reductions import empty
+from pyharness.sweep.store import scratch
+from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 
 # Numbers of scenes in the samples. The scenes are evenly spread over the grid, and the smallest
 # sample is measured first.

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from pyharness.checks.theory.flips import flip_times
 from pyharness.engine.batch import Batch
-from pyharness.ensembles.attitude_reductions import (
+from pyharness.model.codes import Statuses
+from pyharness.model.extension import ENDS
+from pyharness.model.trajectory import STOP_VARIABLES, Array
+from pyharness.sweep.attitude_reductions import (
     axis_flips,
     end_attitude,
     largest_tilt,
     pointing_error,
     tilted_time,
 )
-from pyharness.ensembles.sweep import ReductionSpec
-from pyharness.model.codes import Statuses
-from pyharness.model.extension import ENDS
-from pyharness.model.trajectory import STOP_VARIABLES, Array
+from pyharness.sweep.sweep import ReductionSpec
 
 Found = NDArray[Any]
 # Value of an integer array where no scene has been computed yet.

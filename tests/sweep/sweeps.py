@@ -4,8 +4,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.sweep import Arrays, Sweep, points
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.sweep import Arrays, Sweep, points
 
 BASE = """
 [scene.body]

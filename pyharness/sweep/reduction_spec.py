@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 
 from pyharness.engine.registry import METHODS
-from pyharness.ensembles.attitude_reductions import RANKS
-from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.sweep import ReductionSpec
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.values import integer, number, three
+from pyharness.sweep.attitude_reductions import RANKS
+from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.sweep import ReductionSpec
 
 _MOST_SAMPLES = 10_000
 

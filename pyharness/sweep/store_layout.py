@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.ensembles.axes import MOST_VALUES
-from pyharness.ensembles.checksums import DamageError, Label, place_checksums, read_bounded
-from pyharness.ensembles.fields import units_of
-from pyharness.ensembles.reductions import REDUCTIONS, empty
-from pyharness.ensembles.sweep import Sweep
 from pyharness.model.distribution import version
 from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
+from pyharness.sweep.axes import MOST_VALUES
+from pyharness.sweep.checksums import DamageError, Label, place_checksums, read_bounded
+from pyharness.sweep.fields import units_of
+from pyharness.sweep.reductions import REDUCTIONS, empty
+from pyharness.sweep.sweep import Sweep
 
 CHECKSUMS = "checksums"  # the group of the checksums in a store; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"

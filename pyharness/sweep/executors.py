@@ -15,11 +15,11 @@ from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from pyharness.ensembles.children import deaf_children, end_with_parent
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.sweep import Arrays, Sweep
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
+from pyharness.sweep.children import deaf_children, end_with_parent
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.sweep import Arrays, Sweep
 
 EXECUTORS = ("here", "processes", "dask")
 Results = Iterator[tuple[int, Arrays]]

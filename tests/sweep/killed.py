@@ -1,4 +1,4 @@
-"""A sweep killed half way and resumed: ``python -m tests.ensembles.killed 10000000``.
+"""A sweep killed half way and resumed: ``python -m tests.sweep.killed 10000000``.
 
 With the word ``attitude`` as second argument, the sweep stores attitudes too, and two worker
 processes solve it.
@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.ensembles.sweeps import files
+from tests.sweep.sweeps import files
 
 _PATIENCE = 600.0  # s
 _ATTEMPTS = 5

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.batch import Batch
 
-CLAIMS = {"stays": "tests.ensembles.claims:stays"}
+CLAIMS = {"stays": "tests.sweep.claims:stays"}
 
 
 def stays(batch: Batch) -> NDArray[Any]:

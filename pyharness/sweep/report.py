@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.ensembles.fields import units_of
-from pyharness.ensembles.forecast import duration, format_estimate
-from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.run import Outcome
-from pyharness.ensembles.store import Store
-from pyharness.ensembles.sweep import ReductionSpec, Sweep
 from pyharness.model.report import Column, Report, Table, digits, words
+from pyharness.sweep.fields import units_of
+from pyharness.sweep.forecast import duration, format_estimate
+from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.run import Outcome
+from pyharness.sweep.store import Store
+from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 _NUMBER = digits(".6g")
 _AXES = (

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pyharness.ensembles.executors import Engine, engine
-from pyharness.ensembles.forecast import Estimate, byte_count, forecast, short_count
-from pyharness.ensembles.reductions import empty, needs_attitudes
-from pyharness.ensembles.store import Store, check_store, opened
-from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, progress_of
+from pyharness.sweep.executors import Engine, engine
+from pyharness.sweep.forecast import Estimate, byte_count, forecast, short_count
+from pyharness.sweep.reductions import empty, needs_attitudes
+from pyharness.sweep.store import Store, check_store, opened
+from pyharness.sweep.sweep import Sweep
 
 # Ratio of the memory that a process needs to the size of a chunk. The process holds several chunks
 # at once, and needs additional memory to compute them.

@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 
 from pyharness.cli.main import main
-from pyharness.ensembles import run, store_layout
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep import Sweep
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
 from pyharness.model.schema import SCHEMAS
-from tests.ensembles.sweeps import TILT, files, text, written
+from pyharness.sweep import run, store_layout
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep import Sweep
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import TILT, files, text, written
 
 SWEEP = text(
     TILT.replace("count = 6", "count = 40"),
@@ -101,7 +101,7 @@ def test_damaged_chunk_is_one_line_and_is_repaired(
         return solve_chunk(sweep, chunk)
 
     monkeypatch.setattr(run, "forecast", lambda *given: 0.0)
-    monkeypatch.setattr("pyharness.ensembles.executors.solve_chunk", solved)
+    monkeypatch.setattr("pyharness.sweep.executors.solve_chunk", solved)
     outcome = run_sweep(sweep, str(store), repair=True)
     assert (computed, outcome.computed, outcome.repaired) == ([0], 1, 1)
     assert files(store) == files(intact / "store")

@@ -1,8 +1,8 @@
 """Functions that solve scenes of a sweep, and return arrays by reduction."""
 
-from pyharness.ensembles.batches import batches
-from pyharness.ensembles.reductions import empty, reduced
-from pyharness.ensembles.sweep import Arrays, Indices, Sweep, points
+from pyharness.sweep.batches import batches
+from pyharness.sweep.reductions import empty, reduced
+from pyharness.sweep.sweep import Arrays, Indices, Sweep, points
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:

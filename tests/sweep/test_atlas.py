@@ -12,15 +12,15 @@ from docs.atlas.collocation import tenfold
 from docs.atlas.maps import place_of
 from docs.atlas.stops import case_scenes, predicted
 from pyharness.checks.theory.flips import flip_times
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.forecast import places_of_a_chunk
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep import Sweep, spread
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
-from tests.ensembles.sweeps import written
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.forecast import places_of_a_chunk
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep import Sweep, spread
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import written
 
 ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"
 

@@ -9,11 +9,11 @@ from typing import Any
 
 from pyharness.engine.registry import check_torque
 from pyharness.engine.scene_reader import scene_of
-from pyharness.ensembles.fields import CONSTANTS
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene
 from pyharness.model.scene_file import scene_text
 from pyharness.model.state_torque import StateTorque
+from pyharness.sweep.fields import CONSTANTS
 
 
 def check_state_axis(scene: Scene, field: str) -> None:

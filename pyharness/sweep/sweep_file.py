@@ -12,13 +12,6 @@ from pyharness.engine.batch import Solver
 from pyharness.engine.registry import REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
 from pyharness.engine.solver import PREPARED
-from pyharness.ensembles.axes import Axis, axis_of
-from pyharness.ensembles.batches import listing_of
-from pyharness.ensembles.fields import ATTITUDE, CHOICES, RIVALS
-from pyharness.ensembles.reduction_spec import reduction_spec_of
-from pyharness.ensembles.reductions import REDUCTIONS, needs_attitudes
-from pyharness.ensembles.state_torques import check_state_axis, check_state_solver
-from pyharness.ensembles.sweep import Sweep
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
@@ -30,6 +23,13 @@ from pyharness.model.scene_file import (
     toml_of,
 )
 from pyharness.model.values import boolean, finite, integer, number
+from pyharness.sweep.axes import Axis, axis_of
+from pyharness.sweep.batches import listing_of
+from pyharness.sweep.fields import ATTITUDE, CHOICES, RIVALS
+from pyharness.sweep.reduction_spec import reduction_spec_of
+from pyharness.sweep.reductions import REDUCTIONS, needs_attitudes
+from pyharness.sweep.state_torques import check_state_axis, check_state_solver
+from pyharness.sweep.sweep import Sweep
 
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _SOLVE = (

@@ -10,17 +10,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pyharness import case_scene, run_program, solve
-from pyharness.ensembles.batches import batches, listing_of
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.sweep import Sweep, points
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.codes import Statuses
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
-from tests.ensembles.claims import CLAIMS
-from tests.ensembles.sweeps import BASE, PROGRAM, TILT, axis, text, written
+from pyharness.sweep.batches import batches, listing_of
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.sweep import Sweep, points
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.claims import CLAIMS
+from tests.sweep.sweeps import BASE, PROGRAM, TILT, axis, text, written
 
 SAMPLES = 400
 

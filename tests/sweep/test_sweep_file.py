@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness.ensembles.axes import axis_of
-from pyharness.ensembles.batches import batches
-from pyharness.ensembles.sweep import points, spread
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.scene_file import case_scene
-from tests.ensembles.sweeps import BASE, PROGRAM, SQUARE, TILT, axis, every, text, written
+from pyharness.sweep.axes import axis_of
+from pyharness.sweep.batches import batches
+from pyharness.sweep.sweep import points, spread
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import BASE, PROGRAM, SQUARE, TILT, axis, every, text, written
 
 
 def test_chunks_cover_the_grid_once_and_hold_one_listing(tmp_path: Path) -> None:

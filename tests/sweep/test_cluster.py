@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep_file import read_sweep
-from tests.ensembles.sweeps import files
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import files
 
 pytest.importorskip("distributed")
 xarray = pytest.importorskip("xarray")

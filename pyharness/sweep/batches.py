@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.batch import OF_PROGRAMS, Batch
-from pyharness.ensembles.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
-from pyharness.ensembles.reductions import needs_attitudes
-from pyharness.ensembles.state_torques import follows_body, with_numbers
-from pyharness.ensembles.sweep import Indices, Sweep, groups, value_columns
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
+from pyharness.sweep.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
+from pyharness.sweep.reductions import needs_attitudes
+from pyharness.sweep.state_torques import follows_body, with_numbers
+from pyharness.sweep.sweep import Indices, Sweep, groups, value_columns
 
 Columns = dict[str, Array]
 

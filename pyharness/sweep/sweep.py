@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.batch import Solver
-from pyharness.ensembles.axes import Axis
 from pyharness.model.scene import Scene
+from pyharness.sweep.axes import Axis
 
 Arrays = dict[str, NDArray[Any]]
 Indices = NDArray[np.int64]

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.ensembles import run, store, store_layout
-from pyharness.ensembles.axes import MOST_VALUES
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.executors import engine
-from pyharness.ensembles.forecast import forecast
-from pyharness.ensembles.run import check_size, run_sweep
-from pyharness.ensembles.store import opened
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
-from tests.ensembles.killed import ATTITUDE, OMEGA, kill_and_resume
-from tests.ensembles.sweeps import PROGRAM, SQUARE, TILT, files, text, written
+from pyharness.sweep import run, store, store_layout
+from pyharness.sweep.axes import MOST_VALUES
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.executors import engine
+from pyharness.sweep.forecast import forecast
+from pyharness.sweep.run import check_size, run_sweep
+from pyharness.sweep.store import opened
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.killed import ATTITUDE, OMEGA, kill_and_resume
+from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, files, text, written
 
 Patch = pytest.MonkeyPatch
 

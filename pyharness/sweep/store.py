@@ -13,7 +13,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pyharness.ensembles.checksums import (
+from pyharness.model.distribution import check_package, install_command
+from pyharness.model.errors import InputError
+from pyharness.model.schema import check_schema
+from pyharness.sweep.checksums import (
     DamageError,
     Label,
     check_files,
@@ -21,8 +24,8 @@ from pyharness.ensembles.checksums import (
     exists,
     place_checksums,
 )
-from pyharness.ensembles.reductions import REDUCTIONS
-from pyharness.ensembles.store_layout import (
+from pyharness.sweep.reductions import REDUCTIONS
+from pyharness.sweep.store_layout import (
     CHECKSUMS,
     LARGEST_METADATA,
     METADATA,
@@ -32,10 +35,7 @@ from pyharness.ensembles.store_layout import (
     largest_chunk,
     metadata_files,
 )
-from pyharness.ensembles.sweep import Arrays, Sweep
-from pyharness.model.distribution import check_package, install_command
-from pyharness.model.errors import InputError
-from pyharness.model.schema import check_schema
+from pyharness.sweep.sweep import Arrays, Sweep
 
 _UNFINISHED = "*.partial"  # Zarr's name for a file that is not renamed yet
 _SAME_SWEEP = "give another --out, or remove it"

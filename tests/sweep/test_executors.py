@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
-from pyharness.ensembles import executors
-from pyharness.ensembles.chunk import solve_chunk
-from pyharness.ensembles.executors import engine
-from pyharness.ensembles.run import run_sweep
-from pyharness.ensembles.sweep import Sweep
-from pyharness.ensembles.sweep_file import read_sweep
 from pyharness.model.errors import InputError
-from tests.ensembles.sweeps import PROGRAM, files, quick_and_slow, written
+from pyharness.sweep import executors
+from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.executors import engine
+from pyharness.sweep.run import run_sweep
+from pyharness.sweep.sweep import Sweep
+from pyharness.sweep.sweep_file import read_sweep
+from tests.sweep.sweeps import PROGRAM, files, quick_and_slow, written
 
 Patch = pytest.MonkeyPatch
 distributed = pytest.importorskip("distributed")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.batch import Batch
+from pyharness.checks.compare.batch import Batch
 from pyharness.model.attitude import product
 from pyharness.model.trajectory import Array
 

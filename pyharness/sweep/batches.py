@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.batch import OF_PROGRAMS, Batch
+from pyharness.checks.compare.batch import OF_PROGRAMS, Batch
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, subset

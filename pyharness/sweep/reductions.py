@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.checks.compare.batch import Batch
 from pyharness.checks.theory.flips import flip_times
-from pyharness.engine.batch import Batch
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import STOP_VARIABLES, Array

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.batch import Solver
+from pyharness.checks.compare.batch import Solver
 from pyharness.model.scene import Scene
 from pyharness.sweep.axes import Axis
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyharness.engine.batch import Solver
+from pyharness.checks.compare.batch import Solver
 from pyharness.engine.registry import REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
 from pyharness.engine.solver import PREPARED

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, compare_programs, prepare, solve, solve_many
+from pyharness.checks.compare.batch import Solver
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.cli.main import main
-from pyharness.engine.batch import Solver
 from pyharness.engine.plan import plan
 from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS, requested_tolerance
 from pyharness.engine.solver import PREPARED

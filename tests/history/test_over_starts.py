@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.engine.batch import Batch, Solver
+from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.history.claims import over_starts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim, outcome

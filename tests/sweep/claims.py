@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.batch import Batch
+from pyharness.checks.compare.batch import Batch
 
 CLAIMS = {"stays": "tests.sweep.claims:stays"}
 

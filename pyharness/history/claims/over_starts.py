@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.batch import Batch
+from pyharness.checks.compare.batch import Batch
 from pyharness.engine.many import solve_many
 from pyharness.engine.rotated import restarted_at
 from pyharness.history.claims import rules

@@ -82,10 +82,10 @@ __all__ = [
 # The public names by module. A module is imported at the first use of one of its names, so that a
 # program loads only the modules that it needs.
 _SUBMODULES = {
-    "compare.comparison": ("Comparison", "compare_programs"),
-    "compare.method_comparison": ("compare_methods",),
-    "dynamics.scene_reader": ("read_scene",),
-    "dynamics.trajectory_reader": ("load",),
+    "checks.compare.comparison": ("Comparison", "compare_programs"),
+    "checks.compare.method_comparison": ("compare_methods",),
+    "engine.scene_reader": ("read_scene",),
+    "engine.trajectory_reader": ("load",),
     "model.changing": ("ChangingInertia", "ChangingMoments"),
     "model.dense_output": ("DenseOutput",),
     "model.errors": ("InputError", "NotBuiltError"),
@@ -97,16 +97,16 @@ _SUBMODULES = {
     "model.state_torque": ("StateTorque", "opaque"),
     "model.torque_law": ("TorqueLaw",),
     "model.trajectory": ("Stop", "Trajectory"),
-    "original.many": ("ProgramEnsemble", "run_many"),
-    "original.programs": ("run_program",),
-    "methods.many": ("Ensemble", "solve_many"),
-    "methods.prepared": ("prepare",),
-    "methods.prepared_attitude": ("AttitudeSolver",),
-    "methods.compiled_call": ("get_include",),
-    "methods.solver": ("Solver",),
-    "methods.stepper": ("Stepper",),
-    "methods.taylor_ivp": ("Taylor",),
-    "methods.solve": ("solve",),
+    "thesis.many": ("ProgramEnsemble", "run_many"),
+    "thesis.programs": ("run_program",),
+    "engine.many": ("Ensemble", "solve_many"),
+    "engine.prepared": ("prepare",),
+    "engine.prepared_attitude": ("AttitudeSolver",),
+    "engine.compiled_call": ("get_include",),
+    "engine.solver": ("Solver",),
+    "engine.stepper": ("Stepper",),
+    "engine.taylor_ivp": ("Taylor",),
+    "engine.solve": ("solve",),
 }
 # Public modules, which are imported at their first use too.
 _MODULES = ("events", "torques")

@@ -22,10 +22,10 @@ TESTS = {
     "tests/passed.txt": (), "web/": ("edition", "browser"),
     "pyharness/edition/": ("edition", "browser"),
     "tests/changed.py": ("test_quick.py",), "tests/quick.py": ("test_quick.py",),
-    "pyharness/data/": ("history", "original", "edition"), "fortran/original/": ("original",),
+    "pyharness/data/": ("history", "thesis", "edition"), "fortran/original/": ("thesis",),
 }  # fmt: skip
 # Packages on which nearly all others depend.
-SHARED = ("pyharness/model/", "pyharness/engine/", "pyharness/engine/")
+SHARED = ("pyharness/model/", "pyharness/engine/")
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -55,6 +55,16 @@ def _blocks() -> list[tuple[Path, str, str]]:
     return found
 
 
+def test_picture_of_the_architecture_is_the_import_contract() -> None:
+    page = (ROOT / "docs/contributing/architecture.md").read_text()
+    picture = page.split("```")[1].strip("\n").split("\n")
+    names = [re.split(r" {2,}", line)[0].split() for line in picture]
+    (contract, *_) = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"][
+        "contracts"
+    ]
+    assert names == [each.split(" | ") for each in contract["layers"]]
+
+
 @pytest.mark.sampled
 @pytest.mark.parametrize(("path", "command", "output"), _blocks())
 def test_output_is_current(

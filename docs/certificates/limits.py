@@ -4,21 +4,20 @@ import pkgutil
 from collections import Counter
 from importlib import import_module
 
-from pyharness import checks, theory
+from pyharness import checks
 from pyharness.edition.made_pages import table
 from pyharness.model.basis import MARKS, Basis
 
 
 def limits() -> list[Basis]:
-    """Return each basis that a module of `pyharness.checks` or `pyharness.checks.theory` defines, once.
+    """Return each basis that a module of `pyharness.checks` defines, once.
 
     They are sorted by their marks, from proved to measured, and then by the limited quantities.
     """
     found = set()
-    for package in (theory, checks):
-        for each in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            values = vars(import_module(each.name)).values()
-            found |= {value for value in values if isinstance(value, Basis)}
+    for each in pkgutil.walk_packages(checks.__path__, "pyharness.checks."):
+        values = vars(import_module(each.name)).values()
+        found |= {value for value in values if isinstance(value, Basis)}
     order = list(MARKS)
     return sorted(found, key=lambda each: (order.index(each.mark), each.limit))
 

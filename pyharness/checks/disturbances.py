@@ -1,7 +1,7 @@
 """Propagation of small perturbations by a step of each program, measured by running it.
 
-`pyharness.checks.theory.amplification` derives the same from the schemes alone, exactly, so that limits
-allow only for rounding. J is the Jacobian of Euler's equations (13-15 of the thesis).
+`theory.amplification` derives the same from the schemes alone, exactly, so that limits allow only
+for rounding. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 from collections.abc import Callable, Sequence

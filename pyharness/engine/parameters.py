@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.system import rates_of_changing, rates_of_inertia
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, quaternion_rates
 from pyharness.model.changing import Changing
 from pyharness.model.expressions import components
+from pyharness.model.inertia_rates import rates_of_changing, rates_of_inertia
 from pyharness.model.law_symbols import body_torque
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, torque_of

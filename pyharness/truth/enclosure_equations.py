@@ -7,10 +7,10 @@ from typing import Any
 
 from flint import arb
 
-from pyharness.engine.system import rates_of_inertia
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.dual import Dual
 from pyharness.model.errors import InputError
+from pyharness.model.inertia_rates import rates_of_inertia
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate

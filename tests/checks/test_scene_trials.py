@@ -74,7 +74,7 @@ def _off(real: Callable[..., Any], only_at: Callable[[Scene], bool]) -> Callable
 def test_fault_is_seen(trial: str) -> None:
     """Omega has an error of .001 in some of the calls."""
     scene = SCENES["terms"]()
-    place = "compare.candidates" if "length" in trial else "checks.scene_trials"
+    place = "checks.compare.candidates" if "length" in trial else "checks.scene_trials"
     is_same = trial.endswith(("split", "length/taylor"))
     wrong = _off(solve, lambda each: is_same == (each.torque == scene.torque))
     with patch(f"pyharness.{place}.solve", wrong):

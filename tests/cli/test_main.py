@@ -342,8 +342,8 @@ def test_rooms_are_entered_only_when_needed(tmp_path: Path) -> None:
     code = (
         "import sys; from pyharness.cli.main import main; "
         "main(['run', '--case', '3', '--program', 'four-term', '--out', sys.argv[1]]); "
-        "print([m for m in ('scipy', 'matplotlib', 'decimal', 'pyharness.checks.compare.comparison')"
-        " if m in sys.modules])"
+        "own = 'pyharness.checks.compare.comparison'; "
+        "print([m for m in ('scipy', 'matplotlib', 'decimal', own) if m in sys.modules])"
     )
     assert _python("-c", code, str(tmp_path / "x")).stdout == "[]\n"
 

@@ -49,8 +49,8 @@ CALLING = (
     *(
         f"--ignore=tests/{name}.py"
         for name in (
-            "methods/test_scipy_state", "original/test_cards", "original/test_deck_collation",
-            "original/test_operations", "original/test_words",
+            "engine/test_scipy_state", "thesis/test_cards", "thesis/test_deck_collation",
+            "thesis/test_operations", "thesis/test_words",
         )
     ),
 )  # fmt: skip

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
-from pyharness import original
+from pyharness import thesis
 from pyharness.checks.plants.faults import Fault
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
@@ -78,8 +78,8 @@ def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> M
     package = f"planted_{next(_COUNT)}"
     target = folder / package
     ignore = shutil.ignore_patterns("__pycache__")
-    assert original.__file__ is not None
-    shutil.copytree(Path(original.__file__).parent, target, ignore=ignore)
+    assert thesis.__file__ is not None
+    shutil.copytree(Path(thesis.__file__).parent, target, ignore=ignore)
     for path in target.glob("*.py"):
         text = path.read_text().replace("pyharness.thesis", package)
         if path.name == file:

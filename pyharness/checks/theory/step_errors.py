@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The errors of a step, the truncation error from `pyharness.checks.theory.schemes`, are propagated by the
-state-transition matrix. The methods are not run.
+The errors of a step, the truncation error from `schemes`, are propagated by the state-transition
+matrix. The methods are not run.
 """
 
 import math

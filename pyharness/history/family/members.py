@@ -3,8 +3,8 @@
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
-for n weight functions W (eq. 26). The thesis makes one. `pyharness.checks.theory.tableau` computes its
-coefficients.
+for n weight functions W (eq. 26). The thesis makes one. `checks.theory.tableau`
+computes its coefficients.
 """
 
 import math

@@ -21,7 +21,7 @@ SEED = "mutations"
 # which takes more address space than a trial has, and of run times, which say nothing under load.
 NOT_HERE = ("tests/campaigns/mutations/", "tests/edition/", "tests/browser/", "tests/bench/")
 # The files that most mutations need are recorded first, so that an interrupted recording is useful.
-FIRST = ("methods", "model", "original", "truth", "compare", "theory", "ensembles", "checks")
+FIRST = ("engine", "model", "thesis", "truth", "checks", "sweep")
 # Arguments of pytest for every test.
 PYTEST = ("--no-header", "--tb=no", "-p", "no:cacheprovider")
 OF_ONE_FILE, UNKNOWN = 3000.0, 20.0  # s

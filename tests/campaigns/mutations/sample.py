@@ -18,9 +18,11 @@ EQUIVALENT = Path(__file__).parent / "equivalent.toml"
 # Code that computes, judges, reads and keeps numbers. Excluded are `cli`, `views`, `edition`,
 # pictures and reports, whose texts `tests/outputs` compares, and `bench`, whose results are run
 # times.
-_PYTHON = ("model", "dynamics", "methods", "theory", "truth", "original", "compare", "checks",
-           "ensembles", "history/claims")  # fmt: skip
-_FOR_READERS = re.compile(r"report|picture|sentences|__init__|facts|ledger")
+_PYTHON = ("model", "engine", "truth", "thesis", "checks", "sweep", "history/claims")
+# Random scenes are no results.
+_OTHER_PYTHON = re.compile(
+    r"report[^/]*$|picture[^/]*$|sentences|__init__|facts|ledger|checks/scenes/"
+)
 # Excluded are `levels.c` and `levels.f90`, which choose among instruction sets of equal results,
 # and what f2py reads, where a change is a signature that does not fit.
 _OTHERS = ("fortran/original/*.f90", "fortran/original/*.fypp", "fortran/many/*.f90",
@@ -71,7 +73,7 @@ class Mutation:
 def files() -> list[str]:
     """Return the files that may be changed."""
     python = [path for folder in _PYTHON for path in (ROOT / "pyharness" / folder).rglob("*.py")]
-    kept = [path for path in python if not _FOR_READERS.search(path.name)]
+    kept = [path for path in python if not _OTHER_PYTHON.search(path.as_posix())]
     others = [path for pattern in _OTHERS for path in ROOT.glob(pattern)]
     kept += [path for path in others if not _NO_RESULT.search(path.name)]
     return sorted(str(path.relative_to(ROOT)) for path in kept)

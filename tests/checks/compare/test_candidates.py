@@ -27,7 +27,7 @@ def test_end_of_a_program_is_its_last_row(program: str, implementation: str) -> 
 
 def test_a_twin_enters_no_compiled_program(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bits are the same, so only the module that computed them distinguishes the two."""
-    for room in ("compare.candidates", "original.compiled"):
+    for room in ("checks.compare.candidates", "thesis.compiled"):
         monkeypatch.setattr(f"pyharness.{room}.extension", lambda: pytest.fail("compiled"))
     twin = program_candidate(Listing.original("two-term"), "python")
     assert twin.end(SCENE, END).ended == "complete"

@@ -224,7 +224,7 @@ def by_plan(
         # the smallest one that it claims to meet.
         return method.solve(scene, times, tolerance, effort)
     except InputError as refusal:
-        if chosen.fallback is None:
+        if not chosen.fallback:
             raise
         try:
             return METHODS[chosen.fallback].solve(scene, times, tolerance, effort)

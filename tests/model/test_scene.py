@@ -1,18 +1,28 @@
 """Scenes and scene files: what is read."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene, principal, read_scene
+from pyharness import (
+    ChangingMoments,
+    InputError,
+    Scene,
+    TorqueLaw,
+    case_scene,
+    principal,
+    read_scene,
+    torques,
+)
 from pyharness.engine.rescaled import scaled
 from pyharness.engine.rotated import restarted_at, rotated
 from pyharness.model.attitude import matrices
 from pyharness.model.records import scene_record
-from pyharness.model.scene import most_steps
+from pyharness.model.scene import CHANGING, STATE_TORQUE, most_steps
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 
@@ -148,3 +158,11 @@ def test_wave_beyond_every_angle_is_no_number() -> None:
     law = TorqueLaw(sines=(((1.0, 0.0, 0.0), 1e308),))
     scene = Scene("fast", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=law)
     assert np.isnan(scene.right_hand_side()(1e10, scene.omega)[0])
+
+
+def test_a_torque_of_the_state_and_a_changing_body_have_no_law() -> None:
+    damped = Scene("", (1.0, 2.0, 3.0), (3.0, 2.5, 1.0), torque=torques.damping(0.1))
+    changing = Scene("", (1.0, 2.0, 3.0), ChangingMoments([[3.0, 0.1], [2.0], [1.0]]))
+    for scene, message in ((damped, STATE_TORQUE), (changing, CHANGING)):
+        with pytest.raises(InputError, match=re.escape(message)):
+            _ = scene.law

@@ -22,12 +22,12 @@ _GROUPS = {
     "the thesis": {
         "claims": "judge the statements of the thesis for the original and the corrected programs",
         "figures": "redraw Figures 6 to 12 of the thesis",
-        "cards": "show the listings card by card with scan, port, twin and apparatus",
+        "cards": "show the listings card by card with scan, Fortran, Python and notes",
         "defects": "list the defects and readings with their evidence and effect",
         "deck": "write a program as a deck of cards in fixed-form FORTRAN",
         "limits": "show what the original programs converge to as the step goes to zero",
-        "family": "derive and measure the orders of the weighted residual methods",
-        "words": "run the programs in the CDC's arithmetic and in other word lengths",
+        "family": "derive and measure the orders of convergence of the weighted residual methods",
+        "words": "run the programs in the arithmetic of the CDC and in other word lengths",
     },
     "rigid bodies": {
         "rotations": "find steady rotations of a scene, their stability and the time between flips",
@@ -36,9 +36,9 @@ _GROUPS = {
     },
     "checks and publication": {
         "verify": "check all programs and methods against each other and against the truth",
-        "stress": "test the numerical stability of every method against derived bounds",
+        "stress": "test the numerical stability of every method against bounds from theory",
         "bench": "measure run time against error of our and of third-party integrators",
-        "edition": "write the edition as a web site or as a data package",
+        "edition": "write the edition of the programs as a web site or as a data package",
     },
 }
 VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.items()}

@@ -37,14 +37,14 @@ SCENE = {
 }
 LISTING = {
     "--listing L": "Version of the program: original (all its defects active) or corrected (none "
-    "active); by default `compare` uses both, and other verbs use the original.",
+    "active) (default: original).",
     "--fix NAME,...": "Correct only these faults of the original program: defects, doubtful "
     "readings or conjectures (`pyharness defects` lists and explains the names).",
     "--keep NAME,...": "Keep only these faults of the original program, and correct all others "
     "(`pyharness defects` lists and explains the names).",
     "--reading NAME,...": "Read these ambiguous statements of the printed program in the way that "
     "this edition does not adopt (`pyharness defects --kind reading` explains the names).",
-    "--conjecture NAME,...": "Assume these statements, for which the printed program has no cards; "
+    "--conjecture NAME,...": "Assume these statements, which are missing from the printed program; "
     "none: assume nothing (`pyharness defects --kind conjecture` explains the names).",
     "--lipschitz L": "Stop the Runge-Kutta program when the slopes change by more than L times the "
     "change of the variables, L in 1/s (default 500, as printed).",
@@ -57,7 +57,8 @@ EFFORT = {
 }
 STRICT = {
     "--strict": "Exit with status 1 if the motion amplifies rounding errors so much that they "
-    "exceed the tolerance, or if a short change of the torque may have been passed."
+    "exceed the tolerance, or if the integration may have stepped over a short change of the "
+    "torque."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too, each in the format of its name: .md "

@@ -20,16 +20,16 @@ FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards, by program, number or range, as in two-term, 1660, "
     "1040-1090 or two-term:1660 (default: all cards of the three programs).",
-    "--classes": "Show counts: the recorded entries of each kind (defect, doubtful reading, ...), "
-    "the cards that they name, and the differences from the scan that they explain.",
+    "--classes": "Count the notes of each kind (defect, doubtful reading, ...), the cards that "
+    "they name, and the differences from the scan that they explain.",
     "--collate": "Compare the card decks of the three programs, operation by operation, with each "
     "other and with sections II to V of the thesis.",
     "--origins": "Show where the decks and the thesis disagree, and what each disagreement "
     "suggests about the origin of a fault.",
     "--second-reading": "Compare our text of a random sample of cards with a second reading of the "
     "scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with the text of a scan "
-    "of the thesis in this file.",
+    "--scan FILE": "Compare our text of the cards, character by character, with the text that was "
+    "recognised in a scan of the thesis, in this file.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "cards runge-kutta:860"

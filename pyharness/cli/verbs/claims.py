@@ -15,8 +15,8 @@ OPTIONS = {
     "which assumed values all claims hold.",
     "--word W": "Floating-point arithmetic in which the programs run for the verdicts: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--evidence": "Score every combination of initial conditions, readings, conjectures and "
-    "numbers of steps by the claims that hold with it.",
+    "--evidence": "Score every combination of initial conditions, readings of ambiguous "
+    "statements, conjectured statements and numbers of steps by the number of claims that hold.",
     "--atlas STORE": "Report for which initial angular velocities the claims hold, from the "
     "results of a sweep in this folder; needs --sweep.",
     "--sweep FILE.toml": "Sweep file (TOML) from which `pyharness sweep` made the folder of "

@@ -9,8 +9,9 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--out DIR": "Write the web pages to this folder, which is created if missing; the first "
     "page is index.html.",
-    "--data DIR": "Write the data of the edition, without web pages, to this folder: cards, "
-    "apparatus, verdicts, figures, runs and printed pages as CSV, JSON, TEI and text.",
+    "--data DIR": "Write the data of the edition, without web pages, to this folder: cards, notes "
+    "on them (apparatus), verdicts on the thesis, figures, runs and printed pages, as CSV, JSON, "
+    "TEI and text.",
     "--docs DIR": "Folder of the documents from which the pages are made (default: the folder docs "
     "of the source checkout).",
     "--format F": "Output format of the list of written files: table (default) or json.",

@@ -11,7 +11,9 @@ OPTIONS = {
     **shared.BODY,
     "--disturbance D": "Magnitude of the perturbation of each steady rotation, as a fraction of "
     "the rotation's magnitude, above 0 and below 1 (default 0.001).",
-    **shared.outputs(plot="the polhodes, and of growth rates of perturbations for all moments,"),
+    **shared.outputs(
+        plot="the polhodes, and of the growth rates of perturbations for all moments of inertia,"
+    ),
 }
 EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 

@@ -37,7 +37,7 @@ OPTIONS = {
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
-    f"{', '.join(FORMS)} (the numbers name axes of Euler angles).",
+    f"{', '.join(FORMS)} (numbers: the axes of Euler angles).",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); needs "
     "--method and --attitude.",
     "--tolerance E": "Largest allowed error of the angular velocity from --method, relative to its "

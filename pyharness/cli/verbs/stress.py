@@ -1,4 +1,4 @@
-"""The verb `stress`: test the numerical stability of every method against derived bounds."""
+"""The verb `stress`: test the numerical stability of every method against bounds from theory."""
 
 import argparse
 import shlex
@@ -14,8 +14,8 @@ _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
     "begin with this text, as in shapes/auto.",
-    "--scene FILE": "Make checks on the scene in this TOML file instead, whose torque may depend "
-    f"on omega or attitude; the trials are then {', '.join(SCENE_TRIALS)}.",
+    "--scene FILE": "Check the scene in this TOML file instead of our scenes, by the trials "
+    f"{', '.join(SCENE_TRIALS)}; its torque may depend on omega or attitude.",
     "--save DIR": "Save the scene with the worst result of each method in each trial as a scene "
     "file (TOML) in this folder (default: failures only, in the folder worst).",
     **shared.outputs(FORMATS, plot="the one trial that --only names"),

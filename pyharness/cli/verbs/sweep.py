@@ -25,10 +25,10 @@ OPTIONS = {
     "quantities (reductions) to store for each scene.",
     "--out STORE": "Store the results in this folder, in the Zarr format; if an earlier run of the "
     "sweep was interrupted, compute only what is missing.",
-    "--repair": "Compute damaged chunks (blocks of the grid) of the store again, and write damaged "
-    "metadata again.",
-    "--executor E": f"Place of the computation: {', '.join(EXECUTORS)} (default "
-    f"{EXECUTORS[0]}), that is, this process, several processes, or a Dask cluster.",
+    "--repair": "Recompute damaged chunks (blocks of the grid) of the store, and rewrite damaged "
+    "metadata.",
+    "--executor E": "Where to compute: here (in this process, the default), processes (in several) "
+    "or dask (in a Dask cluster).",
     "--workers N": "Number of processes of the executors processes and dask, "
     f"1 to {_MOST_WORKERS} (default: one for each processor).",
     "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "

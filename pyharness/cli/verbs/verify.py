@@ -24,13 +24,12 @@ OPTIONS = {
     "ids begin with this text, as in cells/two-term.",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes in which methods are checked (default {DRAWS}), "
-    "or, with --port, in which the port is compared (default 0), or of each kind with --integrator "
-    "(default 2).",
-    "--external FILE": "Check our methods only against the published results in this file "
+    "--draws N": f"Number of random scenes: for methods (default {DRAWS}), with --port for the "
+    "port (default 0), with --integrator of each kind (default 2).",
+    "--external FILE": "Only check our methods against the published results in this file "
     "(docs/how-to/external.md describes its format).",
-    "--listing-output FILE": "Find the floating-point arithmetic in which a program on any machine "
-    "printed the page in this file.",
+    "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in this "
+    "file, which one of the programs printed on some machine.",
     "--port COMMAND": "Compare a port of the programs to another language, started by this "
     "command, bit for bit with our Python versions (docs/how-to/ports.md).",
     "--integrator COMMAND": "Compare an integrator of rigid bodies, started by this command, with "
@@ -40,15 +39,14 @@ OPTIONS = {
     "--listing-output or --port (default: all three).",
     "--case N": "Consider only this case of Table 1, 1 to 7, with --listing-output or --port "
     "(default: all cases).",
-    "--cell NAME,...": "Compare the port only in these combinations of program, case and listing, "
-    "as in two-term/case-3 (default: all), or in these random scenes, as in random/7; the "
-    "integrator only in these, as in wave or wave-1.",
+    "--cell NAME,...": "With --port, compare only these combinations of program, case and listing, "
+    "as in two-term/case-3, or random scenes, as in random/7; with --integrator, only these kinds "
+    "of scenes or scenes, as in wave or wave-1 (default: all).",
     "--self-test": "Introduce known faults into the software, or with --port or --integrator into "
     "its answers, one by one, and report which checks detect each fault.",
     "--update": "Compute and write the golden record (stored trajectories for comparison) again, "
     "and report what changed.",
-    "--record DIR": "Folder of the golden record, the stored trajectories for comparison (default: "
-    "tests/golden of the source checkout).",
+    "--record DIR": "Folder of the golden record (default: tests/golden of the source checkout).",
     **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
     **shared.ALSO,
 }

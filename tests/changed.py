@@ -22,6 +22,7 @@ TESTS = {
     "tests/passed.txt": (), "web/": ("edition", "browser"),
     "pyharness/edition/": ("edition", "browser"),
     "tests/changed.py": ("test_quick.py",), "tests/quick.py": ("test_quick.py",),
+    "tests/tiers.py": ("test_tiers.py",),
     "pyharness/data/": ("history", "thesis", "edition"), "fortran/original/": ("thesis",),
 }  # fmt: skip
 # Packages on which nearly all others depend.

@@ -10,6 +10,7 @@ import pytest
 FAST = "not campaign"
 LIMIT = 1.0  # s of CPU on the machine on which the yardstick takes _USUAL
 _USUAL = 0.045  # s
+_NOISE = 2.0  # ratio of the CPU times of one test on a shared machine
 # A test that imports packages first is not judged, because another would do it in another order.
 _MODULES = 20
 
@@ -35,7 +36,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     # The build with run-time checks is slow.
     is_fast = item.config.option.markexpr == FAST and "PYHARNESS_TRAPS" not in os.environ
     is_judged = is_fast and len(sys.modules) - modules < _MODULES
-    if is_judged and seconds > LIMIT and _again(item, seconds) > LIMIT * _slowness():
+    if is_judged and seconds > LIMIT and _again(item, seconds) > _NOISE * LIMIT * _slowness():
         pytest.fail(
             f"took {seconds:.1f} s of CPU, allowed is {LIMIT:g} s: make it smaller, or mark it "
             "with @pytest.mark.campaign, so that make test-all alone runs it",

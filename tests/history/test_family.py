@@ -103,7 +103,9 @@ def test_points_of_ones_own(points: tuple[float, ...], order: int) -> None:
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
-@pytest.mark.parametrize("changes", [{"steps": 400}, {"steps": 7}, {"step_size": 0.05}])
+@pytest.mark.parametrize(
+    "changes", [{"steps": 400}, {"steps": 7}, {"step_size": 0.05, "steps": 60}]
+)
 def test_long_and_short_scenes_have_orders_too(changes: dict[str, Any]) -> None:
     (found,) = order_table(replace(case_scene(6), **changes), [Member("collocation", 3, None, 2)])
     assert abs(found.deviation) <= SLACK

@@ -17,11 +17,6 @@ _NODES_PER_RADIAN = 8.0
 _FEWEST_NODES, _MOST_NODES = 50, 200_000
 
 
-def compiler_here() -> bool:
-    """Return True: no compiler is needed."""
-    return True
-
-
 @dataclass(frozen=True, eq=False)
 class Truth:
     """Measures of a motion up to the last of some times, and the errors of results."""

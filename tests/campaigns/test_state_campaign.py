@@ -69,7 +69,8 @@ def test_missing_rows_are_reported() -> None:
     tally = Tally("again {seed} {number}", "seed", 7)
     judge(tally, truth, result, 1e-6, scene)
     (fault,) = tally.faults
-    assert fault.startswith("again seed 7: solve: 0 rows instead of 1, tolerance 1e-0")
+    assert fault.startswith("again seed 7: solve: 0 rows instead of 1, tolerance 1e-06,")
+    assert fault.endswith("ended overflow")
 
 
 @pytest.mark.campaign

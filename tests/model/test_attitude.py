@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from pyharness import Scene, TorqueLaw, prepare, principal, read_scene, solve, solve_many
-from pyharness.model.attitude import angles, matrices, of_angles, product
+from pyharness.model.attitude import angle_between, angles, matrices, of_angles, product
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import Array
 
@@ -140,3 +140,12 @@ def test_a_rotation_of_scipy_is_an_attitude_everywhere() -> None:
         np.testing.assert_array_equal(many, solver.many(starts, 1.0, numbers)[1])
     one, other = (solver(starts[0], 1.0, given)[1] for given in (turns[1], rows[1]))
     np.testing.assert_array_equal(one, other)
+
+
+def test_angle_between_nearly_equal_attitudes() -> None:
+    p = np.array([[0.5, -0.1, 0.7, 0.5]])
+    w, x, y, z = p[0]
+    turned = p + 5e-9 * np.array([[-z, y, -x, w]])
+    for other in (turned, -turned):
+        assert angle_between(other, p)[0] == pytest.approx(1e-8, rel=1e-6)
+    assert angle_between(p, p)[0] < 1e-15

@@ -194,14 +194,14 @@ def test_transition_matrix_is_a_limit_of_difference_quotients(name: str) -> None
     found = enclose(scene, [0.25], 12, transition=True)
     assert found.transition is not None
     matrix = [found.transition[0].middle[k : k + 3] for k in (0, 3, 6)]
-    # One direction has a part of each column.
-    moved: Any = [np.add(scene.omega, np.array([1.0, -0.75, 0.5]) * h) for h in (1e-6, -1e-6)]
-    starts = [replace(scene, omega=omega) for omega in moved]
-    ends = [enclose_steps(each, [0.25], 18).omega[0].middle for each in starts]
-    begin = [Fraction(x) - Fraction(y) for x, y in zip(*(s.omega for s in starts), strict=True)]
-    for row, x, y in zip(matrix, *ends, strict=True):
-        wanted = sum(each * move for each, move in zip(row, begin, strict=True))
-        assert abs(x - y - wanted) <= 2e-16
+    for direction in ((1.0, -0.75, 0.5), (0.5, 1.0, -0.75), (-0.75, 0.5, 1.0)):
+        moved: Any = [np.add(scene.omega, np.array(direction) * h) for h in (1e-6, -1e-6)]
+        starts = [replace(scene, omega=omega) for omega in moved]
+        ends = [enclose_steps(each, [0.25], 18).omega[0].middle for each in starts]
+        begin = [Fraction(x) - Fraction(y) for x, y in zip(*(s.omega for s in starts), strict=True)]
+        for row, x, y in zip(matrix, *ends, strict=True):
+            wanted = sum(each * move for each, move in zip(row, begin, strict=True))
+            assert abs(x - y - wanted) <= 2e-16
     assert found.transition[0].radius < 1e-9
     assert len(found.transition[0].middle) == (9 if scene.attitude is None else 21)
 

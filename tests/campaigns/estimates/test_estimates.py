@@ -13,6 +13,7 @@ from pyharness.model.state_torque import of_law
 from pyharness.truth.reference import reference
 from tests.campaigns import entries
 from tests.campaigns.entries import ENTRIES, Result
+from tests.campaigns.estimates import truth
 from tests.campaigns.estimates.__main__ import COMMAND, SENSITIVE, Answer, answers, main
 from tests.campaigns.estimates.scenes import COARSEST, FINEST, Draw, drawn
 from tests.campaigns.estimates.truth import truth_of
@@ -31,6 +32,8 @@ OMEGA = (1.0, -2.0, 0.5)
 IN_SPACE = replace(LAW, frame="space")
 SCENES = {
     "all torques": (Scene("", OMEGA, BODY, torque=LAW), -2.0),
+    "no torque": (Scene("", (0.3, 2.0, 0.5), BODY), 9.7),
+    "from rest": (Scene("", (0.0, 0.0, 0.0), BODY, torque=LAW), 3.0),
     "no body": (Scene("", (1.0, 0.2, -0.4), None, (0.7, -1.2, 0.3), LAW), 2.0),
     "attitude": (Scene("", OMEGA, BODY, torque=LAW, attitude=TURNED), 2.5),
     "space": (Scene("", OMEGA, BODY, torque=IN_SPACE, attitude=TURNED), -2.0),
@@ -71,6 +74,14 @@ def test_growth_is_the_norm_of_the_derivative(name: str) -> None:
     later = flow[-1] @ np.linalg.inv(flow)
     largest = np.linalg.norm([flow[-1], *later], 2, axis=(1, 2)).max()
     assert whole.growth == pytest.approx(largest, rel=0.02)
+    assert whole.largest == pytest.approx(whole.exact.scale, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["attitude", "space", "full inertia", "full inertia, space"])
+def test_the_true_attitude_is_that_of_the_series(name: str) -> None:
+    scene, time = SCENES[name]
+    found = solve(scene, time, "taylor", 1e-14, attitude=True)
+    assert truth_of(scene, [time], attitude=True).error(found.omega, found.attitude) < 2e-14
 
 
 def test_the_truth_of_a_full_inertia_is_that_of_its_principal_axes() -> None:
@@ -80,9 +91,22 @@ def test_the_truth_of_a_full_inertia_is_that_of_its_principal_axes() -> None:
     assert truth_of(scene, [time]).error(known) < 1e-14
 
 
-def test_truth_says_what_it_cannot_know() -> None:
+def test_truth_says_what_it_cannot_know(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="grows without bound"):
         truth_of(Scene("", (1.0, 1.0, 1.0), None, (1.0, 1.0, 1.0)), [2.0])
+    monkeypatch.setattr(truth, "_MOST_NODES", 10)
+    with pytest.raises(InputError, match="too fast"):
+        truth_of(*SCENES["no torque"])
+
+
+def test_a_bounded_motion_without_rows_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else the campaign would draw another scene in its place."""
+    right = truth.solve
+    monkeypatch.setattr(
+        truth, "solve", lambda *given, **more: replace(right(*given, **more), ended="overflow")
+    )
+    with pytest.raises(AssertionError, match="bounded"):
+        truth_of(*SCENES["no torque"])
 
 
 def test_turns_of_a_spin() -> None:
@@ -154,6 +178,7 @@ def _answer(growth: float, ended: str, error: float, estimate: float | None = No
         (9e5, "complete", 4e-9, ""),
         (9e5, "complete", 5e-9, "exceeds"),
         (2e6, "complete", 1.0, ""),
+        (1e7, "complete", 1e-9, ""),
         (1e7, SENSITIVE, 1e-9, ""),
         (1e8, "complete", 1e-9, "silent"),
         (1e8, SENSITIVE, 1e-9, ""),

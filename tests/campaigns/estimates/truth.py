@@ -55,6 +55,8 @@ def truth_of(scene: Scene, until: float | Sequence[float], attitude: bool = Fals
         nodes = np.concatenate([[0.0], *parts])
         path = solve(scene, nodes, "auto", 1e-13, attitude=joint)
         if not path.has_all_rows:
+            known = entries.truth_of(scene, times).omega
+            assert len(known) < len(times), f"{path.ended}, and the motion is bounded"
             raise InputError("the solution grows without bound")
         slopes = _slopes(scene, path, joint)
         wanted = _NODES_PER_RADIAN * np.abs(slopes).sum(axis=2).max() * abs(times[-1])

@@ -1,12 +1,15 @@
 """Torque about the axes of space: other integrators, and its effect on the angular momentum."""
 
+import itertools
 import pickle
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.checks.scenes.random_scenes import draw
@@ -42,6 +45,22 @@ def matrix(scene: Scene) -> Array:
     return np.array(scene.inertia) if scene.inertia is not None else np.diag(scene.moments or ())
 
 
+def by_scipy(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
+    """Return omega and attitude by DOP853 for seven unknowns, with SciPy's own rotations."""
+    inertia = matrix(scene)
+
+    def rates(t: float, y: Array) -> Array:
+        omega, q = y[:3], y[3:]
+        push = Rotation.from_quat(q, scalar_first=True).inv().apply(scene.law.at(t))
+        turned = np.linalg.solve(inertia, push - np.cross(omega, inertia @ omega))
+        rest = q[0] * omega + np.cross(q[1:], omega)
+        return np.concatenate([turned, [-0.5 * q[1:] @ omega], 0.5 * rest])
+
+    start = [*scene.omega, *(scene.attitude or IDENTITY)]
+    found = solve_ivp(rates, (0.0, times[-1]), start, "DOP853", times, rtol=3e-14, atol=1e-14).y.T
+    return found[:, :3], found[:, 3:]
+
+
 def momentum(scene: Scene, times: Array) -> Array:
     """Return the angular momentum in space at `times` (s), which the torque alone changes."""
     start = matrix(scene) @ np.array(scene.omega)
@@ -55,12 +74,46 @@ def momentum(scene: Scene, times: Array) -> Array:
     return np.asarray(found)
 
 
+@pytest.mark.sampled
+@pytest.mark.parametrize(
+    ("name", "time"),
+    [("waves", -2.0), *zip(SCENES, itertools.cycle((2.0, -2.0)), strict=False)],
+)
+def test_series_agrees_with_seven_unknowns(name: str, time: float) -> None:
+    times = [0.1 * time, 0.5 * time, time]
+    found = solve(SCENES[name], times, "taylor", 1e-12, attitude=True)
+    assert found.attitude is not None
+    omega, attitude = by_scipy(SCENES[name], times)
+    assert np.abs(found.omega - omega).max() < 2e-12 * np.abs(omega).max()
+    # The signs are compared too, because they are continuous.
+    assert np.abs(found.attitude - attitude).max() < 2e-12
+    assert np.abs(np.linalg.norm(found.attitude, axis=1) - 1.0).max() < 4e-16
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_momentum_in_space_is_what_torque_made_of_it(name: str) -> None:
     times = np.linspace(-8.0, 8.0, 33)
     found = solve(SCENES[name], times.tolist(), tolerance=1e-13, attitude=True)
     true = momentum(SCENES[name], times)
     assert np.abs(found.angular_momentum("space") - true).max() < 1e-13 * np.abs(true).max()
+
+
+def test_momentum_on_random_scenes() -> None:
+    ways = []
+    for number in range(0, 200, 2):
+        drawn = draw("space torque", number)
+        scene = drawn.scene
+        if scene.moments is None or scene.torque.is_zero:
+            continue
+        scene = replace(scene, torque=replace(scene.law, frame="space"), attitude=TURNED)
+        found = solve(scene, [drawn.time], tolerance=1e-13, attitude=True)
+        true = momentum(scene, np.array([drawn.time]))
+        # The angle of a wave may be rounded.
+        error = np.abs(found.angular_momentum("space") - true).max()
+        largest = max(np.abs(true).max(), np.abs(momentum(scene, np.zeros(1))).max())
+        ways.append(error / largest)
+    assert len(ways) > 50
+    assert max(ways) < 1e-12
 
 
 def test_energy_is_the_work_of_the_torque() -> None:
@@ -83,18 +136,22 @@ def test_tolerance_and_estimate_hold_on_random_scenes() -> None:
             continue
         scene = replace(drawn.scene, torque=replace(drawn.scene.law, frame="space"))
         times = [0.4 * drawn.time, drawn.time]
-        with suppress(InputError):
+        try:
             true: Any = solve(scene, times, "taylor", 1e-15, attitude=True)
-            if not true.has_all_rows:
-                continue
-            largest = max(np.abs(true.omega).max(), *map(abs, scene.omega))
-            for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
-                found: Any = solve(scene, times, "auto", tolerance, attitude=True)
-                apart = angle_between(found.attitude, true.attitude).max()
-                error = max(np.abs(found.omega - true.omega).max() / largest, apart)
-                # Two integrations at the finest tolerance still differ by amplified rounding.
-                assert error <= tolerance + 10.0 * (true.error or 0.0), (number, tolerance)
-                ratios.append(error / ((found.error or 0.0) + (true.error or 0.0)))
+        except InputError:
+            assert scene.name == "extreme"
+            continue
+        if not true.has_all_rows:
+            assert scene.name == "extreme"
+            continue
+        largest = max(np.abs(true.omega).max(), *map(abs, scene.omega))
+        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12):
+            found: Any = solve(scene, times, "auto", tolerance, attitude=True)
+            apart = angle_between(found.attitude, true.attitude).max()
+            error = max(np.abs(found.omega - true.omega).max() / largest, apart)
+            # Two integrations at the finest tolerance still differ by amplified rounding.
+            assert error <= tolerance + 10.0 * (true.error or 0.0), (number, tolerance)
+            ratios.append(error / ((found.error or 0.0) + (true.error or 0.0)))
     assert len(ratios) > 4 * 180
     # Two integrations may have the same error, here far below the tolerance.
     assert max(ratios) < 10.0

@@ -101,9 +101,9 @@ def test_truth_says_what_it_cannot_know(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_a_bounded_motion_without_rows_is_no_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else the campaign would draw another scene in its place."""
-    right = truth.solve
     monkeypatch.setattr(
-        truth, "solve", lambda *given, **more: replace(right(*given, **more), ended="overflow")
+        "tests.campaigns.estimates.truth.solve",
+        lambda *given, **more: replace(solve(*given, **more), ended="overflow"),
     )
     with pytest.raises(AssertionError, match="bounded"):
         truth_of(*SCENES["no torque"])

@@ -95,6 +95,8 @@ def test_finest_tolerance_is_met(method: str) -> None:
     for name, motion in motions("cases").items():
         found = solve(motion.scene, motion.times, method, finest)
         check_error(motion, found.omega, None, finest, name, steps=found.steps)
+        apart = np.abs(found.omega - motion.omega).max()
+        assert apart <= (finest + 1e-15) * motion.largest
         assert 0 < found.steps < found.evaluations
 
 

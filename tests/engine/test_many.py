@@ -3,13 +3,14 @@
 import tracemalloc
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve_many, torques
+from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve, solve_many, torques
 from pyharness.engine import many_scenes
 from pyharness.engine.many import Ensemble
 from pyharness.engine.problem import normalized
@@ -18,9 +19,10 @@ from pyharness.engine.solver import CODES, PREPARED
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing
+from pyharness.model.trajectory import Array
 from tests.as_written import compiler_here, many_as_written
 from tests.engine.tolerance_scenes import EDGES
-from tests.many_errors import bodies, exceeding
+from tests.many_errors import KINDS, bodies, exceeding, scene_of
 
 LISTING = Listing.corrected("two-term")
 TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
@@ -29,6 +31,38 @@ TOP = Scene("top", (0.3, -0.4, 1.2), moments=(40.0, 30.0, 20.0))
 def same(one: Ensemble, two: Ensemble) -> bool:
     """Return whether two ensembles have the same bits."""
     return one.omega.tobytes() == two.omega.tobytes() and np.array_equal(one.status, two.status)
+
+
+@cache
+def truths(kind: str, n: int, seed: int) -> Array:
+    """Return omega of the bodies at the end; NaN where the error amplification is large."""
+    drawn = bodies(kind, n, seed)
+    ends = np.full((n, 3), np.nan)
+    for row in range(n):
+        truth = solve(scene_of(drawn, row), [drawn["t_end"][row]], "taylor", 1e-15)
+        if truth.has_all_rows and (truth.growth or np.inf) < 1e3:
+            ends[row] = truth.omega[-1]
+    return ends
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
+    drawn = bodies(kind, 60, 1982)
+    found = solve_many(TOP, tolerance=tolerance, **drawn)
+    truth = truths(kind, 60, 1982)
+    scale = np.maximum(np.abs(truth).max(axis=1), np.abs(drawn["omega0"]).max(axis=1))
+    off = np.abs(found.omega - truth).max(axis=1) / scale
+    assert np.count_nonzero(np.isfinite(off)) > 50
+    assert np.nanmax(off) <= tolerance + 4e-12
+    assert found.has_result.all()
+    # The results come from lanes: one by one they would have the single solver's bits.
+    alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(20)]
+    same = [
+        np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
+        for row, solver in enumerate(alone)
+    ]
+    assert np.count_nonzero(same) < 10
 
 
 @pytest.mark.sampled

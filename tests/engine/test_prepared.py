@@ -43,6 +43,14 @@ def _omega(scene: Scene) -> Array:
     return np.array(scene.omega)
 
 
+def test_sphere_is_a_closed_form_under_any_torque() -> None:
+    law = TorqueLaw((1.0, -2.0, 3.0), (0.5, 0.0, -1.0), (((1.0, 2.0, 3.0), 3.0),))
+    scene = Scene("", (0.3, -1.0, 2.0), moments=(2.0, 2.0, 2.0), torque=law)
+    solver = prepare(scene)
+    assert (solver.plan.method, solver.plan.closed_form) == ("closed-form", "sphere")
+    np.testing.assert_allclose(solver(_omega(scene), 2.0), reference(scene, [2.0]).omega[0], 1e-15)
+
+
 @pytest.fixture
 def solver() -> Solver:
     return prepare(PUSHED)
@@ -423,6 +431,7 @@ def test_auto_solves_what_the_closed_form_refuses(attitude: bool) -> None:
     solver = make(scene, attitude=attitude)
     found = np.hstack(solver(scene.omega, 5.0))
     assert (solver.status, solver.steps > 0) == ("complete", True)
+    assert np.isfinite(found).all()
     wanted = reference(scene, [5.0]).omega[0]
     rows = [found[:3], solve(scene, [5.0]).omega[0]]
     if not attitude:

@@ -3,7 +3,6 @@
 import math
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -49,12 +48,24 @@ def _error(found: Trajectory, truth: Reference) -> float:
 @pytest.mark.parametrize("number", [0, 1, 2, 3])
 def test_an_opaque_torque_has_the_results_of_the_recorded_one(number: int, name: str) -> None:
     """The two right-hand sides differ by rounding errors, and therefore the results do too."""
-    scene, times = _random_scene(number)
-    recorded: Any = scene.torque
-    hidden = opaque(lambda t, omega, attitude: recorded.at(t, omega, attitude))
-    turned = replace(scene, attitude=scene.attitude or (1.0, 0.0, 0.0, 0.0))
+    source = np.random.default_rng(number)
+    damping, wheel, pull = source.uniform(-0.3, 0.3, 3), source.uniform(-1.0, 1.0, 3), number % 2
+
+    def function(t: Any, w: Any, q: Any) -> list[Any]:
+        pulse = np.exp(-((t - 2.0) ** 2))
+        return [
+            pulse - damping[0] * w[0] * w[0] + pull * q[1] * q[0],
+            w[2] * wheel[0] - w[0] * wheel[2] - damping[1] * w[1] + np.sin(3.0 * t),
+            w[0] * wheel[1] - w[1] * wheel[0] - damping[2] * w[2] - pull * q[3],
+        ]
+
+    kinds = replayed(function), opaque(lambda t, omega, attitude: function(t, omega, attitude))
+    attitude = (0.5, -0.1, 0.7, 0.5)
     first, second = (
-        scipy_method(name)(replace(turned, torque=each), times, 1e-6) for each in (recorded, hidden)
+        scipy_method(name)(
+            Scene("", _OMEGA, _MOMENTS, torque=each, attitude=attitude), [1.0, 4.0], 1e-6
+        )
+        for each in kinds
     )
     np.testing.assert_allclose(first.omega, second.omega, rtol=0, atol=1e-9)
     assert first.attitude is not None

@@ -28,7 +28,8 @@ TOLERANCES = (1e-4, 1e-12)
 # By method, if others: `auto` chooses by the tolerance, SciPy's methods claim less.
 _OTHER = {
     "auto": (1e-4, 1e-8, 1e-12), "dop853": (1e-4, 1e-8), "rk45": (1e-5,), "lsoda": (1e-5,),
-    "radau": (1e-4,),
+    "radau": (1e-4,), "gauss-1": (1e-4, 1e-8), "gauss-2": (1e-4, 1e-8),
+    "quick": (1e-4, 1e-8, 1e-12),
 }  # fmt: skip
 _FEW = 2  # of the scenes of a kind, for SciPy's methods, which take long
 _ENDED = ("complete", "sensitive")

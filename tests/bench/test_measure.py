@@ -200,6 +200,7 @@ def _refuses(scene: Scene) -> Maker:
 @pytest.fixture
 def few_steps(hurried: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "_LARGEST_STEPS", 64)
+    monkeypatch.setattr(bench, "_ROUNDS", 2)
 
 
 @pytest.fixture(scope="module")

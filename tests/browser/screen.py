@@ -10,6 +10,11 @@ from selenium.webdriver.common.by import By
 WIDTHS = (360, 800, 1440)
 # Wider than any font of a reader: every letter takes one em more.
 WIDEST_FONT = "* { letter-spacing: 1em !important; }"
+# Returns the controls without a label, hidden ones too.
+UNNAMED = (
+    "return [...document.querySelectorAll('.controls :is(input, select)')]"
+    ".filter((each) => !each.labels.length).map((each) => each.id)"
+)
 
 
 def set_width(browser: Chrome, width: int) -> None:

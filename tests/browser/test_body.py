@@ -14,6 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from pyharness import Scene, case_scene, solve
 from pyharness.checks.theory.flips import flip_times
 from tests.browser.screen import (
+    UNNAMED,
     WIDTHS,
     fragment,
     opening,
@@ -246,6 +247,7 @@ def test_nothing_is_wider_than_the_page(browser: Chrome, body: Open) -> None:
         with screen(browser, width):
             body("#moments=40,30,20&omega0=0.123456789,-1,10&time=123456.789")
             assert too_wide(browser) <= 0, width
+            assert browser.execute_script(UNNAMED) == []
             for id in CANVASES:
                 assert _drawn(browser, id) > 500, (id, width)
 

@@ -15,7 +15,7 @@ from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
 from pyharness.thesis.printer import page
-from tests.browser.screen import WIDTHS, fragment, opening, screen, text_of, too_wide
+from tests.browser.screen import UNNAMED, WIDTHS, fragment, opening, screen, text_of, too_wide
 
 Open = Callable[[str], None]
 EXPERIMENTS = facts("experiments")["experiment"]
@@ -386,6 +386,7 @@ def test_nothing_is_wider_than_the_page(browser: Chrome, laboratory: Open) -> No
             laboratory("#case=7&program=two-term&listing=original")
             _rows(browser)
             assert too_wide(browser) <= 0, width
+            assert browser.execute_script(UNNAMED) == []
     laboratory("")
     before = browser.execute_script(_DRAWN)
     _click(browser, "#theme")

@@ -60,12 +60,12 @@ def test_a_reader_chooses_a_program_predicts_and_runs(browser: Chrome) -> None:
     for letter, has in (("A", "two terms"), ("B", "Runge-Kutta")):
         click(browser, f"input[name=trust][value={letter}]")
         assert has in _text(browser, "claim")
+        for name in story.LETTERS.values():
+            assert _points(browser, "claim", name) == _first_points("claim", name)
     run = run_program(case_scene(2), subset("runge-kutta"), "python")
     assert run.stop is not None
     error = _largest(2, "runge-kutta", subset("runge-kutta"), slice(0, 1))
     assert _value(browser, "stop-error") == pytest.approx(error, rel=1e-12)
-    for name in story.LETTERS.values():
-        assert _points(browser, "claim", name) == _first_points("claim", name)
     curve = browser.find_element(By.CSS_SELECTOR, "#chart-stop [data-curve=runge-kutta]")
     assert curve.value_of_css_property("visibility") == "hidden"
     assert not browser.find_element(By.CSS_SELECTOR, "#stop .answer").is_displayed()

@@ -282,6 +282,10 @@ def _other_stop(run: Trajectory, **change: Any) -> Trajectory:
     return run if run.stop is None else replace(run, stop=replace(run.stop, **change))
 
 
+def _later(run: Trajectory) -> Trajectory:
+    return run if run.stop is None else _other_stop(run, step=run.stop.step + 1)
+
+
 def _off(run: Trajectory) -> Trajectory:
     factors = np.ones_like(run.omega)
     factors[-1, 1] += 1e-9
@@ -296,7 +300,7 @@ def _off(run: Trajectory) -> Trajectory:
         (_shorter, "stops", "complete, or no velocity"),
         (partial(replace, velocity=None), "schemes", "complete, or no velocity"),
         (partial(_other_stop, variable="V3"), "stops/case-3", "due Stop("),
-        (partial(_other_stop, step=99), "stops/case-3", "due Stop("),
+        (_later, "stops/case-3", "due Stop("),
         (_off, "schemes/runge-kutta/case-3", "most at step 100, U2"),
         (lambda run: replace(run, evaluations=run.evaluations - 1), "cells/two-term/case-3", "due"),
         (lambda run: replace(run, evaluations=run.evaluations + 1), "cells/two-term/case-3", "due"),

@@ -145,10 +145,11 @@ def trials(
 
 def main() -> int:
     """Run trials, print each that went wrong, and count the outcomes."""
-    count = int(sys.argv[1]) if sys.argv[1:] else 300
+    numbers = [int(each) for each in sys.argv[1:] if each != "--kill"]
+    count, seed = (*numbers, *(300, 1)[len(numbers) :])
     sent = signal.SIGKILL if "--kill" in sys.argv else signal.SIGINT
     found: Counter[tuple[str, str]] = Counter()
-    for each in trials(count, 4.0, 1, sent, ["compare", "verify", *EXECUTORS]):
+    for each in trials(count, 4.0, seed, sent, ["compare", "verify", *EXECUTORS]):
         found[each.verb, each.outcome.split()[0]] += 1
         if each.outcome[:2].isupper():
             print(f"{each.verb} at {each.moment:.3f} s, group {each.to_group}: {each.outcome}")

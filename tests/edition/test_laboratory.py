@@ -142,13 +142,14 @@ def test_only_what_differs_is_in_the_address() -> None:
         "", "#", "keep=stage-base", "omega0=-0.0,1,10&steps=100", "conjecture=none&no-stop",
         "listing=corrected&program=two-term&case=7&keep=torque-held&steps=+30",
         "listing=corrected&reading=do-variable&conjecture=torque-held,initial-torque",
+        "omega0=0,1,10&steps=100",
     ]  # fmt: skip
     found = ask(body, asked)
     assert [each[0] for each in found] == [
         first, first, "case=2&program=runge-kutta&listing=corrected&keep=stage-base",
         f"{first}&omega0=-0,1,10", f"{first}&conjecture=none&no-stop",
         "case=7&program=two-term&listing=corrected&keep=torque-held&steps=30",
-        "case=2&program=runge-kutta&listing=corrected",
+        "case=2&program=runge-kutta&listing=corrected", f"{first}&omega0=0,1,10",
     ]  # fmt: skip
     given = "--case 2 --program runge-kutta --listing original --conjecture none --no-stop"
     assert found[4][1] == f"pyharness run {given}"
@@ -294,7 +295,7 @@ def test_endings_are_told() -> None:
     assert known == [n < length for n in range(len(known))]
 
 
-def test_the_page_without_script_has_the_default_state() -> None:
+def test_the_page_without_script_has_the_default_state(built_site: dict[str, bytes]) -> None:
     first = context()["first"]
     assert first["ending"].startswith("Stopped at step 25 by V2")
     assert [row[0] for row in first["rows"]] == ["1", "2", "3", "23", "24", "25"]
@@ -305,6 +306,10 @@ def test_the_page_without_script_has_the_default_state() -> None:
         at = int(row[0]) - 1
         assert row[-1] == short(float(np.abs(twin.omega[at] - truth[at]).max()))
     assert first["page"] == page(case_scene(2), "runge-kutta", twin)
+    text = html.unescape(built_site["laboratory.html"].decode())
+    assert first["page"] in text
+    assert repr(float(twin.omega[-1, 0])) in text
+    assert "step 25 by V2" in " ".join(text.split())
     assert first["command"] == "pyharness run --case 2 --program runge-kutta --listing original"
     given = json.loads(json.dumps(data(), allow_nan=False))
     assert [scene["case"] for scene in given["scenes"]] == list(case_numbers())

@@ -62,7 +62,11 @@ def test_numbers_of_the_first_states_are_those_of_the_twins(slots: Slots) -> Non
     in_48_bits = run_program(case_scene(2), subset("runge-kutta"), "python", word="cdc48").stop
     assert in_48_bits == story.context()["in_48_bits"].stop
     assert in_48_bits is not None
-    assert (in_48_bits.step, in_48_bits.variable) == (25, "V2")
+    rounded = run_program(case_scene(2), subset("runge-kutta"), "python", word="cdc48-rounded").stop
+    for stop in (in_48_bits, rounded):
+        assert stop is not None
+        assert (stop.step, stop.variable) == (25, "V2")
+        assert isinstance(stop.quotient, float)
     for case in (1, 2, 5):
         run = run_program(case_scene(case), subset("runge-kutta"), "python")
         assert found[f"blind-steps-{case}"] == run.steps

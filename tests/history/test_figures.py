@@ -139,6 +139,11 @@ def test_lines_are_drawn_to_their_end_which_is_marked(found: dict[str, FigureFin
     t, *omega = _rows(found["figure-07"], "limit").T
     limit = [2.0 * np.sin(2.5 * t), 2.0 * np.cos(2.5 * t) - 1.0, np.full_like(t, 10.0)]
     np.testing.assert_allclose(omega, limit, atol=1e-12)
+    scene = replace(case_scene(2), step_size=1e-4, steps=10_000)
+    run = compiled.run(scene, Listing.original("runge-kutta"), may_stop=False)
+    t = run.time
+    limit = [2.0 * np.sin(2.5 * t), 2.0 * np.cos(2.5 * t) - 1.0, np.full_like(t, 10.0)]
+    assert np.abs(run.omega.T - limit).max() < 2e-3
 
 
 def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding]) -> None:

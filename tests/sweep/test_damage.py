@@ -55,6 +55,11 @@ def flip(path: Path, at: int = -1, bit: int = 0) -> None:
     path.write_bytes(content)
 
 
+def _letter(path: Path) -> None:
+    path.mkdir()
+    (path / "letter").write_text("dear")
+
+
 def replaced(make: Callable[[Path], object]) -> Callable[[Path], None]:
     """Return a damage: something else is made in place of a file."""
 
@@ -78,7 +83,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
     "garbage": lambda path: path.write_bytes(os.urandom(50)),
     "longer": lambda path: path.write_bytes(path.read_bytes() + b"\0"),
     "missing": Path.unlink,
-    "folder": replaced(lambda path: (path / "letter").mkdir(parents=True)),
+    "folder": replaced(_letter),
     "pipe": replaced(os.mkfifo),
     "/dev/zero": replaced(lambda path: path.symlink_to("/dev/zero")),
     "link to itself": replaced(lambda path: path.symlink_to(path.name)),

@@ -110,6 +110,8 @@ def test_blocks_are_shared_among_threads(monkeypatch: pytest.MonkeyPatch) -> Non
         pieces = list(many._pieces(n, 100, threads))
         assert all(each.start % 32 == 0 for each in pieces)
         assert (len(pieces) >= threads) == (n >= 32 * threads)
+        assert [each.start for each in pieces] == [0, *(each.stop for each in pieces[:-1])]
+        assert pieces[-1].stop == n
     assert len(list(many._pieces(1000, 100, 1))) == 1
 
 

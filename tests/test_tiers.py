@@ -34,7 +34,7 @@ def test_a_long_test_is_marked(
     mark: list[str], passed: list[str], failed: list[str],
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(tiers, "LIMIT", 0.05)
+    monkeypatch.setattr(tiers, "LIMIT", 0.1)
     monkeypatch.setattr(tiers, "_slowness", lambda: 1.0)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n campaign\n sampled\n")
     (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)

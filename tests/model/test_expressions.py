@@ -62,7 +62,7 @@ def _drawn(source: random.Random, depth: int) -> str:
 
 def test_values_of_random_expressions_are_those_of_python() -> None:
     source = random.Random("random expressions")
-    for _ in range(100):
+    for _ in range(300):
         text = _drawn(source, 6)
         torque = parsed([text, text, "0"], {"k": 0.25})
         state = [source.uniform(-1.0, 1.0) for _ in INPUTS]

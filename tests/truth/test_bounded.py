@@ -66,7 +66,7 @@ def test_bound_is_the_distance_to_the_farthest_point() -> None:
 def test_attitude_without_torque_is_proved_with_the_library(hide: Hide) -> None:
     pytest.importorskip("flint")
     scene = replace(case_scene(4), attitude=TURNED)
-    known = reference(scene, scene.times()[49::50])
+    known = reference(scene, scene.times()[9::10])
     found = bound_of(scene, known)
     assert (found.basis, found.angle_basis) == (PROVED, PROVED)
     assert found.angle is not None

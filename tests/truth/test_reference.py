@@ -18,7 +18,7 @@ from pyharness.truth import reference as room
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import reference
-from tests.exact_attitude import exact
+from tests.exact_attitude import joint
 
 
 def _whole(found: room.Reference, row: int) -> list[mpmath.mpf]:
@@ -180,13 +180,13 @@ def test_velocity_of_a_steady_spin_goes_round_as_it_must() -> None:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize(("case", "time"), [(2, 7.0), (3, -4.0), (4, 7.0)])
-def test_attitude_is_that_of_the_series_in_whole_numbers(case: int, time: float) -> None:
+def test_attitude_is_that_of_verified_steps(case: int, time: float) -> None:
     scene = replace(case_scene(case), attitude=(0.5, -0.1, 0.7, 0.5))
     assert scene.moments is not None
     assert scene.attitude is not None
     found = reference(scene, [0.5 * time, time])
     assert found.attitude is not None
-    _, wanted = exact(scene.moments, scene.omega, scene.attitude, time)
+    _, wanted = joint(scene.moments, scene.omega, scene.attitude, time)
     assert found.attitude[1] == pytest.approx([float(x) for x in wanted], abs=2e-16)
     assert 0.0 < found.angle_estimate < 1e-18
     # Omega does not change, and has the same source.

@@ -15,7 +15,7 @@ from tests.campaigns import entries
 from tests.campaigns.entries import ENTRIES, Result
 from tests.campaigns.estimates import truth
 from tests.campaigns.estimates.__main__ import COMMAND, SENSITIVE, Answer, answers, main
-from tests.campaigns.estimates.scenes import COARSEST, FINEST, Draw, drawn
+from tests.campaigns.estimates.scenes import COARSEST, FINEST, KINDS, Draw, drawn
 from tests.campaigns.estimates.truth import truth_of
 
 BODY = (1.0, 2.0, 2.7)
@@ -119,6 +119,7 @@ def test_number_of_a_seed_is_one_scene() -> None:
     assert first.scene == again.scene != other.scene
     assert again.tolerance == 1e-5
     assert FINEST <= first.tolerance <= COARSEST
+    assert {*first.kinds, *other.kinds} <= set(KINDS)
 
 
 @pytest.mark.campaign

@@ -104,15 +104,20 @@ def _campaign(seed: int, inputs: int, only: str | None) -> int:
 def _watched(kind: str, seed: int, begin: int, end: int) -> tuple[int, list[str]]:
     """Run a worker until it ends or dies; return the next number, and the faults."""
     command = [sys.executable, "-m", "tests.campaigns.fuzz", "--kind", kind, "--seed", str(seed)]
-    done = subprocess.run(
-        [*command, "--number", str(begin), "--until", str(end)], capture_output=True, check=False
-    )
     number = begin
     faults: list[str] = []
 
     def fault(what: str) -> None:
         faults.append(f"FAULT --seed {seed} --kind {kind} --number {number}: {what}")
 
+    try:
+        done = subprocess.run(
+            [*command, "--number", str(begin), "--until", str(end)], capture_output=True,
+            check=False, timeout=PATIENCE * (end - begin + 2),
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:  # before the first input, or after the last one
+        fault("the worker neither began nor ended")
+        return end, faults
     for line in done.stdout.decode().splitlines():
         word, _, text = line.partition(" ")
         if word == "done":

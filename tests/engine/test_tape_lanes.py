@@ -170,6 +170,28 @@ def test_bodies_that_can_not_be_solved_are_left() -> None:
     assert lanes(spin, starts[[0, 9, 0]], 1.0, turns)[1] == [1]
 
 
+def test_a_product_whose_first_terms_do_not_show_it() -> None:
+    starts = np.linspace(0.01, 0.3, 16)[:, None] * [1.0, 0.0, 0.0]
+
+    def rising(doublings: int) -> tuple[Ensemble, list[int]]:
+        def torque(t: Any, w: Any) -> Any:
+            power = w[0]
+            for _ in range(doublings):
+                power = power * power
+            return (1.0, 0.0, power)
+
+        return lanes(Scene("", (1.0, 0.0, 0.0), moments=(1, 1, 1), torque=torque), starts, 1.0)
+
+    for doublings in (2, 3):
+        found, left = rising(doublings)
+        n = 2**doublings + 1
+        exact = ((starts[:, 0] + 1.0) ** n - starts[:, 0] ** n) / n
+        assert not left
+        assert found.omega[:, 2] == pytest.approx(exact, rel=1e-13)
+    # The order of the lanes would not suffice.
+    assert rising(4)[1] == list(range(16))
+
+
 def test_unstable_motions_are_left() -> None:
     # Errors grow as exp(2 t), until the last digits are lost.
     unstable = Scene(

@@ -14,10 +14,11 @@ from jsonschema import Draft202012Validator
 
 from pyharness.checks.integrators.drift import growth_power
 from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
-from pyharness.checks.integrators.plants import PLANTS, as_check, self_test
+from pyharness.checks.integrators.plants import PLANTS, self_test
 from pyharness.checks.integrators.problem import LEVELS, convergence, problems
 from pyharness.checks.integrators.protocol import read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER
+from pyharness.checks.plants.outcome import CONTROL
 from pyharness.checks.port_process import PortError
 from pyharness.checks.scenes.moderate import KINDS, draw_moderate
 from pyharness.cli.main import main
@@ -200,10 +201,10 @@ def test_two_faults_at_once_are_named(tmp_path: Path, capsys: Capture) -> None:
 @pytest.mark.campaign
 def test_every_planted_fault_is_named() -> None:
     found = list(self_test(command_of(RK4), problems("plants", 1)))
-    assert [each.plant for each in found] == [None, *PLANTS]
+    assert [each.name for each in found] == [CONTROL, *(plant.name for plant in PLANTS)]
     for each in found:
         assert each.has_effect
-        assert each.passed, as_check(each)
+        assert each.passed, each
     known = {each.name for each in FAULTS} | FIRST_ORDER.keys()
     assert {each.name for each in PLANTS} <= known
 
@@ -213,7 +214,7 @@ def test_the_self_test_fails_for_a_faulty_integrator(tmp_path: Path, capsys: Cap
     command = edited(tmp_path, ("0.5 * (-b", "0.6 * (-b"))
     words = ["verify", "--integrator", command, "--self-test", "--cell", "free-0"]
     assert main([*words, "--seed", "x"]) == 1
-    assert "FAILED control" in capsys.readouterr().out
+    assert "FAILED none" in capsys.readouterr().out
 
 
 @pytest.mark.campaign

@@ -24,7 +24,7 @@ from pyharness.checks.golden import mathematics, read_record, recorded, update
 from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.orders import judged_order
-from pyharness.checks.plants import self_test
+from pyharness.checks.plants import program_self_test
 from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.scenes.random_scenes import draw, weekly_seed
@@ -237,10 +237,9 @@ def test_no_record_is_said(tmp_path: Path, capsys: Capture) -> None:
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     plant = BY_NAME[name]
     chosen = Selection(seed="fixed", draws=12, thin=True, only=plant.kinds)
-    with plant.planted(plant.size):
-        caught = self_test._caught(plant, chosen)
-    assert caught.passed
-    assert not caught.example.startswith("golden")
+    found = program_self_test.outcome(plant, chosen)
+    assert found.passed
+    assert "(golden" not in found.note
 
 
 @pytest.mark.campaign
@@ -251,11 +250,11 @@ def test_plant_that_nothing_catches_is_a_failure(capsys: Capture) -> None:
         """Yield a small control; `verify --self-test` makes one of every kind."""
         return verify(replace(chosen, only=("cells",)))
 
-    with patch.multiple(self_test, PLANTS=(harmless,), verify=few):
+    with patch.multiple(program_self_test, PLANTS=(harmless,), verify=few):
         assert main(["verify", "--self-test"]) == 1
     output = capsys.readouterr().out
     assert "FAILED harmless" in output
-    assert "1 plants and a control: 1 not as it should be" in output
+    assert "1 plant and a control: 1 not as it should be" in output
 
 
 def test_every_kind_but_the_record_has_a_plant() -> None:

@@ -10,8 +10,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness import run_program
+from pyharness.checks.plants.outcome import CONTROL
 from pyharness.checks.plants.port_plants import PLANTS
-from pyharness.checks.plants.port_self_test import as_check, self_test
+from pyharness.checks.plants.port_self_test import self_test
 from pyharness.checks.port import Cell, compared, port_cells, random_cells
 from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
@@ -109,9 +110,9 @@ def test_every_planted_fault_is_noticed(tmp_path: Path) -> None:
     assert len({plant.name for plant in PLANTS}) == len(PLANTS)
     cells = port_cells(PROGRAMS, case_numbers(), ())
     found = list(self_test(scene_port(tmp_path / "port.py"), cells))
-    assert [each.plant for each in found] == [None, *PLANTS]
-    assert [as_check(each).note for each in found if not each.passed] == []
-    assert [each.plant for each in found if not each.has_effect] == []
+    assert [each.name for each in found] == [CONTROL, *(plant.name for plant in PLANTS)]
+    assert [each.note for each in found if not each.passed] == []
+    assert [each.name for each in found if not each.has_effect] == []
     assert all(each.failed >= 4 for each in found[1:])
 
 
@@ -120,10 +121,10 @@ def test_a_wrong_port_fails_the_control(tmp_path: Path, capsys: Capture) -> None
     command = answering(tmp_path / "port.py", BIT)
     record = _json(capsys, command, "--self-test", "--cell", CELL, status=1)
     (failed,) = (each["id"] for each in record["checks"] if not each["passed"])
-    assert failed == "self-test/port/none"
+    assert failed == "self-test/none"
     assert main(["verify", "--port", documented_command(), "--self-test", "--cell", CELL]) == 0
     printed = capsys.readouterr().out
-    assert printed.endswith("without effect in these runs\n")
+    assert printed.endswith("without effect\n")
     assert main(["verify", "--port", "false", "--self-test", "--cell", CELL]) == 1
     assert "FAILED none: no fault: nothing may fail" in capsys.readouterr().out
 
@@ -143,10 +144,7 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(
 
     monkeypatch.setattr("pyharness.checks.plants.port_self_test.compared", blind)
     cells = port_cells(["two-term"], [2], [CELL])
-    missed = {
-        each.plant.name for each in self_test(documented_command(), cells)
-        if each.plant and not each.passed
-    }  # fmt: skip
+    missed = {each.name for each in self_test(documented_command(), cells) if not each.passed}
     assert {"bit-U1", "bit-V3", "dropped-row", "nan"} <= missed
     assert "ier-null" not in missed
 

@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import Check, Name
 from pyharness.checks.integrators.faults import FAULTS, State, as_output, space_omega
 from pyharness.checks.integrators.judging import Ask, Verdict, judge_problem
 from pyharness.checks.integrators.problem import Problem
 from pyharness.checks.integrators.protocol import Motion, read_motion
-from pyharness.checks.integrators.recognition import recognised
+from pyharness.checks.integrators.recognition import FIRST_ORDER, recognised
+from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
-from pyharness.checks.report import checks_report, summary_page
 from pyharness.model.attitude import product
-from pyharness.model.report import Report, counted
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
+_SAYS = {each.name: each.says for each in FAULTS} | FIRST_ORDER
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
@@ -198,27 +197,9 @@ def _advanced(
     return replace(motion, omega=motion.omega[chosen], attitude=attitude)
 
 
-@dataclass(frozen=True)
-class Recognised:
-    """A planted fault (None: the control), and the names of the faults that were recognised."""
-
-    plant: IntegratorPlant | None
-    names: tuple[str, ...]
-    failed: int
-    has_effect: bool = True
-    note: str = ""
-
-    @property
-    def passed(self) -> bool:
-        """Return whether the fault was named; for the control, whether nothing was found."""
-        if self.note or not self.has_effect:
-            return not self.note
-        return self.plant.name in self.names if self.plant else not (self.names or self.failed)
-
-
 def self_test(
     command: str, chosen: Sequence[Problem], due: float = 1.0, patience: float = PATIENCE
-) -> Iterator[Recognised]:
+) -> Iterator[Outcome]:
     """Yield the faults that are recognised, first without a planted fault, then with each of them.
 
     Without valid answers, only a failed control is yielded.
@@ -229,35 +210,48 @@ def self_test(
             def ask(line: bytes, rows: int) -> Motion:
                 return read_motion(process.ask(line), rows)
 
-            control = Verdict(command)
+            right = Verdict(command)
             for problem in chosen:
-                judge_problem(ask, problem, due, control, lambda name: "")
-            if not control.judged:
+                judge_problem(ask, problem, due, right, lambda name: "")
+            if not right.judged:
                 raise PortError("the integrator refused every scene")
-            yield _seen(None, control)
+            names, failed = _seen(right)
+            yield control(failed + len(names), _note(names))
             for plant in PLANTS:
                 found = Verdict(command)
                 for problem in chosen:
                     faulty = with_plant(ask, plant, problem.scene)
                     judge_problem(faulty, problem, due, found, lambda name: "")
-                yield replace(_seen(plant, found), has_effect=_can_have(plant, control))
+                yield _outcome(plant, found, _can_have(plant, right))
     except PortError as error:
-        yield Recognised(None, (), 1, note=str(error))
+        yield control(1, str(error))
 
 
-def _seen(plant: IntegratorPlant | None, verdict: Verdict) -> Recognised:
+def _seen(verdict: Verdict) -> tuple[list[str], int]:
+    """Return the names of the recognised faults, and the number of failed checks."""
     failed = sum(not check.passed for check in verdict.checks)
-    return Recognised(plant, tuple(each.name for each in recognised(verdict.judged)), failed)
+    return [each.name for each in recognised(verdict.judged)], failed
 
 
-def _can_have(plant: IntegratorPlant, control: Verdict) -> bool:
-    if plant.needs_step and control.control == "tolerance":
+def _note(names: Sequence[str]) -> str:
+    return f"recognised: {', '.join(names) or 'no fault'}"
+
+
+def _outcome(plant: IntegratorPlant, found: Verdict, has_effect: bool) -> Outcome:
+    names, failed = _seen(found)
+    note = _note(names) if has_effect else "the integrator can't have this fault"
+    is_named = plant.name in names or not has_effect
+    return Outcome(plant.name, _SAYS[plant.name], is_named, failed, note, has_effect)
+
+
+def _can_have(plant: IntegratorPlant, right: Verdict) -> bool:
+    if plant.needs_step and right.control == "tolerance":
         return False
-    kinds = {each.problem.kind for each in control.judged}
+    kinds = {each.problem.kind for each in right.judged}
     if plant.name.startswith("torque"):
         return bool(kinds & ({"wave"} if plant.name in _OF_WAVES else {"constant", "wave"}))
     needs_attitude = plant.advance or plant.name in _OF_ATTITUDE
-    return not needs_attitude or control.judged[0].finest.attitude is not None
+    return not needs_attitude or right.judged[0].finest.attitude is not None
 
 
 _OF_WAVES = (
@@ -267,32 +261,3 @@ _OF_WAVES = (
 _OF_ATTITUDE = (
     "omega-in-space", "quaternion-transposed", "scalar-last", "attitude-from-identity",
 )  # fmt: skip
-
-
-def as_check(found: Recognised) -> Check:
-    """Return the result for a planted fault as a check, which passes if it was named."""
-    name = Name("self-test", found.plant.name if found.plant else "control")
-    if found.note:
-        return name.judged(False, found.note)
-    if not found.has_effect:
-        return name.judged(True, "the integrator can't have this fault")
-    seen = ", ".join(found.names) or "no fault"
-    return name.judged(found.passed, f"recognised: {seen}", float(found.failed))
-
-
-def self_test_report(command: str, found: Sequence[Recognised], again: str) -> Report:
-    """Return the report of the self-test, which the command `again` repeats."""
-    checks = [replace(as_check(each), again=again) for each in found]
-    planted = [each for each in found if each.plant and each.has_effect]
-    named = sum(each.passed for each in planted)
-    head = f"{command}: {counted(len(planted), 'planted fault')}, {named} named"
-    says = {each.name: each.says for each in FAULTS}
-    lines = [
-        f"{'FAILED ' if not check.passed else ''}{check.name.subject}: {check.note}"
-        for check in checks
-    ]
-    told = [f"{each.plant.name}: {says[each.plant.name]}" for each in found
-            if each.plant and not each.passed and each.plant.name in says]  # fmt: skip
-    text = [[head], lines, *([told] if told else [])]
-    page = summary_page("verify --integrator --self-test", checks, [head])
-    return checks_report("verify", checks, text, page, integrator=command)

@@ -3,42 +3,20 @@
 import copy
 import json
 import random
-import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from pyharness.checks.check import Check, Name
+from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.plants.port_plants import PLANTS, PortPlant
 from pyharness.checks.port import Cell, compared
 from pyharness.checks.port_process import PortError, PortProcess
-from pyharness.checks.report import checks_report, summary_page
-from pyharness.model.report import Report, counted
+from pyharness.model.report import counted
 
 _MOST_CELLS = 24  # cells in which the faults are planted
 
 
-@dataclass(frozen=True)
-class Noticed:
-    """The runs in which a planted fault changed the port's answer (control: all), and failures."""
-
-    plant: PortPlant | None
-    changed: int
-    failed: int
-    example: str
-
-    @property
-    def passed(self) -> bool:
-        """Return whether each changed answer was noticed; for the control, whether none failed."""
-        return self.changed == self.failed if self.plant else self.failed == 0
-
-    @property
-    def has_effect(self) -> bool:
-        """Return whether the planted fault changed an answer; true for the control."""
-        return self.plant is None or self.changed > 0
-
-
-def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Noticed]:
+def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
     """Yield what the check of a port notices, first without any fault, then with each fault.
 
     Without valid answers, only a failed control is yielded.
@@ -48,7 +26,7 @@ def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Noticed]:
         with PortProcess(command) as process:
             yield from _planted(process, chosen)
     except PortError as error:
-        yield Noticed(None, len(chosen), 1, str(error))
+        yield control(1, str(error))
 
 
 def _chosen(cells: Sequence[Cell]) -> list[Cell]:
@@ -63,13 +41,13 @@ def _chosen(cells: Sequence[Cell]) -> list[Cell]:
     return [cells[n] for n in sorted(list(found.values())[:_MOST_CELLS])]
 
 
-def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Noticed]:
+def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
     lines = [process.ask(cell.request) for cell in cells]
     twins = [cell.twin() for cell in cells]
     checked = [compared(*each) for each in zip(cells, twins, lines, strict=True)]
     failed = [check for check in checked if not check.passed]
     example = f"{failed[0].id}: {failed[0].note}" if failed else ""
-    yield Noticed(None, len(cells), len(failed), example)
+    yield control(len(failed), example or f"nothing fails in {counted(len(cells), 'run')}")
     answers = [_parsed(line) for line in lines]
     for plant in PLANTS:
         changed, notes = 0, []
@@ -84,7 +62,12 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Noticed]:
                 check = replace(checked[0], name=cell.of, passed=False, note=str(error))
             if not check.passed:
                 notes.append(f"{check.id}: {check.note}")
-        yield Noticed(plant, changed, len(notes), notes[0] if notes else "")
+        seen = f"noticed in {len(notes)} of {counted(changed, 'changed run')}"
+        note = " ".join([seen, *(f"({each})" for each in notes[:1])])
+        if not changed:
+            note = "changes no answer in these runs"
+        is_seen = len(notes) == changed
+        yield Outcome(plant.name, plant.fault, is_seen, len(notes), note, changed > 0)
 
 
 def _faulty(
@@ -125,37 +108,3 @@ def _written(answer: dict[str, Any]) -> bytes:
 def _same(faulty: dict[str, Any], answer: dict[str, Any]) -> bool:
     # As text, because NaN differs from itself, and because zeros have a sign.
     return json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True)
-
-
-def as_check(noticed: Noticed) -> Check:
-    """Return the result for a planted fault as a check; its value is the runs that noticed it."""
-    name = Name("self-test", "port", noticed.plant.name if noticed.plant else "none")
-    return Check(name, noticed.passed, float(noticed.failed), None, None, _told(noticed))
-
-
-def _told(noticed: Noticed) -> str:
-    if noticed.plant is None:
-        return noticed.example or f"nothing fails in {counted(noticed.changed, 'run')}"
-    if not noticed.has_effect:
-        return "changes no answer in these runs"
-    seen = f"noticed in {noticed.failed} of {counted(noticed.changed, 'changed run')}"
-    return f"{seen} ({noticed.example})" if noticed.example else seen
-
-
-def report(command: str, found: Sequence[Noticed]) -> Report:
-    """Return the report: for each planted fault, in how many runs it was noticed."""
-    again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
-    lines = []
-    for each in found:
-        plant = each.plant
-        name, fault = (plant.name, plant.fault) if plant else ("none", "no fault: nothing may fail")
-        lines += [f"{'' if each.passed else 'FAILED '}{name}: {fault}", f"  {_told(each)}"]
-    missed = sum(not each.passed for each in found)
-    idle = sum(not each.has_effect for each in found)
-    end = f"{missed} not as it should be" if missed else "each noticed"
-    end += f", but {idle} without effect in these runs" if idle else ""
-    title = [f"{command}: faults planted in its answers"]
-    text = [title, lines, [f"{counted(len(found) - 1, 'plant')} and a control: {end}"]]
-    checks = [replace(as_check(each), again=again) for each in found]
-    page = summary_page("verify --port --self-test", checks, title)
-    return checks_report("verify", checks, text, page, port=command)

@@ -58,12 +58,12 @@ def run(options: argparse.Namespace) -> int:
     if options.listing_output is not None:
         return _listing_output(options)
     if options.integrator is not None:
-        from pyharness.cli.integrator_checks import check_integrator
+        from pyharness.cli.command_checks import check_integrator
 
         return check_integrator(options)
     shared.refuse(options, "the checks; give --integrator", ("order", "plot"))
     if options.port is not None:
-        from pyharness.cli.port_checks import check_port
+        from pyharness.cli.command_checks import check_port
 
         return check_port(options, *_programs_and_cases(options))
     shared.refuse(options, "the checks; give --listing-output or --port", ("program", "case"))
@@ -122,14 +122,12 @@ def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], l
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     from pyharness.checks.plants.plants import PLANTS
-    from pyharness.checks.plants.self_test import as_check, self_test, self_test_report
+    from pyharness.checks.plants.program_self_test import self_test
+    from pyharness.cli.command_checks import collect, tell
 
-    found = []
-    for caught in self_test(chosen.seed, chosen.record):
-        found.append(caught)
-        shared.progress(len(found), len(PLANTS) + 1, as_check(caught).id)
-    shared.show(self_test_report(_title(chosen), found, chosen.seed), options)
-    return 0 if all(caught.passed for caught in found) else 1
+    found = collect(self_test(chosen.seed, chosen.record), len(PLANTS))
+    again = "python -m pyharness verify --self-test"
+    return tell(options, found, _title(chosen), again, seed=chosen.seed)
 
 
 def _selection(options: argparse.Namespace) -> Selection:

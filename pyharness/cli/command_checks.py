@@ -1,0 +1,162 @@
+"""The checks of `verify --port` and `verify --integrator`, and the self-tests of all checks."""
+
+import argparse
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pyharness.checks.integrators.judging import judge_integrator, replay_command
+from pyharness.checks.integrators.problem import DRAWS, Problem, problems
+from pyharness.checks.integrators.protocol import refuse_integrator
+from pyharness.checks.plants.outcome import Outcome, self_test_report
+from pyharness.checks.port import Cell, port, port_cells, random_cells, refuse_port
+from pyharness.checks.port_report import port_report
+from pyharness.checks.scenes.moderate import KINDS
+from pyharness.checks.selection import Selection
+from pyharness.cli import options as shared
+from pyharness.cli.forecast import CHECKS, Cost, check_count
+from pyharness.model.errors import InputError
+
+_OF_THE_CHECKS = ("only", "external", "update", "record")
+_SCENES = Cost("random scenes of each kind", 1.0, 1e5, 1000)
+_HIGHEST = 40.0
+
+
+def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
+    """Compare a port, started by `options.port`; return 0 if all checks pass, else 1."""
+    shared.refuse(options, "--port", _OF_THE_CHECKS)
+    cells, seed = requested_cells(
+        shared.names(options.cell), programs, cases, options.draws, shared.chosen_seed(options)
+    )
+    shared.check_outputs(options)
+    if options.self_test:
+        return _port_self_test(options, cells)
+    checks = []
+    for check in port(options.port, cells):
+        checks.append(check)
+        shared.progress(len(checks), len(cells), check.id)
+    if checks[0].value is None:
+        refuse_integrator(options.port)
+    shared.show(port_report(options.port, checks, len(cells), seed), options)
+    return 0 if all(check.passed for check in checks) else 1
+
+
+def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
+    from pyharness.checks.plants.port_plants import PLANTS
+    from pyharness.checks.plants.port_self_test import self_test
+
+    command = options.port
+    found = collect(self_test(command, cells), len(PLANTS))
+    if not found[0].passed:
+        refuse_integrator(command)
+    title = [f"{command}: faults planted in its answers"]
+    again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
+    return tell(options, found, title, again, port=command)
+
+
+def requested_cells(
+    names: Sequence[str],
+    programs: Sequence[str],
+    cases: Sequence[int],
+    draws: str | None,
+    seed: str | None,
+) -> tuple[list[Cell], str]:
+    """Return the runs, those of Table 1 first, and the seed of random scenes.
+
+    `names` are beginnings such as ``two-term/case-3`` or ``random/7``, empty for all; `draws` is
+    the number of random scenes as text. The seed is by default the present year and week, and empty
+    without draws.
+    """
+    count = 0 if draws is None else shared.whole(draws, "--draws")
+    check_count("--draws", count, 0, CHECKS)
+    used = Selection().seed if seed is None else seed
+    drawn = random_cells(used, count, names, programs)
+    if seed is not None and not drawn:
+        raise InputError("--seed has no meaning without random scenes; give --draws N")
+    found = [*port_cells(programs, cases, names), *drawn]
+    if not found:
+        raise InputError(
+            f"--cell {','.join(names)}: there is no such cell; give one as in two-term/case-3"
+        )
+    return found, used if drawn else ""
+
+
+def check_integrator(options: argparse.Namespace) -> int:
+    """Compare an integrator with true solutions; return 0 if all checks pass, else 1.
+
+    `options.integrator` starts it.
+    """
+    shared.refuse(options, "--integrator", (*_OF_THE_CHECKS, "port", "program", "case"))
+    command = options.integrator
+    due = shared.positive(options.order, "--order", 1.0)
+    if due > _HIGHEST:
+        raise InputError(f"--order: {due:g}; allowed: a number above 0, at most {_HIGHEST:g}")
+    draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
+    check_count("--draws", draws, 1, _SCENES)
+    given = shared.chosen_seed(options)
+    seed = Selection().seed if given is None else given
+    names = shared.names(options.cell)
+    _check_names(names)
+    numbers = [int(each.rpartition("-")[2]) + 1 for each in names if "-" in each]
+    chosen = problems(seed, max([draws, *numbers]), names)
+    shared.check_outputs(options)
+    order = "" if options.order is None else f" --order {due:g}"
+
+    def again(name: str) -> str:
+        return replay_command(command, seed, draws, name) + order
+
+    if options.self_test:
+        shared.refuse(options, "--self-test", ("plot",))
+        return _integrator_self_test(options, chosen, due, f"{again('')} --self-test")
+    total = len(chosen) + 1
+    found = judge_integrator(
+        command, chosen, again, due, lambda done, what: shared.progress(done, total, what)
+    )
+    if not found.judged:
+        refuse_port(command)
+    from pyharness.checks.integrators.report import integrator_report
+
+    shared.show(integrator_report(found, seed), options)
+    return 0 if all(check.passed for check in found.checks) else 1
+
+
+def _check_names(names: list[str]) -> None:
+    form = re.compile(rf"({'|'.join(KINDS)})(-[0-9]{{1,4}})?")
+    for each in names:
+        if not form.fullmatch(each):
+            raise InputError(
+                f"--cell '{each}': there is no such scene; allowed: {', '.join(KINDS)}, or one of "
+                "their scenes, as in wave-1"
+            )
+
+
+def _integrator_self_test(
+    options: argparse.Namespace, chosen: list[Problem], due: float, again: str
+) -> int:
+    from pyharness.checks.integrators.plants import PLANTS, self_test
+
+    command = options.integrator
+    found = collect(self_test(command, chosen, due), len(PLANTS))
+    if not found[0].passed:
+        refuse_port(command)
+    title = [f"{command}: faults planted in its requests and answers"]
+    return tell(options, found, title, again, integrator=command)
+
+
+def collect(outcomes: Iterable[Outcome], count: int) -> list[Outcome]:
+    """Return the outcomes of a self-test with `count` faults and a control; show its progress."""
+    found = []
+    for each in outcomes:
+        found.append(each)
+        shared.progress(len(found), count + 1, each.check.id)
+    return found
+
+
+def tell(
+    options: argparse.Namespace, found: Sequence[Outcome], title: Sequence[str], again: str,
+    **extra: Any,
+) -> int:  # fmt: skip
+    """Write the report of a self-test; return 0 if each outcome is as it should be, else 1."""
+    shared.show(self_test_report(title, found, again, **extra), options)
+    return 0 if all(each.passed for each in found) else 1

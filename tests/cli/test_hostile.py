@@ -2,6 +2,8 @@
 
 import importlib
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -177,3 +179,45 @@ def test_large_quaternion_is_normalised(capsys: Capture) -> None:
     assert "attitude(0) = (0.5, 0.5, -0.5, 0.5)" in told.out
     told_so = "the attitude has a norm above 1.79769e+308; it was normalised"
     assert told.err == f"pyharness: warning: {told_so}\n"
+
+
+def test_message_is_one_line_that_a_terminal_can_show() -> None:
+    """Regression test: names with line feeds, escapes and 4000 letters were printed unchanged."""
+    assert str(InputError("a\nb\x1b[1m\udcff")) == "a b\\x1b[1m\\udcff"
+    assert len(str(InputError("where: " + "x" * 5000 + "; allowed: y"))) < 1000
+    assert str(InputError("x" * 5000 + "; allowed: y")).endswith("; allowed: y")
+    assert printable("ü 日本") == "ü 日本"
+
+
+def test_pipe_without_another_end_is_not_waited_for(tmp_path: Path, capsys: Capture) -> None:
+    """Regression test: a scene from an unwritten pipe, and a result to an unread one, hung."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert main(["plan", "--scene", str(pipe)]) == 2
+    assert "nothing came within 0.05 s" in capsys.readouterr().err
+    assert main(["doctor", "--out", str(pipe)]) == 2
+    assert "no one read it within 0.05 s" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_scene_comes_through_a_pipe() -> None:
+    command = f"printf '{BODY}' | {sys.executable} -m pyharness plan --scene /dev/stdin"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=True)
+    assert "I = (3, 2, 1) kg m2" in done.stdout
+
+
+@pytest.mark.campaign
+def test_name_that_the_terminal_or_the_picture_can_not_write(tmp_path: Path) -> None:
+    """Regression test: UnicodeEncodeError; the picture read a name with dollars as a formula."""
+    path = tmp_path / "\udcff ü.toml"
+    path.write_text(BODY + "[run]\nsteps=3\n")
+    command = [sys.executable, "-m", "pyharness", "run", "--program", "two-term", "--scene"]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([*command, str(path)], capture_output=True, env=environment, check=True)
+    assert done.stdout.startswith(b"\\udcff \\xfc\n")
+    assert done.stderr == b""
+    path.write_text('name = "$\\\\frac$ \\u0007"\n' + BODY + "[run]\nsteps=3\n")
+    picture = tmp_path / "x.svg"
+    arguments = ["run", "--scene", str(path), "--program", "two-term", "--plot", str(picture)]
+    assert main([*arguments, "--out", str(tmp_path / "x.txt")]) == 0
+    assert picture.exists()

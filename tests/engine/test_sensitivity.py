@@ -215,6 +215,21 @@ def test_is_sensitive_by_a_share_of_the_tolerance() -> None:
     assert is_sensitive(0.31e-9 / ROUNDING, 1e-9)
 
 
+def test_growth_beside_a_state_that_stays_does_not_depend_on_its_axis() -> None:
+    """The steps follow what a perturbation does, because the state has no terms."""
+    found = set()
+    for axis in range(3):
+
+        def torque(t: Any, w: Any, axis: int = axis) -> Any:
+            return [np.sin(w[i]) if i == axis else 0.0 for i in range(3)]
+
+        still = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+        run: Any = solve(still, [20.0], "taylor", 1e-10)
+        assert run.growth == pytest.approx(math.exp(20.0), rel=1e-5)
+        found.add((run.growth, run.steps))
+    assert len(found) == 1
+
+
 def test_what_overflows_in_the_units_of_the_scene_has_no_error() -> None:
     time = np.array([1.0])
     found = Trajectory(time, time, np.full((1, 3), 1e300), None, 1, 1, error=1e-9, growth=2.0)

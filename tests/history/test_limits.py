@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness import case_scene
+from pyharness import Scene, case_scene
 from pyharness.history.limits import NOTHING, Limit, invisible, limit
 from tests.conftest import Printed
 
@@ -78,3 +78,11 @@ def test_limits_in_every_form(printed: Printed) -> None:
     distances = [each["from_limit"] for each in record["limits"][0]["halvings"]]
     assert np.all(np.diff(distances) < 0)
     assert printed(f"{command} --format csv").count("\n") == 1 + 3 * 3
+
+
+@pytest.mark.campaign
+def test_limits_of_a_scene_that_its_solver_can_not_begin() -> None:
+    """Regression test: AttributeError, because no rows are a list, not an array."""
+    coefficients = (1.1e-16, 1.1e-16, 4.4e17)
+    scene = Scene("", (0.005, -5.0, -1.6), coefficients=coefficients, step_size=0.6, steps=4)
+    assert limit("two-term", scene, 1).order is None

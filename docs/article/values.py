@@ -279,7 +279,7 @@ def _machine() -> dict[str, str]:
     found = list(word_cells(case_numbers(), lengths=(bits,)))
 
     def runs(rule: str) -> list[WordRun]:
-        return [run for run in (cell.of(bits, rule) for cell in found) if run is not None]
+        return [run for run in (cell.find_run(bits, rule) for cell in found) if run is not None]
 
     rules = [WORDS[name].rule for name in ("cdc48", "cdc48-rounded")]
     stops = sum(

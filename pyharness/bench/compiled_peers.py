@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.bench.contenders import Maker
-from pyharness.checks.compare.candidates import End, Ready, plain
+from pyharness.checks.compare.candidates import End, Ready, copied_result
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -42,7 +42,9 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
             kernel(omega0, horizon, steps, omega)
             return omega
 
-        return Ready(run, lambda result: End(plain(result), evaluations=steps * len(formula[1])))
+        return Ready(
+            run, lambda result: End(copied_result(result), evaluations=steps * len(formula[1]))
+        )
 
     return make
 
@@ -99,7 +101,7 @@ def state_names(scene: Scene) -> str:
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
     """Return the unknowns at the end time, and the count of evaluations, as an `End`."""
-    found = plain(state)
+    found = copied_result(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)
 

@@ -51,7 +51,7 @@ class SceneContender(Contender):
     attitude: bool = False  # whether the contender can compute the attitude
 
 
-def own() -> list[SceneContender]:
+def list_own_contenders() -> list[SceneContender]:
     """Return our methods, and the programs, original and corrected."""
     both = partial(SceneContender, attitude=True)
     found = [

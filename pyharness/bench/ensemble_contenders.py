@@ -138,14 +138,14 @@ def own_ensembles() -> list[EnsembleContender]:
     """Return our contenders: closed form, Taylor and RK4."""
     return [
         EnsembleContender(
-            "closed-form", "none", _own("closed-form"), torque_free=True, attitude=True
+            "closed-form", "none", _make_own("closed-form"), torque_free=True, attitude=True
         ),
-        EnsembleContender("taylor", "tolerance", _own("taylor"), attitude=True),
-        EnsembleContender("rk4", "steps", _own("rk4")),
+        EnsembleContender("taylor", "tolerance", _make_own("taylor"), attitude=True),
+        EnsembleContender("rk4", "steps", _make_own("rk4")),
     ]
 
 
-def _own(method: str) -> EnsembleMaker:
+def _make_own(method: str) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
         # Each call writes its results into the arrays of the previous call.
         tolerance = setting if method == "taylor" else None

@@ -39,7 +39,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
     return measured_report(
         "## Ensembles",
         _DRIFT,
-        _parts(found),
+        _make_tables(found),
         _notes(found),
         lambda: _record(found),
         _data(found.rates),
@@ -55,7 +55,7 @@ def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
     return max(rates) / row.rate if rates else None
 
 
-def _parts(found: Ensembles) -> list[tuple[str, Table]]:
+def _make_tables(found: Ensembles) -> list[tuple[str, Table]]:
     tables: dict[tuple[str, float | None], list[Rate]] = {}
     for row in found.rates.rows:
         tables.setdefault((row.load, row.target), []).append(row)

@@ -42,7 +42,7 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     return measured_report(
         "# Run time against error" + (" of omega and attitude" if finding.attitude else ""),
         _DRIFT,
-        (_spread_parts if drawn else _parts)(finding),
+        (_spread_parts if drawn else _make_tables)(finding),
         _notes(finding),
         lambda: _record(finding),
         _spread_data(finding) if drawn else data,
@@ -185,7 +185,7 @@ def ratio(value: float | None) -> str:
     return f"{value:.{min(digits, 5)}f}"
 
 
-def _parts(finding: Finding) -> list[tuple[str, Table]]:
+def _make_tables(finding: Finding) -> list[tuple[str, Table]]:
     targets = list(map(_power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:

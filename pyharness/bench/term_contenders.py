@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, own
+from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, list_own_contenders
 from pyharness.bench.ensemble_contenders import EnsembleContender, own_ensembles
 from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.peers import heyoka_maker, peers
@@ -20,7 +20,11 @@ _TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
 def term_methods() -> list[SceneContender]:
     """Return our solver of single bodies: `auto`, prepared."""
-    return [replace(each, settings=_TOLERANCES[:-1]) for each in own() if each.name == OURS]
+    return [
+        replace(each, settings=_TOLERANCES[:-1])
+        for each in list_own_contenders()
+        if each.name == OURS
+    ]
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:

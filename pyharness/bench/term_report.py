@@ -60,7 +60,7 @@ def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
     return measured_report(
         "# Torques that depend on the state",
         _WORTH,
-        _parts(found),
+        _make_tables(found),
         _notes(found),
         lambda: _record(found),
         _data(found),
@@ -142,7 +142,7 @@ def _has(found: Terms, method: str) -> bool:
     return any(row.method == method for row in rows)
 
 
-def _parts(found: Terms) -> list[tuple[str, Table]]:
+def _make_tables(found: Terms) -> list[tuple[str, Table]]:
     parts = []
     for kind, title in _TITLES.items():
         if loads := [load for load in found.single.workloads if kind in load.kinds]:

@@ -45,7 +45,7 @@ def of_cell(suite: str, listing: Listing, case: int) -> Name:
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks in scenes drawn at random, with random listings and stop tests."""
     for number in range(chosen.draws):
-        yield Attempt(chosen.drawn(number, "program"), partial(_of_draw, chosen.seed, number))
+        yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
 
 def _of_case(listing: Listing, case: int, is_listed: bool, name: Name) -> Check:

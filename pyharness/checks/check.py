@@ -62,7 +62,7 @@ class Name:
         """Return the shell command that repeats this check alone."""
         return f"python -m pyharness {self.command} --only {self.id}{self.options}"
 
-    def of(self, quantity: str) -> "Name":
+    def with_quantity(self, quantity: str) -> "Name":
         """Return this name with another `quantity`."""
         return replace(self, quantity=quantity)
 
@@ -166,7 +166,7 @@ class Attempt:
 Attempts = Iterable[Check | Attempt]
 
 
-def made(
+def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
     """Yield finished checks and requested deferred ones; exceptions not `raised` fail."""
@@ -178,7 +178,7 @@ def made(
                 found = each.make(each.name)
                 parts = [found] if isinstance(found, Check) else found
                 yield from (
-                    check for check in made(parts, only, raised) if selected(check.id, only)
+                    check for check in make_checks(parts, only, raised) if selected(check.id, only)
                 )
             except raised:
                 raise
@@ -202,7 +202,7 @@ def run_suites(
             continue
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
         try:
-            yield from made(attempts(), only, raised)
+            yield from make_checks(attempts(), only, raised)
         except raised:
             raise
         except Exception as error:
@@ -215,7 +215,7 @@ def _ended(name: Name, error: Exception) -> Check:
         place = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(place.filename).name}, line {place.lineno}"
         said = printable(f"ended here: {type(error).__name__}: {error} ({where})")
-    return replace(name.of("exception").judged(False, said), again=name.replay)
+    return replace(name.with_quantity("exception").judged(False, said), again=name.replay)
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:

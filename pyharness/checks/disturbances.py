@@ -101,7 +101,9 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
         return run[0] if len(run) else np.full(3, np.nan)
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
-    matrix = np.array(amplification(listing).of(jacobian(scene, scene.omega)), dtype=float)
+    matrix = np.array(
+        amplification(listing).exact_matrix(jacobian(scene, scene.omega)), dtype=float
+    )
     derived = sum(np.split(matrix[-3:], len(matrix) // 3, axis=1))
     units = _units(scene, listing.program, np.abs(np.array(scene.omega)) + reach)
     return Probe(found, np.asarray(derived), amplified * ROUNDING * float(units.max()))
@@ -116,7 +118,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
     small = [row[:2] for row in jacobian(scene, (0.0, 0.0, scene.omega[2]))[:2]]
-    one = np.array(amplification(listing).of(small), dtype=float)
+    one = np.array(amplification(listing).exact_matrix(small), dtype=float)
     state = np.tile(np.array(scene.omega[:2]), len(one) // 2)
     power = np.eye(len(one))
     norms, sizes = [], []
@@ -143,7 +145,7 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
         return [z * each for each in x]  # type: ignore[misc]
 
     (found,), _ = collocation.interval([1.0], points(program, moved), 1.0, rates)
-    derived = amplification(listing, step).at(np.array(z))[-1, -1]
+    derived = amplification(listing, step).evaluate(np.array(z))[-1, -1]
     _, varying = solver_roundings(program)
     weights = _WEIGHTS[program]
     rate = abs(z) * (1.0 + moved * abs(z))

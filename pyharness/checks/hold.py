@@ -183,7 +183,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
     method, scene = name.subject, scene_of(name)
     ask = partial(run_method, method, scene, truth.end, tolerance)
     tried = MethodRun(method, tolerance, scene, lambda: of_end(method, ask()))
-    yield judge(name.of("error"), tried, truth, DERIVED)
+    yield judge(name.with_quantity("error"), tried, truth, DERIVED)
     answer = tried.answer
     if truth.exact and answer.is_whole and not answer.refusal:
         made = promised_sum(tried, truth)
@@ -196,7 +196,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
-        yield name.of("drift").bounded(found, most, DERIVED.basis)
+        yield name.with_quantity("drift").bounded(found, most, DERIVED.basis)
 
 
 def scene_of(name: Name) -> Scene:

@@ -116,7 +116,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
         with PortProcess(command, patience) as process:
             for cell in cells:
                 name, again = cell.of, replay_command(command, cell)
-                yield asked(process, command, cell)
+                yield check_answer(process, command, cell)
     except PortError as error:
         yield _port_check(name.judged(False, str(error)), again)
 
@@ -136,7 +136,7 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
     return verb if cell is None else f"{verb} {cell.options}"
 
 
-def asked(process: PortProcess, command: str, cell: Cell) -> PortCheck:
+def check_answer(process: PortProcess, command: str, cell: Cell) -> PortCheck:
     """Return the check of the answer to a run; raise PortError if it is not valid."""
     begin = time.perf_counter()
     line = process.ask(cell.request)

@@ -126,8 +126,8 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         except InputError as refusal:
             # There is no true solution to compare with: the motion diverges, or is too fast.
             may = drawn.scene.name in _MAY_REFUSE
-            none = chosen.drawn(number, "no-truth")
-            again = chosen.drawn(number).replay
+            none = chosen.name_draw(number, "no-truth")
+            again = chosen.name_draw(number).replay
             yield replace(none.judged(may, f"{drawn.scene.name}: {refusal}"), again=again)
             continue
         yield from _sampled(chosen, number, asked, truth, POLICY)
@@ -193,7 +193,7 @@ def _sampled(
     chosen: Selection, number: int, entrances: Entrances, truth: Truth, policy: Policy
 ) -> Iterator[Attempt]:
     for subject, tried in entrances.items():
-        yield Attempt(chosen.drawn(number, subject), partial(sample, tried, truth, policy))
+        yield Attempt(chosen.name_draw(number, subject), partial(sample, tried, truth, policy))
 
 
 def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:

@@ -63,7 +63,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
             continue
         if truth and ROUNDING * truth.flow.amplification < 1.0:
             for subject, tried in entrances.items():
-                yield Attempt(chosen.drawn(number, subject), partial(_samples, tried, truth))
+                yield Attempt(chosen.name_draw(number, subject), partial(_samples, tried, truth))
 
 
 def _entrances(
@@ -119,6 +119,6 @@ contains the error of the true solution.
 
 def _samples(tried: Callable[[], MethodRun], truth: Truth, name: Name) -> Iterator[Check]:
     run = cache(tried)
-    yield sample(run, replace(truth, attitude=None), POLICY, name.of("omega"))
+    yield sample(run, replace(truth, attitude=None), POLICY, name.with_quantity("omega"))
     if truth.attitude is not None:
-        yield sample(run, truth, POLICY, name.of("angle"))
+        yield sample(run, truth, POLICY, name.with_quantity("angle"))

@@ -56,7 +56,7 @@ def summary_page(
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
-        seen = f"{check.id}{_seen(check, ' > ')}"
+        seen = f"{check.id}{_format_outcome(check, ' > ')}"
         lines += [Line(f"- FAILED {_code(seen)}  "), Line(f"  {_code(check.replay)}")]
     if len(failed) > _MOST_ON_PAGE:
         lines.append(f"- ... and {len(failed) - _MOST_ON_PAGE} more")
@@ -122,15 +122,17 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
     lines = []
     for check in failed[:_MOST_FAILURES]:
         # The command is never shortened, so that it can be copied.
-        lines += [f"FAILED {check.id}{_seen(check, ' > ')}", Line(f"  {check.replay}")]
+        lines += [f"FAILED {check.id}{_format_outcome(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
     if len(checks) <= _FEW:
-        lines += [f"{each.id}:{_seen(each, ', limit ')}" for each in checks if each.passed]
+        lines += [
+            f"{each.id}:{_format_outcome(each, ', limit ')}" for each in checks if each.passed
+        ]
     return lines
 
 
-def _seen(check: Check, against: str) -> str:
+def _format_outcome(check: Check, against: str) -> str:
     found = "" if check.value is None else f" {short(check.value)}"
     allowed = "" if check.limit is None else f"{against}{short(check.limit)}"
     told = "; ".join(filter(None, (check.mark, check.note)))

@@ -99,12 +99,12 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
         del made["step-size"]
     own = named("", scene=scene, options=options)
     return {
-        name: Trial(name, title, bound, partial(_made, attempts, scene, replace(own, suite=name)))
+        name: Trial(name, title, bound, partial(_make, attempts, scene, replace(own, suite=name)))
         for name, (title, bound, attempts) in made.items()
     }
 
 
-def _made(
+def _make(
     attempts: Callable[[Scene, Name], Iterator[Attempt]],
     scene: Scene,
     name: Name,
@@ -154,9 +154,9 @@ def _truth(scene: Scene, times: Sequence[float]) -> Truth:
 
 def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
     run, exact = tried(), truth()
-    found = [judge(name.of("omega"), run, replace(exact, attitude=None), POLICY)]
+    found = [judge(name.with_quantity("omega"), run, replace(exact, attitude=None), POLICY)]
     if exact.attitude is not None:
-        found.append(judge(name.of("angle"), run, exact, POLICY))
+        found.append(judge(name.with_quantity("angle"), run, exact, POLICY))
     return found
 
 

@@ -36,7 +36,7 @@ class Selection:
         """Return whether a check whose id begins with `id`, or is `id`, may be requested."""
         return may_hold(id, self.only)
 
-    def drawn(self, number: int, subject: str = "") -> Name:
+    def name_draw(self, number: int, subject: str = "") -> Name:
         """Return the name of the check of `subject` in random draw `number`, with its seed."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"

@@ -44,7 +44,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 
     `progress` gets the number of completed parts, of all parts, and the name of the part.
     """
-    parts = [*_parts(progress)]
+    parts = [*_list_files(progress)]
     parts.append(_readme(parts))
     content = {each.path: each.content for each in parts}
     content[CRATE] = _indented(crate_record(parts))
@@ -62,7 +62,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     return dict(sorted(content.items()))
 
 
-def _parts(progress: Progress) -> Iterator[Part]:
+def _list_files(progress: Progress) -> Iterator[Part]:
     progress(0, 5, "cards")
     for program in PROGRAMS:
         yield Part(

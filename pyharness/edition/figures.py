@@ -31,7 +31,7 @@ class Drawn(NamedTuple):
     files: dict[str, bytes]
 
 
-def drawn() -> dict[str, Drawn]:
+def draw_figures() -> dict[str, Drawn]:
     """Return all figures, by the names of their files without suffix."""
     return {
         each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))

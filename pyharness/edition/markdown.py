@@ -39,7 +39,7 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     raises ValueError.
     """
     tokens = _parser().parse(text)
-    for token in _all(tokens):
+    for token in _walk(tokens):
         if token.type == "link_open":
             target = link(str(token.attrs["href"]))
             # Without a target, the text of the link remains as plain text.
@@ -54,7 +54,7 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
     # The empty cell in the corner of a table is not the head of a column.
     html = html.replace("<th></th>", "<td></td>")
-    return Document(_plain(title), Markup(html), list(_parts(tokens)))
+    return Document(_strip_markup(title), Markup(html), list(_split(tokens)))
 
 
 def inline(text: str) -> Markup:
@@ -109,10 +109,10 @@ def _code(tokens: Sequence["Token"], index: int, *_: Any) -> str:
     )
 
 
-def _all(tokens: Sequence["Token"]) -> Iterator["Token"]:
+def _walk(tokens: Sequence["Token"]) -> Iterator["Token"]:
     for token in tokens:
         yield token
-        yield from _all(token.children or [])
+        yield from _walk(token.children or [])
 
 
 def _anchor(tokens: Sequence["Token"]) -> None:
@@ -120,7 +120,7 @@ def _anchor(tokens: Sequence["Token"]) -> None:
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":
-            name = slug(_plain(content.content))
+            name = slug(_strip_markup(content.content))
             count = seen[name] = seen.get(name, -1) + 1
             opening.attrs["id"] = name + (f"-{count}" if count else "")
 
@@ -130,18 +130,22 @@ def slug(title: str) -> str:
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def _plain(text: str) -> str:
+def _strip_markup(text: str) -> str:
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 
-def _parts(tokens: Sequence["Token"]) -> Iterator[Part]:
+def _split(tokens: Sequence["Token"]) -> Iterator[Part]:
     anchor, title = "", ""
     text: list[str] = []
     for index, token in enumerate(tokens):
         if token.type == "heading_open":
             if title:
                 yield Part(anchor, title, " ".join(text))
-            anchor, title, text = str(token.attrs["id"]), _plain(tokens[index + 1].content), []
+            anchor, title, text = (
+                str(token.attrs["id"]),
+                _strip_markup(tokens[index + 1].content),
+                [],
+            )
         elif token.type in ("inline", "fence") and tokens[index - 1].type != "heading_open":
-            text.append(_plain(token.content))
+            text.append(_strip_markup(token.content))
     yield Part(anchor, title, " ".join(text))

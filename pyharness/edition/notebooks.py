@@ -30,7 +30,7 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     may be anywhere.
     """
     cells: list[dict[str, Any]] = []
-    for kind, source, found in _parts(text):
+    for kind, source, found in _split(text):
         if kind == "picture" and cells and cells[-1]["cell_type"] == "code" and source in pictures:
             cells[-1]["outputs"].append(_display(source, pictures[source]))
         elif kind == "code":
@@ -47,7 +47,7 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     return json_text(record).encode()
 
 
-def _parts(text: str) -> Iterator[tuple[str, str, "re.Match[str] | None"]]:
+def _split(text: str) -> Iterator[tuple[str, str, "re.Match[str] | None"]]:
     """Yield kind (prose, code or picture), text and match of each part."""
     start = 0
     for found in _PART.finditer(text):

@@ -116,7 +116,7 @@ def _likeness(one: Card, other: Card) -> float:
 def _compared(row: dict[str, Card]) -> AlignedRow:
     """Return a row with the parts that differ between any two cards."""
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
-    parts = {program: _parts(card) for program, card in row.items()}
+    parts = {program: _split_card(card) for program, card in row.items()}
     for one, other in combinations(row, 2):
         mine, theirs = (
             [(each.kind == _LABEL, each.text) for each in parts[name]] for name in (one, other)
@@ -133,7 +133,7 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
     return AlignedRow(cells, [kind for kind in KINDS if kind in kinds])
 
 
-def _parts(card: Card) -> list[_Part]:
+def _split_card(card: Card) -> list[_Part]:
     """Return statement number and parts, without continuation marks."""
     found = [] if card.continues else _PART.finditer(card.text[:5])
     labels = [_Part(each.start(), each[0], _LABEL) for each in found]

@@ -111,7 +111,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
-    drawn = figures.drawn()
+    drawn = figures.draw_figures()
     pictures = figures.together(drawn)
     for each in drawn.values():
         pictures |= each.files

@@ -100,7 +100,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
         played = FuncAnimation(figure, update, frames=count, interval=1000.0 * _PAUSE)
         with rc_context({"animation.embed_limit": 100.0}):
             page = played.to_jshtml(default_mode="loop")
-        head = f"<!doctype html><meta charset='utf-8'><title>{_plain(scene.name)}</title>"
+        head = f"<!doctype html><meta charset='utf-8'><title>{_escape(scene.name)}</title>"
         return (head + page).encode()
     canvas: Any = FigureCanvasAgg(figure)
     frames = []
@@ -159,5 +159,5 @@ def _form(path: str) -> str:
     return Path(path).suffix.lstrip(".").lower()
 
 
-def _plain(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;")

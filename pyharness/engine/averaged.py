@@ -61,7 +61,7 @@ def averaged(
     a recorded torque is more than a polynomial in omega and time, and waves, so that it may change
     within a part of a macro-step; and if the work limit is exceeded.
     """
-    coordinates = Coordinates.of(scene.euler_coefficients, scene.omega)
+    coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
     if coordinates is None:
         raise InputError(
             "averaged: without torque, omega would not rotate about a principal axis; allowed: a "
@@ -131,7 +131,7 @@ class _Run:
                 angle = float(angles[-1])
             n_rows = inside
             propagated = step.propagated(angle)
-            self.done.append(Done.of(self.coordinates, self.point, *propagated))
+            self.done.append(Done.from_start(self.coordinates, self.point, *propagated))
             if n_rows == len(self.times):
                 break
             self.begin = whole, math.fsum((*self.begin, *parts, -whole))

@@ -37,7 +37,7 @@ class Coordinates(NamedTuple):
     sign: float  # of w_a
 
     @classmethod
-    def of(cls, coefficients: Triple, omega: Triple) -> Self | None:
+    def from_omega(cls, coefficients: Triple, omega: Triple) -> Self | None:
         """Return the coordinates from omega (rad/s), or None on a separatrix."""
         found: list[tuple[float, Self]] = []
         for a in range(3):

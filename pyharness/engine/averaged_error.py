@@ -23,7 +23,9 @@ class Done(NamedTuple):
     transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
 
     @classmethod
-    def of(cls, coordinates: Coordinates, start: Array, error: Array, transition: Array) -> Self:
+    def from_start(
+        cls, coordinates: Coordinates, start: Array, error: Array, transition: Array
+    ) -> Self:
         """Return a macro-step with its start and the error of its end."""
         phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
         cosine, sine = np.cos(phases), np.sin(phases)
@@ -37,16 +39,16 @@ def estimates(
 ) -> tuple[float, float]:
     """Return the largest measured error of omega (rad/s) and amplification at several ends."""
     count = len(done)
-    error, growth = _at(coordinates, coefficients, done, omega, angle)
+    error, growth = _estimate_end(coordinates, coefficients, done, omega, angle)
     for n in range(1, count, -(-count // _MOST_ENDS)):
         start = done[n].start[:, None]
         there = np.concatenate(coordinates.omega(start, np.ones(1), np.zeros(1))[0])
-        other_error, other_growth = _at(coordinates, coefficients, done[:n], there, 0.0)
+        other_error, other_growth = _estimate_end(coordinates, coefficients, done[:n], there, 0.0)
         error, growth = max(error, other_error), max(growth, other_growth)
     return error, growth
 
 
-def _at(
+def _estimate_end(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
     """Return them at the end of the last macro-step."""

@@ -119,7 +119,9 @@ def isolated(fits: Fits) -> Roots:
     """Return all roots of polynomials, even undistinguished, and extrema that may be 0."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
-    found = [_at(fits, np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int), near)]
+    found = [
+        _describe_roots(fits, np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int), near)
+    ]
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))
     first, last, c = fits.first, fits.last, fits.coefficients
@@ -140,17 +142,17 @@ def isolated(fits: Fits) -> Roots:
         is_bent = ~is_tiny & ~is_monotone & _has_no_root(bends)
         middle = 0.5 * (low + high)
         tiny = is_tiny & changes
-        found.append(_at(fits, middle[tiny], sign[tiny], number[tiny], near))
+        found.append(_describe_roots(fits, middle[tiny], sign[tiny], number[tiny], near))
         tiny = is_tiny & ~changes
-        found.append(_at(fits, middle[tiny], 0 * sign[tiny], number[tiny], near))
+        found.append(_describe_roots(fits, middle[tiny], 0 * sign[tiny], number[tiny], near))
         one = is_monotone & changes
         x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
         x = middle[one] + 0.5 * (high - low)[one] * x
-        found.append(_at(fits, x, sign[one], number[one], near))
+        found.append(_describe_roots(fits, x, sign[one], number[one], near))
         for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent], slopes[is_bent],
                                       near[number[is_bent]]):  # fmt: skip
             inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
-            found.append(_at(fits, inner, change, number[is_bent][which], near))
+            found.append(_describe_roots(fits, inner, change, number[is_bent][which], near))
         split = ~(is_tiny | is_monotone | is_bent)
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
@@ -168,7 +170,7 @@ def _has_no_root(coefficients: Array) -> Array:
     return found
 
 
-def _at(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
+def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
     """Return roots at the points x, from -1 to 1, of some polynomials."""
     half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x

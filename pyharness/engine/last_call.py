@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pyharness.engine.compiled_call import CompiledCall, compiled_call
 from pyharness.engine.plan import Plan
-from pyharness.engine.problem import known
+from pyharness.engine.problem import estimate_or_none
 from pyharness.engine.registry import GAUSS
 from pyharness.engine.sensitivity import (
     closed_form_estimate,
@@ -71,17 +71,17 @@ class LastCall:
         method does not apply; ``sensitive``: amplified rounding errors exceed the tolerance. To
         find the last takes microseconds for a closed form, milliseconds for Gauss collocation.
         """
-        return self._found()[0]
+        return self._judge()[0]
 
     @property
     def error(self) -> float | None:
         """Return the last result's estimated error, relative or of the angle (rad), or None."""
-        return self._found()[1]
+        return self._judge()[1]
 
     @property
     def growth(self) -> float | None:
         """Return the error amplification of the last motion, or None, as in `Trajectory`."""
-        return self._found()[2]
+        return self._judge()[2]
 
     @property
     def digits(self) -> float | None:
@@ -98,7 +98,7 @@ class LastCall:
         ending = self._ending
         return 0 if ending is None else ending[1]
 
-    def _found(self) -> tuple[str, float | None, float | None]:
+    def _judge(self) -> tuple[str, float | None, float | None]:
         ending = self._ending
         if ending is None:
             return "complete", None, None
@@ -106,7 +106,7 @@ class LastCall:
         status = ENDS[number]
         if status not in WITH_ALL_ROWS:
             return status, None, None
-        error, growth = known(of_kernel), known(grown)
+        error, growth = estimate_or_none(of_kernel), estimate_or_none(grown)
         scene = self.plan.scene
         if self.plan.closed_form and not steps:
             noise = torque_noise(scene, omega0, t_end)

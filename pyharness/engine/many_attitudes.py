@@ -47,7 +47,7 @@ def many_attitudes(
         turns = rows_of("attitude0", usual, 4) if turns is None else turns
         work = partial(_enter, solver.plan.scene, code, solver._given, starts, times, turns, found)
     else:
-        work = partial(_each, solver, starts, times, turns, found)
+        work = partial(_solve_each, solver, starts, times, turns, found)
     for_each_piece(work, n, threads_of(threads))
     assert found.attitude is not None
     return found.omega, found.attitude, found.status
@@ -69,17 +69,17 @@ def _enter(
             scene.moments or scene.coefficients, law.constant, law.rate
         )),
         *(each.T for each in waves),
-        starts[piece].T, _part(times, piece), _part(turns, piece).T, given_up,
+        starts[piece].T, _select(times, piece), _select(turns, piece).T, given_up,
         found.omega[piece].T, found.attitude[piece].T, found.status[piece],
         found.estimates_of(piece),
     )  # fmt: skip
 
 
-def _part(rows: Array, piece: slice) -> Array:
+def _select(rows: Array, piece: slice) -> Array:
     return rows if len(rows) == 1 else rows[piece]
 
 
-def _each(
+def _solve_each(
     solver: "AttitudeSolver", starts: Array, times: Array, turns: Array | None, found: Ensemble,
     piece: slice, given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip

@@ -60,7 +60,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
         found["coefficients"] = list(scene.coefficients)
     if scene.inertia is not None:
         found["inertia"] = [scene.inertia[i][j] for i, j in _ELEMENTS]
-    for part in _parts(scene.torque):
+    for part in _list_summands(scene.torque):
         own = _parameters_of(part)
         found |= {name: None if name in found else values for name, values in own.items()}
     return found
@@ -71,7 +71,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
     body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
-    return _equations(body, tuple(_parts(scene.torque)), values, attitude)
+    return _equations(body, tuple(_list_summands(scene.torque)), values, attitude)
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
@@ -133,7 +133,7 @@ def _equations(
     return VariedEquations(tape, np.asfortranarray(np.hstack(forcings)), columns)
 
 
-def _parts(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
+def _list_summands(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
     """Return the summands of a torque, with names for their numbers if possible."""
     parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
     return [getattr(part, "named", None) or part for part in parts]

@@ -73,7 +73,7 @@ def remainders(scene: Scene) -> Triple:
     return float((i2 - i3) / i1 - a), float((i3 - i1) / i2 - b), float((i1 - i2) / i3 - c)
 
 
-def known(estimate: float) -> float | None:
+def estimate_or_none(estimate: float) -> float | None:
     """Return a kernel's estimate, or None for a negative one."""
     return float(estimate) if estimate >= 0.0 else None
 

@@ -217,7 +217,9 @@ class _Run(Run):
         omega = np.nan_to_num(coarse.sol(times).T)
         sizes = np.abs(omega).max(axis=1)
         largest = max(largest, float(sizes.max()))
-        radians = self.rate * length * float(np.mean(sizes)) + _turned(self.scene, length, largest)
+        radians = self.rate * length * float(np.mean(sizes)) + _sum_phases(
+            self.scene, length, largest
+        )
         turned = 0.0
         if self.scene.attitude is not None:
             turned = length * float(np.linalg.norm(omega, axis=1).mean())
@@ -235,7 +237,7 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
     ]
 
 
-def _turned(scene: Scene, span: float, largest: float) -> float:
+def _sum_phases(scene: Scene, span: float, largest: float) -> float:
     """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
 
     Each is at most the omega that the wave can add, relative to `largest`.

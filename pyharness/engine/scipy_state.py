@@ -325,7 +325,7 @@ class _StateRun(Run):
             if len(found) < len(wanted):
                 break
             state, begin = found[-1].tolist(), end
-        return self._found(rows, len(times))
+        return self._collect_rows(rows, len(times))
 
     def _from(
         self, begin: float, state: Sequence[float], wanted: list[float], local: float,
@@ -345,7 +345,7 @@ class _StateRun(Run):
             return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
         return np.empty((0, len(self.start)))
 
-    def _found(self, rows: Array, wanted: int) -> _Rows:
+    def _collect_rows(self, rows: Array, wanted: int) -> _Rows:
         rows = np.reshape(rows, (-1, len(self.start)))
         finite = np.isfinite(rows).all(axis=1)
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]

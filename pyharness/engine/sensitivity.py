@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pyharness.engine.problem import closed_form, known, normalized
+from pyharness.engine.problem import closed_form, estimate_or_none, normalized
 from pyharness.engine.rescaled import rescaling_factor, scaled
 from pyharness.engine.taylor import taylor
 from pyharness.model.errors import InputError
@@ -66,7 +66,9 @@ def closed_form_estimate(
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
     if any(scene.euler_coefficients):
-        growth = known(extension().torque_free_growth(scene.euler_coefficients, omega0, t_end))
+        growth = estimate_or_none(
+            extension().torque_free_growth(scene.euler_coefficients, omega0, t_end)
+        )
     if growth is None:
         return None, None
     error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
@@ -94,7 +96,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     _, n_rows, _, _ = extension().taylor_rows(
         *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
     )
-    return known(work[3]) if n_rows else None
+    return estimate_or_none(work[3]) if n_rows else None
 
 
 def _recorded_growth(scene: Scene, t_end: float) -> float | None:

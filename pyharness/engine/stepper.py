@@ -175,7 +175,7 @@ class Stepper:
         stop = self._next_break(longest > 0.0)
         if stop is not None and abs(stop - self._time) < abs(longest):
             end, longest = stop, stop - self._time
-        taken = self._taken(longest)
+        taken = self._take_step(longest)
         self._begin, self._last = self._time, taken
         is_cut = self._time + taken.h == self._time + longest
         # A step that was cut says nothing of the next one.
@@ -187,7 +187,7 @@ class Stepper:
         self._steps += 1
         return self._time
 
-    def _taken(self, longest: float) -> Step:
+    def _take_step(self, longest: float) -> Step:
         scale = self._scale()
         while True:
             tolerances = np.full(len(self._state), math.inf)

@@ -4,7 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pyharness.engine.problem import known, normalized, normalized_in_space, trajectory_of
+from pyharness.engine.problem import (
+    estimate_or_none,
+    normalized,
+    normalized_in_space,
+    trajectory_of,
+)
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import advice
@@ -43,7 +48,7 @@ def taylor(
             + advice("use a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
-    error, growth = map(known, work[2:4])
+    error, growth = map(estimate_or_none, work[2:4])
     attitudes = joint[:, 1:] if n_attitudes else None
     return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
 

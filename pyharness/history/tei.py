@@ -176,12 +176,14 @@ def _places(div: xml.Element) -> None:
         for number, card in found.cards.items():
             for kind, places in (("port", found.port), ("twin", found.twin)):
                 for place in places.get(number, ()):
-                    _place(xml.SubElement(div, "note", type=kind, target=f"#{_id(card)}"), place)
+                    _write_place(
+                        xml.SubElement(div, "note", type=kind, target=f"#{_id(card)}"), place
+                    )
             if number in found.absent:
                 with_text(div, "note", found.absent[number], type="absent", target=f"#{_id(card)}")
 
 
-def _place(note: xml.Element, place: Place) -> None:
+def _write_place(note: xml.Element, place: Place) -> None:
     cited = xml.SubElement(note, "cit")
     with_text(cited, "quote", place.text)
     where = xml.SubElement(cited, "bibl")

@@ -55,7 +55,7 @@ class WordCell:
     widest: WordRun
     runs: tuple[WordRun, ...]
 
-    def of(self, p: int, rule: str) -> WordRun | None:
+    def find_run(self, p: int, rule: str) -> WordRun | None:
         """Return the run with p bits and a rounding rule, if there is one."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 

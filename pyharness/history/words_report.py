@@ -44,7 +44,7 @@ def words_report(cells: Sequence[WordCell]) -> Report:
         ],
     ]
     notes: list[str] = []
-    if all(cell.of(p, rule) for cell in cells for _, p, rule in _MACHINE):
+    if all(cell.find_run(p, rule) for cell in cells for _, p, rule in _MACHINE):
         legend = (
             "fields: numbers on the printed page, in binary64. cdc48, rounded: how many of them "
             "differ in the CDC's arithmetic, unrounded and rounded. stop: variable and step at "
@@ -83,7 +83,7 @@ def _machine(cells: Sequence[WordCell]) -> Table:
     for cell in cells:
         row = [*_head(cell), cell.double.fields, cell.double.stop or "-", cell.double.error]
         for _, p, rule in _MACHINE:
-            run = cell.of(p, rule)
+            run = cell.find_run(p, rule)
             assert run is not None
             row += [run.different, "same" if run.stop == cell.double.stop else run.stop, run.error]
         rows.append(row)
@@ -93,7 +93,7 @@ def _machine(cells: Sequence[WordCell]) -> Table:
 def _changes(cells: Sequence[WordCell]) -> list[str]:
     told = []
     for name, p, rule in _MACHINE:
-        found = [(cell.double, run) for cell in cells if (run := cell.of(p, rule))]
+        found = [(cell.double, run) for cell in cells if (run := cell.find_run(p, rule))]
         of = f"of {len(found)} runs"
         pages = sum(run.different > 0 for _, run in found)
         stops = sum(run.stop != double.stop for double, run in found)

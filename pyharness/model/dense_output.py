@@ -43,10 +43,10 @@ class Pieces:
         found = np.empty((len(times), self.values.shape[2]))
         for begin in range(0, len(times), _BLOCK):
             block = slice(begin, begin + _BLOCK)
-            found[block] = self._at(times[block])
+            found[block] = self._evaluate(times[block])
         return found
 
-    def _at(self, times: Array) -> Array:
+    def _evaluate(self, times: Array) -> Array:
         last = len(self.edges) - 2
         piece = np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, last)
         low, high = self.edges[piece], self.edges[piece + 1]

@@ -87,14 +87,18 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
         left = [k for k in range(3) if k not in order]
         order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
     axes = [found.vectors[k] for k in order]
-    axes = [_turned(axis) if axis[n] < 0 else axis for n, axis in enumerate(axes)]
+    axes = [_reverse(axis) if axis[n] < 0 else axis for n, axis in enumerate(axes)]
     if _determinant(axes) < 0:
         least = min(range(3), key=lambda n: abs(axes[n][n]))
-        axes[least] = _turned(axes[least])
+        axes[least] = _reverse(axes[least])
     first, second, third = (found.values[k] for k in order)
     exact = first, second, third
     rounded = nearest_float(first), nearest_float(second), nearest_float(third)
-    low = _rest(first, rounded[0]), _rest(second, rounded[1]), _rest(third, rounded[2])
+    low = (
+        _round_off(first, rounded[0]),
+        _round_off(second, rounded[1]),
+        _round_off(third, rounded[2]),
+    )
     columns = np.array([[float(x) for x in axis] for axis in axes]).T
     columns.flags.writeable = False
     return PrincipalFrame(rounded, low, columns, exact, (axes[0], axes[1], axes[2]))
@@ -106,7 +110,7 @@ def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
     return found.moments, found.axes.copy()
 
 
-def _turned(axis: Exact) -> Exact:
+def _reverse(axis: Exact) -> Exact:
     return -axis[0], -axis[1], -axis[2]
 
 
@@ -124,5 +128,5 @@ def nearest_float(value: Fraction) -> float:
         return math.inf if value > 0 else -math.inf
 
 
-def _rest(value: Fraction, rounded: float) -> float:
+def _round_off(value: Fraction, rounded: float) -> float:
     return float(value - Fraction(rounded)) if math.isfinite(rounded) else 0.0

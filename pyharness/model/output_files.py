@@ -74,7 +74,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
                     file.keep()
                 for file in files:
                     path = file.path
-                    file.place()
+                    file.put_in_place()
             except BaseException:
                 for file in files:
                     file.undo()
@@ -141,7 +141,7 @@ class _File:
 
                 shutil.copy2(self.target, self.old)
 
-    def place(self) -> None:
+    def put_in_place(self) -> None:
         os.replace(self.new, self.target)
 
     def undo(self) -> None:

@@ -90,10 +90,10 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     elif not law.in_space:
         # The torque about an axis of small moment may result from cancellation of large
         # components. Therefore it is rounded only after the transformation.
-        law = exact_law(law).turned(frame.into).rounded()
+        law = exact_law(law).rotate(frame.into).rounded()
     bare = PrincipalScene(
         scene.name,
-        _turned(frame, scene.omega),
+        _rotate(frame, scene.omega),
         moments=frame.moments,
         torque=law,
         step_size=scene.step_size,
@@ -116,7 +116,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
 
 
-def _turned(frame: PrincipalFrame, vector: Triple) -> Triple:
+def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:
     first, second, third = map(Fraction, vector)
     x, y, z = map(float, frame.into((first, second, third)))
     return x, y, z

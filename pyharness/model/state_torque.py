@@ -104,7 +104,7 @@ class StateTorque:
             second = recorded(other)
         else:
             return NotImplemented
-        return _sum([*_parts(self), *_parts(second)])
+        return _sum([*_list_summands(self), *_list_summands(second)])
 
     __radd__ = __add__
 
@@ -300,7 +300,7 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
     return replace(torque, parameters=parameters, varied=_tape_of(called, names))
 
 
-def _parts(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
+def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
     """Return the summands of a torque; a zero law has none."""
     if isinstance(torque, TorqueLaw):
         return () if torque.is_zero else (torque,)

@@ -246,7 +246,7 @@ class Symbol:
         """Refuse a power whose exponent is a symbol."""
         raise self.recorder.refusal("a power that is not a number")
 
-    def _of(self, kind: str, function: Callable[[float], float]) -> "Symbol":
+    def _apply(self, kind: str, function: Callable[[float], float]) -> "Symbol":
         if not self._terms:
             return Symbol(self.recorder, function(self._constant), {})
         slot, factor = self._slot()
@@ -260,19 +260,19 @@ class Symbol:
         if not self._terms and self._constant < 0.0:
             place = self.recorder.place
             raise InputError(f"{place}: square root of the constant {self._constant:g}")
-        return self._of("sqrt", math.sqrt)
+        return self._apply("sqrt", math.sqrt)
 
     def exp(self) -> "Symbol":
         """Return the exponential."""
-        return self._of("exp", _exp)
+        return self._apply("exp", _exp)
 
     def sin(self) -> "Symbol":
         """Return the sine."""
-        return self._of("sine", math.sin)
+        return self._apply("sine", math.sin)
 
     def cos(self) -> "Symbol":
         """Return the cosine."""
-        return self._of("cosine", math.cos)
+        return self._apply("cosine", math.cos)
 
     def tan(self) -> "Symbol":
         """Return the tangent."""
@@ -288,7 +288,7 @@ class Symbol:
 
     def tanh(self) -> "Symbol":
         """Return the hyperbolic tangent."""
-        return self._of("tanh", math.tanh)
+        return self._apply("tanh", math.tanh)
 
     def of_table(self, table: Table) -> "Symbol":
         """Return a table at this symbol, which must be the time."""

@@ -60,15 +60,15 @@ def is_no_number(value: object) -> bool:
 
 def parsed_float(text: str) -> float:
     """Return the number that `text` is, or raise ValueError, also for float()'s underscores."""
-    return float(_plain(text))
+    return float(_read_text(text))
 
 
 def parsed_whole(text: str) -> int:
     """Return the whole number that `text` is, or raise ValueError."""
-    return int(_plain(text))
+    return int(_read_text(text))
 
 
-def _plain(text: str) -> str:
+def _read_text(text: str) -> str:
     if not text.isascii() or "_" in text:
         raise ValueError(f"{text!r} is no number")
     return text

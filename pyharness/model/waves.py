@@ -36,7 +36,7 @@ class ExactLaw:
     cosines: tuple[ExactWave, ...]
     frame: str
 
-    def turned(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
+    def rotate(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
         """Return the law with its vectors rotated by `turn`."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:

@@ -74,14 +74,14 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
     elif axis.how == "log":
         found = np.geomspace(axis.values[0], axis.values[1], axis.count)
     else:
-        found = _drawn(axis)
+        found = _draw(axis)
     if number_field(axis.field).whole:
         found = np.rint(found)
     found.setflags(write=False)
     return found
 
 
-def _drawn(axis: Axis) -> Floats:
+def _draw(axis: Axis) -> Floats:
     # All values of the axis are drawn at once, so that they do not depend on the chunks. Each field
     # has its own sequence of random numbers.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])

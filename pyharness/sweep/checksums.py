@@ -149,10 +149,10 @@ def place_checksums(
         content = checksum_text(label, part, folder, names, limit)
     except DamageError as damage:
         raise OSError(errno.EIO, f"{damage}, though it was written now") from None
-    _place(folder, checksums, content)
+    _write_whole(folder, checksums, content)
 
 
-def _place(folder: Path, name: str, content: bytes) -> None:
+def _write_whole(folder: Path, name: str, content: bytes) -> None:
     """Write a file by renaming a temporary one, so that it is never incomplete."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)

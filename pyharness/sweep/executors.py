@@ -55,7 +55,7 @@ def engine(
     if no scheduler with a worker answers, and later, if no worker is left.
     """
     if executor == "here":
-        yield Engine(1, _here, is_here=True)
+        yield Engine(1, _solve_here, is_here=True)
     elif executor == "processes":
         count = workers or _processors()
         yield Engine(count, partial(_by_processes, count))
@@ -71,7 +71,7 @@ def _processors() -> int:
     return os.cpu_count() or 1
 
 
-def _here(sweep: Sweep, chunks: list[int]) -> Results:
+def _solve_here(sweep: Sweep, chunks: list[int]) -> Results:
     return ((chunk, solve_chunk(sweep, chunk)) for chunk in chunks)
 
 

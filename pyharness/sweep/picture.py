@@ -73,9 +73,9 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
         else:
             _dots(plot, axis_of, shown, places, panel, logarithmic)
         for at in itertools.product(*(range(len(each)) for each in places)):
-            here = [_plain(axis_of[d].coordinates()[p[i]]) for d, p, i in
+            here = [_as_number(axis_of[d].coordinates()[p[i]]) for d, p, i in
                     zip(shown, places, at, strict=True)]  # fmt: skip
-            numbers.append((told, *here, _plain(panel[at])))
+            numbers.append((told, *here, _as_number(panel[at])))
     for plot in plots[len(panels) :]:
         plot.set_axis_off()
     reduction = REDUCTIONS[asked.reduction]
@@ -201,5 +201,5 @@ def _label(name: str, units: str) -> str:
     return f"{name} ({units})" if units not in ("", "1") else name
 
 
-def _plain(value: Any) -> Any:
+def _as_number(value: Any) -> Any:
     return value if isinstance(value, str) else float(value)

@@ -127,17 +127,19 @@ class Store:
         return False
 
     def _described(self, chunk: int) -> tuple[Label, str, Path, list[str], int]:
-        part = f"chunk {'/'.join(map(str, self.sweep.place(chunk)))}"
+        part = f"chunk {'/'.join(map(str, self.sweep.position_of(chunk)))}"
         return label(self.sweep), part, self.folder, self._files(chunk), self._limit
 
     def _checksums(self, chunk: int) -> str:
-        return "/".join([CHECKSUMS, "c", *map(str, self.sweep.place(chunk))])
+        return "/".join([CHECKSUMS, "c", *map(str, self.sweep.position_of(chunk))])
 
     def _files(self, chunk: int) -> list[str]:
         found = []
         for asked in self.sweep.reductions:
             more = (0,) if REDUCTIONS[asked.reduction].labels else ()
-            found.append("/".join([asked.name, "c", *map(str, (*self.sweep.place(chunk), *more))]))
+            found.append(
+                "/".join([asked.name, "c", *map(str, (*self.sweep.position_of(chunk), *more))])
+            )
         return found
 
 

@@ -93,7 +93,7 @@ class Sweep:
         """Return the number of chunks of the whole grid."""
         return math.prod(self.chunk_counts)
 
-    def place(self, chunk: int) -> tuple[int, ...]:
+    def position_of(self, chunk: int) -> tuple[int, ...]:
         """Return a chunk's position along each dimension, counted in chunks."""
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
@@ -101,7 +101,9 @@ class Sweep:
         """Return the part of the grid that a chunk covers, a slice per dimension."""
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
-            for at, length, n in zip(self.place(chunk), self.chunk_shape, self.shape, strict=True)
+            for at, length, n in zip(
+                self.position_of(chunk), self.chunk_shape, self.shape, strict=True
+            )
         )
 
 

@@ -85,7 +85,7 @@ class Number:
 
     def __neg__(self) -> "Number":
         """Return the number with the opposite sign."""
-        return self.__class__(-self.m, self.e) if self.m else self._plain(-self.e)
+        return self.__class__(-self.m, self.e) if self.m else self._without_sign_of_zero(-self.e)
 
     def __abs__(self) -> "Number":
         """Return the magnitude."""
@@ -150,7 +150,9 @@ class Number:
     def sqrt(self) -> "Number":
         """Return the square root, rounded to nearest; nan below zero."""
         if self.m <= 0:
-            return self._plain(self.e if not self.m and not self.e < 0.0 else math.nan)
+            return self._without_sign_of_zero(
+                self.e if not self.m and not self.e < 0.0 else math.nan
+            )
         shift = 2 * self.word.p + 4 + (self.e & 1)
         root = math.isqrt(self.m << shift)
         rest = root * root != self.m << shift
@@ -184,9 +186,9 @@ class Number:
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
             return self if self.m else other  # a zero was added
-        return self._plain(found)
+        return self._without_sign_of_zero(found)
 
-    def _plain(self, value: float) -> "Number":
+    def _without_sign_of_zero(self, value: float) -> "Number":
         return self.__class__(0, value if value or self.rules.signed_zero else 0.0)
 
     @property

@@ -62,7 +62,7 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
     if a[0] and a[2]:
         found = _general(a, omega, time)
     else:
-        found = _turned([_decimal(x) for x in a], [_decimal(x) for x in omega], time)
+        found = _move_on_ellipse([_decimal(x) for x in a], [_decimal(x) for x in omega], time)
     result = [Decimal(0)] * 3
     for axis, value in zip(axes, found, strict=True):
         result[axis] = sign * value
@@ -91,7 +91,7 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
         return [x / f for f, x in zip(factors, found if p <= q else found[::-1], strict=True)]
 
 
-def _turned(a: Row, omega: Row, time: Decimal) -> Row:
+def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if the first or third coefficient is 0.
 
     That component is constant; the others move on an ellipse. The second coefficient is negative.

@@ -78,11 +78,11 @@ class Equations:
             slopes: list[Any] = []
             if self._transition:
                 inner = [Dual(x, rest[3 * k : 3 * k + 3]) for k, x in enumerate((*omega, *q))]
-                moved = self._turned(time, inner[:3], inner[3:], functions)
+                moved = self._evaluate(time, inner[:3], inner[3:], functions)
                 found = [each.value for each in moved]
                 slopes = [slope for each in moved for slope in each.slopes]
             else:
-                found = self._turned(time, omega, q, functions)
+                found = self._evaluate(time, omega, q, functions)
             if v:
                 (x, y, z), (a, b, c) = omega, v
                 cross = (b * z - c * y, c * x - a * z, a * y - b * x)
@@ -91,7 +91,7 @@ class Equations:
 
         return rates
 
-    def _turned(self, time: Any, omega: list[Any], q: list[Any], functions: Any) -> list[Any]:
+    def _evaluate(self, time: Any, omega: list[Any], q: list[Any], functions: Any) -> list[Any]:
         inputs = [time, *omega, *(q or IDENTITY)]
         parts = [evaluate(each, inputs, functions) for each in self._tapes]
         torque = [sum(each[1:], each[0]) for each in zip(*parts, strict=True)]

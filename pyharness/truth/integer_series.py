@@ -110,7 +110,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
             raise InputError("integer series: omega grows without bound")
         while len(rows) < len(times) and wanted[len(rows)] * whole <= begin + length:
             part = (wanted[len(rows)] * whole - begin) / length
-            rows.append([_at(each, part) for each in terms[:3]])
+            rows.append([_evaluate(each, part) for each in terms[:3]])
         state = [sum(each) for each in terms]
         dense = powers @ (np.array([list(map(float, each)) for each in terms[:3]]) * 2.0**-BITS).T
         largest = max(largest, *map(abs, state[:3]), int(np.abs(dense).max() * 2.0**BITS))
@@ -134,7 +134,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
     raise InputError(f"integer series: more than {_MOST_STEPS} steps would be needed")
 
 
-def _at(terms: Series, part: Fraction) -> Fraction:
+def _evaluate(terms: Series, part: Fraction) -> Fraction:
     """Return a Taylor series at the fraction `part` of its step.
 
     `terms` are at the end of the step, in units of 2**-160.

@@ -13,7 +13,7 @@ def write(report: Report) -> str:
 
 def sections(text: Sequence[Section]) -> str:
     """Return sections as HTML, with numbers as for a terminal."""
-    return "\n".join(part for section in text if section for part in _parts(section))
+    return "\n".join(part for section in text if section for part in _write_section(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
@@ -45,7 +45,7 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
     return f"<{tag}{scope}{' class=left' if left else ''}>{shown}</{tag}>"
 
 
-def _parts(section: Section) -> Iterator[str]:
+def _write_section(section: Section) -> Iterator[str]:
     """Yield the HTML elements of a section.
 
     Successive lines form one `pre`, successive labelled paragraphs (Field) one `dl`.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pyharness.bench import compiled_peers, peers
-from pyharness.bench.contenders import SceneContender, own
+from pyharness.bench.contenders import SceneContender, list_own_contenders
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
 from pyharness.bench.scores import groups
@@ -24,7 +24,7 @@ Capture = pytest.CaptureFixture[str]
 TURNED = (0.5, -0.1, 0.7, 0.5)
 SCENE = replace(case_scene(5), attitude=TURNED)
 FREE = replace(case_scene(4), attitude=TURNED)
-ABLE = [each for each in (*own(), *peers.peers()) if each.attitude]
+ABLE = [each for each in (*list_own_contenders(), *peers.peers()) if each.attitude]
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import pytest
 
 from pyharness.bench import measure as bench
 from pyharness.bench.compiled_peers import RK4, compiled_function, steps_source
-from pyharness.bench.contenders import Maker, SceneContender, own
+from pyharness.bench.contenders import Maker, SceneContender, list_own_contenders
 from pyharness.bench.measure import (
     Finding,
     Refusal,
@@ -177,7 +177,7 @@ def test_error_is_relative_to_the_largest_component() -> None:
 
 
 def test_ladder_begins_too_coarse_for_anyone_and_has_rungs_between_powers_of_two() -> None:
-    by_name = {each.name: each for each in own()}
+    by_name = {each.name: each for each in list_own_contenders()}
     assert list(ladder(by_name["gauss-8"], case_scene(7), 3.0))[:4] == [2.0, 3.0, 4.0, 6.0]
     assert list(ladder(by_name["taylor-3"], case_scene(7), 3.0))[:3] == [2.0, 4.0, 8.0]
     assert next(ladder(by_name["rk4"], case_scene(4), 100.0)) == 64.0
@@ -244,9 +244,11 @@ def test_measure_judges_refuses_and_goes_on(right: Array) -> None:
 def test_every_contender_of_ours_meets_its_order_or_tolerance_and_counts() -> None:
     """Check every contender on Case 3, which has a closed form and suits every method."""
     others = [each for each in peers() if each.package == "scipy"][:2]
-    found = measure([Workload("3", case_scene(3), 3.0)], own() + others)
+    found = measure([Workload("3", case_scene(3), 3.0)], list_own_contenders() + others)
     good = {(row.method, row.setting): row for row in found.rows if row.error is not None}
-    assert {name for name, _ in good} >= {each.name for each in own()} - {"runge-kutta-original"}
+    assert {name for name, _ in good} >= {each.name for each in list_own_contenders()} - {
+        "runge-kutta-original"
+    }
     for (name, setting), row in good.items():
         if name in ("auto", "taylor", "closed-form"):
             assert (row.error or 0.0) <= max(setting or 0.0, 5e-15), row

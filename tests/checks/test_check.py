@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from docs.certificates.limits import counts_table, limits
-from pyharness.checks.check import BITS, Attempt, Attempts, Check, Name, made, run_suites
+from pyharness.checks.check import BITS, Attempt, Attempts, Check, Name, make_checks, run_suites
 from pyharness.checks.report import basis_note, marks
 from pyharness.model.basis import MARKS, Basis
 from pyharness.model.errors import InputError, NotBuiltError
@@ -37,15 +37,18 @@ def test_only_what_is_requested_is_computed() -> None:
 
     def both(name: Name) -> list[Check]:
         computed.append(name.id)
-        return [name.of("error").bounded(1.0, 2.0, BITS), name.of("drift").bounded(3.0, 2.0, BITS)]
+        return [
+            name.with_quantity("error").bounded(1.0, 2.0, BITS),
+            name.with_quantity("drift").bounded(3.0, 2.0, BITS),
+        ]
 
     attempts = [Attempt(Name("a", "b"), parts), Attempt(Name("a", "c"), both)]
-    found = list(made(attempts, ["a/b/coarse/drift"]))
+    found = list(make_checks(attempts, ["a/b/coarse/drift"]))
     assert [check.id for check in found] == ["a/b/coarse/drift"]
     assert computed == ["a/b/coarse"]
-    assert len(list(made(attempts, []))) == 6
+    assert len(list(make_checks(attempts, []))) == 6
     # Checks that have been computed already were selected before.
-    assert list(made(found, ["d"])) == found
+    assert list(make_checks(found, ["d"])) == found
 
 
 def test_a_record_tells_id_and_replay_and_what_a_number_is_compared_with() -> None:
@@ -95,7 +98,7 @@ def test_the_document_counts_every_basis_in_the_source() -> None:
 def test_an_exception_is_a_failed_check_and_the_rest_is_computed() -> None:
     def suite(error: Exception) -> Attempts:
         def broken(name: Name) -> Iterator[Check]:
-            yield name.of("error").bounded(1.0, 2.0, BITS)
+            yield name.with_quantity("error").bounded(1.0, 2.0, BITS)
             raise error
 
         yield Attempt(Name("some", "rk4"), broken)

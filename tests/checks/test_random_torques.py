@@ -11,7 +11,7 @@ import pytest
 
 from pyharness.checks import judge
 from pyharness.checks import random_torques as room
-from pyharness.checks.check import Check, made
+from pyharness.checks.check import Check, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_torques import random_torques
 from pyharness.checks.selection import Selection
@@ -27,7 +27,7 @@ def checks(only: str, draws: int = 100) -> list[Check]:
     """Return the checks in the random scenes of a seed whose ids begin with `only`."""
     chosen = Selection(only=[only] if only else [], seed="fixed", draws=draws, thin=True)
     with patch.object(room, "reference_truth", TRUTH):
-        return list(made(random_torques(chosen), chosen.only))
+        return list(make_checks(random_torques(chosen), chosen.only))
 
 
 @pytest.mark.campaign

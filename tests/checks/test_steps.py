@@ -95,7 +95,7 @@ def test_boundaries_are_the_known_ones() -> None:
 
 def test_the_limit_of_the_punched_runge_kutta_is_in_its_matrix() -> None:
     """A decaying solution ends near minus its initial value: 2 y(t/2) - y(0) with y(t/2) near 0."""
-    matrix = amplification(Listing.original("runge-kutta")).at(np.array(-0.01)).real
+    matrix = amplification(Listing.original("runge-kutta")).evaluate(np.array(-0.01)).real
     end = np.linalg.matrix_power(matrix, 5000) @ np.ones(2)
     assert end[1] == pytest.approx(-1.0, abs=0.02)
 
@@ -136,7 +136,7 @@ def test_forecast_is_what_comes_of_it() -> None:
     forecast = Forecaster(path(case_scene(5), 1.0), "four-term")
     for count in (1000, 100_000):
         (check,) = checks_of(f"step-size/four-term/case-5/corrected/{1.0 / count:.0e}").values()
-        assert check.value == pytest.approx(forecast.at(count).truncation, rel=0.05)
+        assert check.value == pytest.approx(forecast.predict(count).truncation, rel=0.05)
 
 
 @pytest.mark.parametrize("name", SCHEMES)

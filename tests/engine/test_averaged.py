@@ -189,7 +189,7 @@ def test_many_macro_steps_agree_with_few(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.parametrize("fault", ["order", "waves", "mean", "nodes"])
 def test_measured_error_shows_a_fault(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A macro-step with too low an order of averaging, or too few nodes, has a large error."""
-    coordinates = Coordinates.of(SCENE.euler_coefficients, SCENE.omega)
+    coordinates = Coordinates.from_omega(SCENE.euler_coefficients, SCENE.omega)
     assert coordinates is not None
     start = coordinates.point(SCENE.omega)
     torques = [np.array(push / moment) for push, moment in zip(PUSH.constant, MOMENTS, strict=True)]

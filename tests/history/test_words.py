@@ -51,11 +51,11 @@ Found = dict[tuple[int, str, str], WordCell]
 @pytest.mark.campaign
 def test_double_is_the_run_in_53_bits(found: Found) -> None:
     for cell in found.values():
-        if (run := cell.of(53, "nearest-even")) is not None:
+        if (run := cell.find_run(53, "nearest-even")) is not None:
             assert run == cell.double
             assert run.different == 0
     cell = found[2, "runge-kutta", "corrected"]
-    assert cell.of(54, "chop") is None
+    assert cell.find_run(54, "chop") is None
     words = [(p, rule) for rule in RULES for p in LENGTHS]
     assert [(run.p, run.rule) for run in cell.runs] == words
 
@@ -66,7 +66,7 @@ def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
     floor = cell.widest.error
     assert floor == pytest.approx(2.5e-7, rel=0.05)
     for rule in RULES:
-        run = cell.of(16, rule)
+        run = cell.find_run(16, rule)
         assert run is not None
         assert run.error > 100.0 * floor
         least = 24 if rule == "nearest-even" else 28

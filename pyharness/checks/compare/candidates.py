@@ -114,7 +114,9 @@ def attitude_candidate(name: str, tolerance: float | None, primed: bool = False)
 
         def read(found: tuple[Array, Array]) -> End:
             omega, attitude = found
-            return End(plain(omega), solver.status, solver.steps, attitude=plain(attitude))
+            return End(
+                copied_result(omega), solver.status, solver.steps, attitude=copied_result(attitude)
+            )
 
         return Ready(partial(solver, start, time), read)
 
@@ -161,7 +163,7 @@ def unstopped(listing: Listing) -> Candidate:
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
-def plain(values: Iterable[float]) -> Array:
+def copied_result(values: Iterable[float]) -> Array:
     """Return a copy of a compiled function's result, whose memory its next call reuses."""
     return np.array([float(x) for x in values])
 
@@ -183,7 +185,9 @@ def _answered(solver: Solver, omega: Array) -> End:
     elif method.startswith("gauss-"):
         counted = solver.steps
     # A Taylor series expands the right-hand side and does not evaluate it.
-    return End(plain(omega), solver.status, solver.steps, None if method == "taylor" else counted)
+    return End(
+        copied_result(omega), solver.status, solver.steps, None if method == "taylor" else counted
+    )
 
 
 def _printed(result: Any) -> End:
@@ -192,4 +196,4 @@ def _printed(result: Any) -> End:
         return not_finite(f"stopped at step {n_rows} by {STOP_VARIABLES[variable - 1]}")
     if status != COMPLETE:
         return not_finite()
-    return End(plain(rows[2:5, n_rows - 1]), "complete", n_rows, evaluations)
+    return End(copied_result(rows[2:5, n_rows - 1]), "complete", n_rows, evaluations)

@@ -121,7 +121,7 @@ def _turn(omega: Array, h: float) -> Any:
     return math.cos(0.5 * spin * h), *(factor * omega).tolist()
 
 
-def _part(field: str, value: Any) -> Callable[[dict[str, Any]], None]:
+def _set_part_of_torque(field: str, value: Any) -> Callable[[dict[str, Any]], None]:
     return _set("torque", lambda law: {**law, field: value})
 
 
@@ -131,9 +131,9 @@ PLANTS = (
       for order in ("132", "213", "231", "312", "321")),
     IntegratorPlant("torque-missing", lambda asked: _scaled(asked, (0.0, 0.0, 0.0))),
     IntegratorPlant("torque-frozen", _frozen),
-    IntegratorPlant("torque-rate-missing", _part("rate", [0.0] * 3)),
-    IntegratorPlant("torque-sines-missing", _part("sines", [])),
-    IntegratorPlant("torque-cosines-missing", _part("cosines", [])),
+    IntegratorPlant("torque-rate-missing", _set_part_of_torque("rate", [0.0] * 3)),
+    IntegratorPlant("torque-sines-missing", _set_part_of_torque("sines", [])),
+    IntegratorPlant("torque-cosines-missing", _set_part_of_torque("cosines", [])),
     IntegratorPlant("torque-sign", lambda asked: _scaled(asked, (-1.0, -1.0, -1.0))),
     IntegratorPlant("torque-undivided", lambda asked: _scaled(asked, asked["moments"])),
     IntegratorPlant("torque-held", _held, needs_step=True),
@@ -215,7 +215,7 @@ def self_test(
                 judge_problem(ask, problem, due, right, lambda name: "")
             if not right.judged:
                 raise PortError("the integrator refused every scene")
-            names, failed = _seen(right)
+            names, failed = _recognise(right)
             yield control(failed + len(names), _note(names))
             for plant in PLANTS:
                 found = Verdict(command)
@@ -227,7 +227,7 @@ def self_test(
         yield control(1, str(error))
 
 
-def _seen(verdict: Verdict) -> tuple[list[str], int]:
+def _recognise(verdict: Verdict) -> tuple[list[str], int]:
     """Return the names of the recognised faults, and the number of failed checks."""
     failed = sum(not check.passed for check in verdict.checks)
     return [each.name for each in recognised(verdict.judged)], failed
@@ -238,7 +238,7 @@ def _note(names: Sequence[str]) -> str:
 
 
 def _outcome(plant: IntegratorPlant, found: Verdict, has_effect: bool) -> Outcome:
-    names, failed = _seen(found)
+    names, failed = _recognise(found)
     note = _note(names) if has_effect else "the integrator can't have this fault"
     is_named = plant.name in names or not has_effect
     return Outcome(plant.name, _SAYS[plant.name], is_named, failed, note, has_effect)

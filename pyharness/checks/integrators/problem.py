@@ -228,7 +228,7 @@ class Judged:
         least = problem.tolerance(level) if by_tolerance else problem.floor(finest.rounding)
         return max(least, *(each.errors[level] for each in self.convergences))
 
-    def of(self, part: str) -> Convergence | None:
+    def order_of(self, part: str) -> Convergence | None:
         """Return the measured order of omega or of the attitude, if it was computed."""
         return next((each for each in self.convergences if each.part == part), None)
 

@@ -137,7 +137,7 @@ def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
         each.convergences[0].is_higher for each in results if each.problem.kind != "wave"
     )
     for judged in results:
-        omega, attitude = judged.of("omega"), judged.of("attitude")
+        omega, attitude = judged.order_of("omega"), judged.order_of("attitude")
         if judged.finest.control == "tolerance" or judged.lost or omega is None:
             continue
         name = ""

@@ -88,7 +88,7 @@ def _record(problem: str, control: str, each: Convergence) -> dict[str, Any]:
 def _orders(found: Verdict) -> Section:
     rows = []
     for judged in found.judged:
-        parts = [judged.of(part) for part in PARTS]
+        parts = [judged.order_of(part) for part in PARTS]
         row: list[Any] = [judged.problem.name]
         for each in parts:
             row += [None, None] if each is None else [each.order, each.errors[-1]]
@@ -138,7 +138,7 @@ def integrator_picture(found: Verdict) -> Picture:
     what = "tolerance" if found.control == "tolerance" else "step size"
     for part, axes in zip(PARTS, panels, strict=False):
         for judged in found.judged:
-            each = judged.of(part)
+            each = judged.order_of(part)
             if each is None:
                 continue
             shown = np.maximum(np.minimum(each.errors, 1e3), _FLOOR)

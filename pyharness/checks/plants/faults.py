@@ -60,7 +60,7 @@ def changing(change: Change) -> Faulty:
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 
-def on(target: str, change: Change, call: int | None = None) -> Fault:
+def change_result(target: str, change: Change, call: int | None = None) -> Fault:
     """Return a fault that changes the result of `target`, in its call number `call` or in all."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
@@ -85,7 +85,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) ->
     return both
 
 
-def of(name: str, change: Change) -> Change:
+def change_attribute(name: str, change: Change) -> Change:
     """Return a change of the attribute `name` of a result, if it is there."""
 
     def changed(found: Any, size: float) -> Any:

@@ -36,7 +36,7 @@ def _near_separatrix(source: Random) -> Scene:
     spin = source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0)
     omega = _disturbed(source, spin, 10.0 ** -source.uniform(1.0, 12.0))
     axes = source.sample(range(3), 3)
-    return _scene(source, _at(omega, axes), _at(moments, axes), torque=False)
+    return _scene(source, _pick(omega, axes), _pick(moments, axes), torque=False)
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
@@ -115,8 +115,8 @@ def _sensitive(source: Random) -> Scene:
     axes = source.sample(range(3), 3)
     steps = source.randint(10, 60)
     step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
-    moments = _at(body, axes)
-    return Scene("", _at(omega, axes), moments, torque=law, step_size=step_size, steps=steps)
+    moments = _pick(body, axes)
+    return Scene("", _pick(omega, axes), moments, torque=law, step_size=step_size, steps=steps)
 
 
 def _long(source: Random) -> Scene:
@@ -238,7 +238,7 @@ def _times(factor: float, values: Triple) -> Triple:
     return _triple([factor * x for x in values])
 
 
-def _at(values: list[float], axes: list[int]) -> Triple:
+def _pick(values: list[float], axes: list[int]) -> Triple:
     return _triple([values[k] for k in axes])
 
 

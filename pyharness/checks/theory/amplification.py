@@ -38,14 +38,14 @@ class Amplification:
         """Return m, the number of propagated vectors."""
         return len(self.coefficients)
 
-    def at(self, z: Complex) -> Complex:
+    def evaluate(self, z: Complex) -> Complex:
         """Return the matrix for each element of `z`, shape (..., m, m)."""
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
         """Return the spectral radius for each element of `z`."""
-        return np.asarray(np.abs(np.linalg.eigvals(self.at(z))).max(axis=-1))
+        return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
         """Return the matrix without row and column of the step's result, if possible.
@@ -58,7 +58,7 @@ class Amplification:
             return Amplification(self.coefficients[:-1, :-1])
         return self
 
-    def of(self, matrix: Exact) -> Fractions:
+    def exact_matrix(self, matrix: Exact) -> Fractions:
         """Return the exact matrix, of order m n, of a step of n equations x' = J x, from hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)

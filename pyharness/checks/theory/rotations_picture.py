@@ -50,7 +50,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
     axes.fill(np.cos(turn), np.sin(turn), facecolor="#f4f4f4", edgecolor="#909090", linewidth=0.8)
     for name, curve in polhodes(scene.moments):
         style = _SEPARATRIX if name == "separatrix" else _POLHODE
-        x, y, near = _seen(curve, low, toward)
+        x, y, near = _project(curve, low, toward)
         for shown, opacity in ((near >= 0.0, 1.0), (near <= 0.0, _HIDDEN)):
             line = np.where(shown, x, np.nan), np.where(shown, y, np.nan)
             axes.plot(*line, alpha=opacity, **style)
@@ -59,7 +59,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
     for axis, each in enumerate(steady_rotations(free, 0.5).rotations):
         unit = np.array(each.omega)
         for sign in (1.0, -1.0):
-            x, y, near = _seen(sign * unit[None], low, toward)
+            x, y, near = _project(sign * unit[None], low, toward)
             opacity = 1.0 if near[0] > 0.0 else _HIDDEN
             axes.plot(
                 x, y, marker="o", markersize=6.0, color="black", alpha=opacity,
@@ -78,7 +78,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
     return rows
 
 
-def _seen(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
+def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
     """Return points' coordinates to the right, upwards, and to the viewer (a unit vector)."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)

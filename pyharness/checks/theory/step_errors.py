@@ -99,7 +99,7 @@ class Forecaster:
         self._missed = cache(self._series)
         self._wandering = self._of_one_step()
 
-    def at(self, steps: int) -> Forecast:
+    def predict(self, steps: int) -> Forecast:
         """Return the predicted errors of `steps` equal steps."""
         here = self._path
         h = float(here.times[-1]) / steps
@@ -133,7 +133,7 @@ class Forecaster:
         low = 1
         while high > low + 1:
             middle = min(max(round(math.sqrt(low * high)), low + 1), high - 1)
-            found = self.at(middle)
+            found = self.predict(middle)
             is_above = found.truncation > found.wandering
             low, high = (middle, high) if is_above else (low, middle)
         return time / high

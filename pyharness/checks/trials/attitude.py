@@ -150,7 +150,7 @@ def _attempts() -> Iterator[Attempt]:
         for method in ("closed-form", "taylor"):
             own = replace(name, subject=method)
             for what, each in TURNS.items():
-                yield Attempt(replace(own, circumstance=what), partial(_turned, each))
+                yield Attempt(replace(own, circumstance=what), partial(_check_rotated, each))
             yield Attempt(replace(own, circumstance="back"), _back)
     for sequence in SEQUENCES:
         for power in range(1, 18):
@@ -162,17 +162,19 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
     # Quaternions are compared with their signs, since the sign is continuous in time.
-    yield judge(name.of("angle"), tried, truth, POLICY)
+    yield judge(name.with_quantity("angle"), tried, truth, POLICY)
     answer = tried.answer
     if answer.attitude is None:
         return
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
-    yield name.of("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
+    yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
         # An error of the angle changes the angular momentum by at most that angle. The moments
         # multiply omega, and the rotation takes two products.
         limit = ATTITUDE + _omega_limit(scene)
-        yield name.of("momentum").bounded(_momentum_drift(scene, answer), limit, CLOSED_FORM)
+        yield name.with_quantity("momentum").bounded(
+            _momentum_drift(scene, answer), limit, CLOSED_FORM
+        )
 
 
 def _omega_limit(scene: Scene) -> float:
@@ -242,7 +244,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         before, count = found, 2 * count
 
 
-def _turned(turn: Turn, name: Name) -> Check:
+def _check_rotated(turn: Turn, name: Name) -> Check:
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     plain, other = (
         solve(each, [time], method, tolerance, attitude=True).attitude

@@ -110,7 +110,7 @@ def _attempts() -> Iterator[Attempt]:
                 continue
             for tolerance in _tolerances(method, scene, time):
                 ways: dict[str, Callable[[float, float, Name], Check]]
-                ways = {what: partial(_turned, each) for what, each in SYMMETRIES.items()}
+                ways = {what: partial(_check_rotated, each) for what, each in SYMMETRIES.items()}
                 ways["back"] = _back
                 if method not in FIXED_STEP:
                     ways["split"] = _split
@@ -140,7 +140,7 @@ def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
     return run_method(name, scene, time, tolerance).omega
 
 
-def _turned(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
+def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     try:
         plain = end(scene, time, method, tolerance)

@@ -153,11 +153,15 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
         for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
             note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
-            yield name.of(f"{what}/{revolutions:.0f}").bounded(value, limits[k], WALK, note)
+            yield name.with_quantity(f"{what}/{revolutions:.0f}").bounded(
+                value, limits[k], WALK, note
+            )
         fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
         due = LAWS[what] + (0.5 if integrator.preference else 0.0)
-        yield name.of(f"{what}/power").bounded(power, due + _HALFWAY, POWER, f"due {due}")
+        yield name.with_quantity(f"{what}/power").bounded(
+            power, due + _HALFWAY, POWER, f"due {due}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +246,7 @@ def _closed_form(name: Name) -> Iterator[Check]:
         gain = body.turn if what == "phase" else body.gains[what]
         limit = _CLOSED_FORM * gain + (0.0 if what == "phase" else 4.0 * brouwer.ROUNDING)
         largest = max(abs(each[what]) for each in found)
-        yield name.of(what).bounded(largest, limit, CLOSED_FORM, "at any time")
+        yield name.with_quantity(what).bounded(largest, limit, CLOSED_FORM, "at any time")
 
 
 def _scipy(name: Name) -> Iterator[Check]:
@@ -267,7 +271,7 @@ def _program(listing: Listing, name: Name) -> Iterator[Check]:
 def _described(name: Name, scene: Scene, time: float, row: Array) -> Iterator[Check]:
     for what, error in brouwer.errors(scene, orbit_of(name.circumstance), time, row).items():
         lost = what == "phase" and abs(error) > _LOST
-        yield name.of(what).described(error, "lost" if lost else "")
+        yield name.with_quantity(what).described(error, "lost" if lost else "")
 
 
 TRIAL = Trial(

@@ -45,18 +45,20 @@ def _attempts() -> Iterator[Attempt]:
 def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
     found = solved(program, step)
     expected = SINGULAR if step <= singular_below(program) else 0
-    yield name.of("ier").bounded(abs(found.ier - expected), 0.0, SINGULARITY, f"IER = {found.ier}")
-    yield name.of("bits").bounded(found.differing, 0.0, BITS)
-    yield name.of("condition").described(found.condition, _condition_note(found))
+    yield name.with_quantity("ier").bounded(
+        abs(found.ier - expected), 0.0, SINGULARITY, f"IER = {found.ier}"
+    )
+    yield name.with_quantity("bits").bounded(found.differing, 0.0, BITS)
+    yield name.with_quantity("condition").described(found.condition, _condition_note(found))
     if found.ier == SINGULAR:
         return
     rows = ", ".join(str(row + 1) for row in found.order)
-    yield name.of("pivots").bounded(*found.pivoting, PIVOTS, f"rows {rows}")
-    yield name.of("residual").bounded(found.residual, 1.0, HIGHAM)
-    yield name.of("forward").bounded(found.forward, 1.0, HIGHAM)
+    yield name.with_quantity("pivots").bounded(*found.pivoting, PIVOTS, f"rows {rows}")
+    yield name.with_quantity("residual").bounded(found.residual, 1.0, HIGHAM)
+    yield name.with_quantity("forward").bounded(found.forward, 1.0, HIGHAM)
     note = f"{found.increment_error:.1e} of the step"
-    yield name.of("increment").bounded(found.increment, 1.0, HIGHAM, note)
-    yield name.of("numpy").described(found.yardstick, f"ours {found.forward:.2g}")
+    yield name.with_quantity("increment").bounded(found.increment, 1.0, HIGHAM, note)
+    yield name.with_quantity("numpy").described(found.yardstick, f"ours {found.forward:.2g}")
 
 
 def _condition_note(found: Solved) -> str:

@@ -47,10 +47,10 @@ def _attempts() -> Iterator[Attempt]:
     halves = [subset("runge-kutta", keep=[name]) for name in ("stage-base", "base-not-restored")]
     for listing in (*LISTINGS, *halves):
         label = "-".join(sorted(listing.defects)) if listing in halves else listing.label
-        yield Attempt(named("regions", listing.program, label), partial(_parts, listing))
+        yield Attempt(named("regions", listing.program, label), partial(_attempt, listing))
 
 
-def _parts(listing: Listing, name: Name) -> Iterator[Attempt]:
+def _attempt(listing: Listing, name: Name) -> Iterator[Attempt]:
     yield Attempt(replace(name, setting="polynomial"), partial(_polynomial, listing))
     for kind, (coefficients, omega) in _STEADY.items():
         for step in _STEPS:

@@ -65,7 +65,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         found, note = error(count)
         if before:
             return name.described(found, note)
-        due = _forecaster(case, method).at(count)
+        due = _forecaster(case, method).predict(count)
         said = f"truncation {due.truncation:.1e}, rounding below {due.rounding:.0e}"
         note = f"{said}{', ' if note else ''}{note}"
         if math.isfinite(due.bound):
@@ -81,7 +81,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
     if not gauss:
-        yield Attempt(place.of("diverges"), partial(_divergence, case, listing))
+        yield Attempt(place.with_quantity("diverges"), partial(_divergence, case, listing))
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
@@ -92,7 +92,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
         # At smaller steps the matrix is declared singular.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
-    ruled = [c for c in counts if 0.5 < error(c) / forecaster.at(c).truncation < 2.0]
+    ruled = [c for c in counts if 0.5 < error(c) / forecaster.predict(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
     if found > TIME / counts[-1]:
         # The crossing is between this step and the next smaller one: take the middle on a

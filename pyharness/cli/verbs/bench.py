@@ -7,7 +7,7 @@ from time import process_time
 from typing import TypeVar
 
 from pyharness.bench import report as reports
-from pyharness.bench.contenders import Contender, SceneContender, own
+from pyharness.bench.contenders import Contender, SceneContender, list_own_contenders
 from pyharness.bench.measure import Refusal, measure, workloads
 from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
@@ -74,7 +74,9 @@ def run(options: argparse.Namespace) -> int:
         horizon = shared.positive(options.horizon, "--horizon", 0.0)
         if horizon > _LONGEST:
             raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
-    methods = chosen(own(), options.methods, "method", "--methods", options.attitude)
+    methods = chosen(
+        list_own_contenders(), options.methods, "method", "--methods", options.attitude
+    )
     others = chosen(peers(), options.peers, "peer", "--peers", options.attitude)
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)

@@ -55,7 +55,10 @@ def atlas_report(atlas: Atlas) -> Report:
     if len(atlas.choices()) > 1:
         sections += [
             ["Readings and steps:", _by_choice(atlas)],
-            ["Starts whose verdict another reading turns, or other steps:", _turned(atlas)],
+            [
+                "Starts whose verdict another reading turns, or other steps:",
+                _percentage_turned(atlas),
+            ],
         ]
     return Report(
         "claims",
@@ -153,7 +156,7 @@ def _by_choice(atlas: Atlas) -> Table:
     return Table(columns, rows)
 
 
-def _turned(atlas: Atlas) -> Table:
+def _percentage_turned(atlas: Atlas) -> Table:
     """Return the percentage of starts from which one other choice changes a verdict."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]

@@ -15,6 +15,7 @@ ARGS ?=
 OUT ?= build/edition
 
 BIN := .venv/bin
+PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 FORTRAN := $(wildcard fortran/*.f90 fortran/*/*.f90)
 # What fypp wrote: the tools for Fortran do not read its input.
 WRITTEN := build/cp*/*_binary*.f90 build/cp*/words.f90
@@ -80,14 +81,16 @@ format: .venv/ready-to-test
 clean:
 	rm -rf .venv build dist
 
-# The environment is made anew when its ingredients change, or other tools are requested.
+# The environment is made anew when its ingredients change, or other tools are requested. uv takes a
+# fifth of pip's time, where it is available.
 .venv/ready: pyproject.toml meson.build .ci/setup .venv/tools
 	@.ci/setup "$(PYTHON)" "$(FC)"
 	@echo "$(PYTHON) $(FC)" > .venv/tools
 	@touch $@
 
 .venv/ready-to-test: .venv/ready
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test
+	@$(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --group test || \
+	  $(PIP) --group test
 	@touch $@
 
 .venv/tools: FORCE

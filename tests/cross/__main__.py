@@ -1,7 +1,8 @@
 """`make cross-check`: make builds, compare bits, run their tests; exit status 1 on faults.
 
 Without arguments: the build with run-time checks, and one by another compiler, or by other options
-where there is none. `--all` makes every build, and those with planted faults.
+where there is none; few tests, unless the kernels differ from the commit at which all passed.
+`--all` makes every build, and those with planted faults.
 """
 
 import json
@@ -20,9 +21,11 @@ from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
 from pyharness.thesis.compiled_in_word import compiled_words
 from pyharness.views.render import render
+from tests.changed import PASSED, changed
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag
 from tests.cross.comparison import CHECKOUT, compared, inside
 from tests.instruction_sets import fuses_here
+from tests.tiers import FAST
 
 FOLDER = ROOT / "build" / "cross"
 # Tests of the kernels that are compared with the truth, not bit for bit.
@@ -36,7 +39,6 @@ MODERN = (
 # Tests that call the kernels, each in its own way. What the other tests do with the results is the
 # same in every build.
 CALLING = (
-    "tests/campaigns/fuzz",
     "tests/engine",
     *(f"tests/model/test_{name}.py" for name in ("attitude", "conversions", "effort", "values")),
     "tests/thesis",
@@ -53,6 +55,22 @@ CALLING = (
             "thesis/test_operations", "thesis/test_words",
         )
     ),
+)  # fmt: skip
+# Tests that together enter every compiled procedure that any test enters, as `make mutate` records.
+ENTERING = (
+    *(
+        f"tests/engine/test_{name}.py"
+        for name in (
+            "attitude_error", "closed_form", "estimates", "many_alone", "many_details", "prepared",
+            "quick", "quick_growth", "saturation", "stepper", "tape_lanes", "term_motions", "work",
+        )
+    ),
+    *(f"tests/engine/test_within_tolerance.py::{name}" for name in (
+        "test_every_instruction_set", "test_many_bodies_side_by_side",
+        "test_many_bodies_under_one_torque",
+    )),
+    *(f"tests/model/test_{name}.py" for name in ("conversions", "effort", "shown")),
+    *(f"tests/thesis/test_{name}.py" for name in ("compiled_words", "linear_solver", "many")),
 )  # fmt: skip
 # Recursion is not checked: the entries release the lock, so that two threads may be in one entry.
 # An array temporary is no fault, and 400 000 lines report them.
@@ -81,8 +99,13 @@ def main() -> int:
     if chosen == ["--all"]:
         chosen = names
     elif not sys.argv[1:]:
-        fast = ("-m", "not campaign")
-        builds = [replace(each, tests=each.tests and (*each.tests, *fast)) for each in builds]
+        paths = changed(PASSED.read_text().strip())
+        is_same = paths is not None and not any(path.startswith("fortran/") for path in paths)
+        builds = [
+            replace(each, tests=ENTERING if is_same and each.checked else each.tests)
+            for each in builds
+        ]
+        builds = [replace(each, tests=each.tests and (*each.tests, "-m", FAST)) for each in builds]
     for name in chosen:
         if name not in names:
             print(f"cross-check: no build '{name}'; skipped: {skipped}", file=sys.stderr)

@@ -111,3 +111,12 @@ def test_flow_between_nodes_is_that_of_the_middle() -> None:
 
     errors = [np.abs(flow(count) - flow(16 * count)).max() for count in (40, 80)]
     assert errors[0] > 3.5 * errors[1]
+
+
+def test_the_limit_counts_the_steps_that_round_alone() -> None:
+    found = Conditioning(
+        amplification=3.0, rounding=0.25, storing=0.5, unamplified=0.0, largest=1.0
+    )
+    assert (found.limit(0.125), found.limit(0.125, 2.0)) == (0.625, 1.625)
+    assert found.limit(100.0) == 2.0
+    assert replace(found, rounding=math.nan).limit(0.0) == 0.0

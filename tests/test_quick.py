@@ -34,6 +34,7 @@ def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
     assert [Path(each).stem for each in nearest([path], TESTS)] == wanted
 
 
+@pytest.mark.campaign
 def test_a_module_has_the_tests_that_import_it() -> None:
     found = nearest(["pyharness/engine/rescaled.py"], sources())
     assert found[0] == "tests/checks/scenes/test_rescaled.py"

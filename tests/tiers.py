@@ -15,14 +15,14 @@ _USUAL = 0.045  # s
 # A test that imports packages first is not judged, because another would do it in another order.
 _MODULES = 20
 _WEEKLY = Path(__file__).parent / "campaigns"
-_MARK = "\npytestmark = pytest.mark.campaign\n"
+MARK = "\npytestmark = pytest.mark.campaign\n"
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave out of the fast tier, without importing them, files of campaigns alone."""
     if config.option.markexpr != FAST:
         return None
-    is_marked = collection_path.suffix == ".py" and _MARK in collection_path.read_text()
+    is_marked = collection_path.suffix == ".py" and MARK in collection_path.read_text()
     return True if is_marked or _WEEKLY in (collection_path, *collection_path.parents) else None
 
 

@@ -12,6 +12,7 @@ from threading import Thread
 
 import pytest
 
+pytestmark = pytest.mark.campaign
 _COLUMNS = 60
 
 
@@ -40,7 +41,6 @@ def _on_a_terminal(*arguments: str) -> tuple[str, str]:
     return out.decode(), b"".join(parts).decode()
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("command", ["verify --only orders,schemes", "stress --only regions"])
 def test_bar_is_within_the_terminal_and_removed(command: str) -> None:
     out, seen = _on_a_terminal(*command.split())
@@ -54,7 +54,6 @@ def test_bar_is_within_the_terminal_and_removed(command: str) -> None:
     assert re.search(r"\r *\r$", seen)
 
 
-@pytest.mark.campaign
 def test_nothing_is_shown_without_a_terminal() -> None:
     command = [sys.executable, "-m", "pyharness", "verify", "--only", "orders"]
     found = subprocess.run(command, capture_output=True, check=True)

@@ -40,6 +40,7 @@ from tests.conftest import Printed
 from tests.json_reference import schema_of
 from tests.test_packaging import ROOT
 
+pytestmark = pytest.mark.campaign
 Package = dict[str, bytes]
 GUIDE = ROOT / "docs/how-to/data-package.md"
 ARTICLE = ROOT / "docs/article/article.md"
@@ -65,7 +66,6 @@ def _rows(package: Package, path: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(package[path].decode())))
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_deck_is_made_of_its_table(package: Package, program: str, printed: Printed) -> None:
     rows = _rows(package, f"cards/{program}.csv")
@@ -73,7 +73,6 @@ def test_a_deck_is_made_of_its_table(package: Package, program: str, printed: Pr
     assert printed(f"deck --program {program}") == "".join(lines)
 
 
-@pytest.mark.campaign
 def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: Printed) -> None:
     found = _json(package, "claims.json")["claims"]
     table = printed("claims").partition("Number of verdicts by kind")[2].splitlines()
@@ -93,7 +92,6 @@ def test_verdicts_are_counted_from_the_package_alone(package: Package, printed: 
         assert row.split() == " ".join([kind, str(len(of_kind)), *told]).split()
 
 
-@pytest.mark.campaign
 def test_outputs_of_verbs_are_in_the_package(package: Package, printed: Printed) -> None:
     assert package["claims.json"].decode() == printed("claims --format json")
     assert package["apparatus.json"].decode() == printed("defects --format json")
@@ -184,7 +182,6 @@ def test_the_crate_describes_every_file(package: Package) -> None:
             check(value)
 
 
-@pytest.mark.campaign
 def test_nothing_depends_on_the_time_or_on_settings(package: Package) -> None:
     """Another process with other settings writes the same bytes, and without optional packages."""
     script = (
@@ -315,7 +312,6 @@ def test_the_command_writes_the_package(
     assert (folder / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.campaign
 def test_the_examples_of_the_guide_run(
     package: Package, tmp_path: Path, printed: Printed, monkeypatch: pytest.MonkeyPatch
 ) -> None:

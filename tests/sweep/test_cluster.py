@@ -16,6 +16,7 @@ from tests.sweep.sweeps import files
 
 pytest.importorskip("distributed")
 xarray = pytest.importorskip("xarray")
+pytestmark = pytest.mark.campaign
 ROOT = Path(__file__).parents[2]
 SCRIPTS = ROOT / "docs/how-to/cluster"
 # Slurm starts a program once for each task. Here there are three.
@@ -43,7 +44,6 @@ def run(folder: Path, text: str, **more: str) -> None:
     assert found.returncode == 0, found.stderr
 
 
-@pytest.mark.campaign
 def test_parts_of_an_array_are_joined(tmp_path: Path) -> None:
     shutil.copy(SCRIPTS / "parts.toml.in", tmp_path)
     for part in range(2):
@@ -56,7 +56,6 @@ def test_parts_of_an_array_are_joined(tmp_path: Path) -> None:
     assert 0.0 < float(found["tilted-time"].mean()) < 30.0
 
 
-@pytest.mark.campaign
 def test_cluster_in_one_job_writes_the_bytes_of_this_process(tmp_path: Path) -> None:
     text = (SCRIPTS / "parts.toml.in").read_text().replace("PART", "7")
     (tmp_path / "sweep.toml").write_text(text)

@@ -240,3 +240,13 @@ def test_dense_output_and_events_use_the_method() -> None:
     truth = solve(SCENE, found.t_events[0], "taylor").omega
     assert len(truth) > 5
     assert np.abs(truth[:, 0]).max() < 1e-8
+
+
+def test_sizes_of_a_point_have_its_units() -> None:
+    coordinates = Coordinates.from_omega(SCENE.euler_coefficients, SCENE.omega)
+    assert coordinates is not None
+    slow, fast = (
+        coordinates.scale(coordinates.point(tuple(factor * np.array(SCENE.omega))))
+        for factor in (1.0, 4.0)
+    )
+    assert np.array_equal(fast / slow, [4.0, 4.0, 16.0, 0.25])

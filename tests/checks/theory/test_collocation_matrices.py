@@ -3,9 +3,11 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.linalg import lu
 
-from pyharness.checks.theory.collocation_matrices import solved
+from pyharness.checks.theory.collocation_matrices import PARTS, solved, solver_roundings
 from pyharness.model import extension
 
 
@@ -40,3 +42,17 @@ def test_a_theorem_bounds_errors_only_where_its_hypotheses_hold(
         monkeypatch.setattr(extension, "extension", lambda change=change: Wrong(change))
         found = solved("four-term", 1e-2)
         assert (found.residual, found.forward, found.increment) == (math.inf,) * 3
+
+
+@pytest.mark.parametrize("program", PARTS)
+def test_bounds_follow_from_the_factors_that_scipy_finds(program: str) -> None:
+    step = 1e-3
+    times = step * np.array([float(part) for part in PARTS[program]])
+    order = np.arange(len(times))
+    matrix = (order + 1) * times[:, None] ** order  # of the derivatives of t, t**2, ...
+    exchanged, lower, upper = lu(matrix)
+    reach = abs(np.linalg.inv(matrix))
+    sizes = reach @ exchanged @ abs(lower) @ abs(upper)
+    powers = 3 * len(matrix) * step**order
+    wanted = powers @ sizes[:, 0], powers @ (sizes @ reach).sum(axis=1)
+    assert solver_roundings(program) == pytest.approx(wanted, rel=1e-9)

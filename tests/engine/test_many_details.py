@@ -1,16 +1,18 @@
 """Events and sensitivities of many bodies, against those of single calls of `solve`."""
 
+import gc
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, solve_many
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, prepare, solve, solve_many
 from pyharness.engine.many_space import scene_of_row
 from pyharness.events import crosses, flip
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.codes import Statuses
+from pyharness.model.extension import extension
 from pyharness.torques import damping
 
 MANY: Any = solve_many  # whose results may lack events
@@ -155,3 +157,10 @@ def test_mistakes_are_refused_before_any_body_is_solved(given: dict[str, Any]) -
 def test_bar_counts_the_bodies_again(capsys: pytest.CaptureFixture[str]) -> None:
     MANY(TOP, 1.0, omega0=STARTS, events=flip(1), progress=True)
     assert capsys.readouterr().err.count("5.00/5.00") >= 2
+
+
+def test_the_garbage_collector_sees_what_the_compiled_entry_refers_to() -> None:
+    entry = prepare(Scene("", (1.0, 0.0, 0.0), moments=(3.0, 2.0, 1.0)), "taylor", 1e-9).many
+    kernel, fallback = gc.get_referents(entry)
+    assert kernel is extension().solve_packed_many
+    assert callable(fallback)

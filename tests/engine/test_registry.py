@@ -20,6 +20,7 @@ def test_properties_of_the_registry_are_those_of_its_methods() -> None:
         assert method.name == name
         assert re.search(r"[12][09]\d\d|\.f90|solve_ivp|pyharness\.", method.source), name
         assert method.is_fixed_step == (method.evaluations > 0) == (method.finest == 1.0)
+        assert (method.order > 0) == (method.is_fixed_step or name.startswith("gauss"))
     assert [name for name in REGISTRY if name not in METHODS] == ["quick"]
 
 

@@ -1,1 +1,1 @@
-"""Methods that solve a scene."""
+"""Solution of scenes: methods, prepared solvers, events, sensitivities and torque terms."""

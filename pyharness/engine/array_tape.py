@@ -1,4 +1,4 @@
-"""Evaluation of a tape for many states in NumPy's arrays."""
+"""Evaluation of a tape, the recorded operations of a torque, for arrays of states."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -24,16 +24,16 @@ ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.tanh, np.sin, np.c
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
-    """Return the eight inputs of a tape, shape (n,), from times and states, (n, 3) or (n, 7)."""
+    """Return the eight inputs of a tape, each of shape (n,); states are (n, 3) or (n, 7)."""
     columns = [times, *state.T]
     return columns + [np.zeros(len(times))] * (N_INPUTS - len(columns))
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return the outputs of a tape, shape (n, outputs), not finite where it is singular."""
+    """Return a tape's outputs, shape (n, m) for m outputs; not finite where it is singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
-    # An output that is a constant is a number.
+    # A constant output is a number, without a shape.
     outputs = np.stack([np.broadcast_to(each, len(times)) for each in found], axis=1)
     for row in np.flatnonzero(~np.isfinite(outputs).all(axis=1)):
         with suppress(ZeroDivisionError):

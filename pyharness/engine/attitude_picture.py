@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ANIMATIONS = ("gif", "html")
-_COLORS = ("#c1272d", "#0a7d3c", "#1f4e9e")  # of the three axes of the body
+_COLORS = ("#c1272d", "#0a7d3c", "#1f4e9e")  # of body axes 1, 2, 3
 _PAUSE = 0.05  # s between frames; a GIF stores it in hundredths of a second
-# Limits of the length of an animation (s): between them it runs in true time.
+# Shortest and longest animation (s); between them it runs in true time.
 _SHORTEST, _LONGEST = 2.0, 10.0
 _EDGES = [
     (a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1
-]  # of a brick, as pairs of corners; the bits of a corner's number are the signs of its coordinates
+]  # of a brick, as pairs of corners; bit k of a corner's number is the sign of coordinate k
 
 
 def draw_sphere(axes: Any, found: Trajectory) -> None:
-    """Draw paths of the body's axes (to dots) and of omega's direction (to a cross) in space."""
+    """Draw the paths in space of the body axes (ends: dots) and omega's direction (end: cross)."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -55,7 +55,7 @@ def _frame(axes: Any) -> None:
 
 
 def check_animation(path: str, scene: Scene) -> None:
-    """Raise InputError unless `path` ends in .gif or .html, and a brick can have the moments."""
+    """Raise InputError unless `path` ends in .gif or .html, and a brick has the scene's moments."""
     if _form(path) not in ANIMATIONS:
         raise InputError(f"--animate '{path}': unknown format; allowed: .gif, .html")
     if scene.changing is not None:
@@ -76,9 +76,10 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return a GIF or HTML file, by `path`, of a brick with the scene's moments up to `end` (s).
+    """Return the bytes of an animated brick, GIF or HTML by the ending of `path`, to `end` (s).
 
-    A motion of 2 to 10 s is in true time; others are stretched to 2 s or compressed to 10 s.
+    The brick has the scene's moments. Motions below 2 s are stretched to 2 s, and those above 10 s
+    are compressed to 10 s. Raise InputError if the motion overflows before `end`.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -116,7 +117,7 @@ def animation(scene: Scene, method: str, tolerance: float | None, end: float, pa
 
 
 def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: float) -> Any:
-    """Return the function that draws a frame, a row of `found`."""
+    """Return the function that draws row n of `found` and returns the changed artists."""
     axes: Any = figure.add_axes((0.02, 0.02, 0.96, 0.86), projection="3d")
     _frame(axes)
     assert found.attitude is not None
@@ -145,7 +146,7 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners, (8, 3), of a brick with sides of at least 1 % of the longest."""
+    """Return the corners of a brick, (8, 3); a side has at least 1 % of the longest."""
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -1,10 +1,11 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
-A weak torque changes the periodic torque-free motion slowly, here in macro-steps of very many
-revolutions. The stroboscopic solution is that of Calvo, Chartier, Murua and Sanz-Serna 2011,
-Numerical stroboscopic averaging for ODEs and DAEs, Applied Numerical Mathematics 61; the two scales
-are those of Chartier, Crouseilles, Lemou and Mehats 2015, Uniformly accurate numerical schemes for
-highly oscillatory Klein-Gordon and nonlinear Schroedinger equations, Numerische Mathematik 129.
+A weak torque changes the periodic torque-free motion slowly. One macro-step computes the change
+over very many revolutions. The stroboscopic solution is that of Calvo, Chartier, Murua and
+Sanz-Serna 2011, Numerical stroboscopic averaging for ODEs and DAEs, Applied Numerical Mathematics
+61; the two scales are those of Chartier, Crouseilles, Lemou and Mehats 2015, Uniformly accurate
+numerical schemes for highly oscillatory Klein-Gordon and nonlinear Schroedinger equations,
+Numerische Mathematik 129.
 """
 
 import math
@@ -28,23 +29,23 @@ NODES = 20  # in a macro-step
 _TURN = 2.0 * math.pi
 _FEWEST = 100  # revolutions in a macro-step
 _MOST_STEPS = 3000  # some ten seconds
-# A macro-step ends this fraction, and these revolutions, behind the last time, because the time at
+# The last macro-step exceeds the rest by this fraction and these revolutions, because the time at
 # its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
 # Factors on the length of a macro-step after a failure, and on the length of the next one after a
 # success at the first and at a later attempt.
 _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
-# The first guess of the length of a macro-step, relative to the scale on which the motion changes.
+# First length of a macro-step, relative to the angle over which the motion changes.
 _RELATIVE = 1.3
-_APPROACH = 2.0  # shorter by this factor if the motion approaches the separatrix
-_WAVE = 4.0  # radians of a wave that are like a relative change by 1
-# The oscillation has the relative error exp(-_DIGITS / 2), and its means exp(-_DIGITS).
+_APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
+_WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
+# With enough angles, the oscillation has the relative error exp(-_DIGITS / 2), means exp(-_DIGITS).
 _DIGITS = 56.0
 _FEWEST_ANGLES, _MOST_ANGLES = 16, 512
-# Highest frequency of a wave of the torque, relative to the frequency of the motion.
+# Highest frequency of a torque wave, relative to the frequency of the motion.
 _FASTEST = 0.02
-# Relative error of a macro-step that is accepted: this fraction of the tolerance, but at least the
-# second number, which allows for rounding errors.
+# Largest relative error of a macro-step: _SHARE of the tolerance, but at least _FLOOR, because of
+# rounding errors.
 _SHARE, _FLOOR = 0.05, 1e-15
 _ROWS_AT_ONCE = 1000
 _LARGEST_PHASE = 1e15  # rad
@@ -55,11 +56,11 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `steps` are macro-steps; `error` is measured with more nodes and a higher order of averaging.
-    Raise InputError for an opaque torque; if torque-free omega would not oscillate about a
-    principal axis, or is near the separatrix; if the torque is not weak, or may be in resonance; if
-    a recorded torque is more than a polynomial in omega and time, and waves, so that it may change
-    within a part of a macro-step; and if the work limit is exceeded.
+    `steps` of the result counts macro-steps; `error` is measured with more nodes and a higher order
+    of averaging. Raise InputError for an opaque torque; if omega without torque would not
+    circle a principal axis, as for a sphere, or is near the separatrix; if the torque is not weak,
+    or may be in resonance; if a recorded torque is not a polynomial in omega and time, and waves,
+    because it may change within a macro-step; and if the work limit is exceeded.
     """
     coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -67,7 +68,7 @@ def averaged(
             "averaged: without torque, omega would not rotate about a principal axis; allowed: a "
             "body that is no sphere, and a motion that is not on the separatrix"
         )
-    # A point that is not finite is refused where the next macro-step begins.
+    # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
         return _Run(scene, coordinates, times, tolerance, effort).trajectory()
 
@@ -151,7 +152,7 @@ class _Run:
         )
 
     def _pace(self, point: Array) -> float:
-        """Return the frequency of the motion (rad/s), roughly."""
+        """Return the approximate frequency of the motion (rad/s)."""
         low = float(point[2])
         high = low + self.coordinates.bend * float(point[0] * point[0] + point[1] * point[1])
         # One step of the arithmetic-geometric mean of the least and the largest |w_a|.
@@ -159,15 +160,15 @@ class _Run:
         return self.coordinates.rate * math.sqrt(0.5 * (low + high) * math.sqrt(low * high))
 
     def _forecast(self) -> float:
-        """Return a length (rad) of the next macro-step."""
+        """Return a first guess of the length (rad) of the next macro-step."""
         point = self.point
         slopes = self.forward * MacroStep.mean_slopes(
             self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
         )
         square = float(point[0] * point[0] + point[1] * point[1])
         low = float(min(point[2], point[2] + self.coordinates.bend * square))
-        # Relative change per radian: of the distance from the separatrix, of x and y, and of the
-        # torque's waves.
+        # Relative changes per radian of the distance from the separatrix, of x and y, and of the
+        # torque waves.
         approach = float(slopes[2]) / low
         change = max(
             approach,
@@ -186,7 +187,7 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the longest possible next macro-step, or raise TimedError."""
+        """Return the next macro-step, as long as accuracy allows, or raise TimedError."""
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))
         length = self._forecast()
@@ -229,8 +230,8 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles that this squared modulus needs."""
-        # The oscillation has singularities at the angles i times this width.
+        """Return the number of angles for a squared modulus; raise TimedError near 1."""
+        # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:
             raise TimedError(
@@ -247,6 +248,6 @@ class _Run:
         return bool(is_slow and late <= max(_FLOOR * self.phase, allowed))
 
     def _relative(self, step: MacroStep) -> Array:
-        """Return the relative error of slow components, and of the phase (rad)."""
+        """Return the relative error of the slow components, and the error of the phase (rad)."""
         slow = np.abs(step.error[:3]).max(axis=1) / step.scale[:3]
         return np.array([slow.max(), np.abs(step.error[3]).max() * self.pace])

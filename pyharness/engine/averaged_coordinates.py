@@ -1,16 +1,16 @@
 """Coordinates of omega that a weak torque changes slowly, for the method `averaged`.
 
-The body rotates about principal axis a, and b, c are the next axes in cyclic order. Euler's
-equations are b' = B w_c w_a + n_b, and so on, with n the torque over the moment. The coefficients
-of b and c are P and Q, of opposite signs, and r that of a. With x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
+The body rotates about principal axis a, and b, c are the next axes in cyclic order. In Euler's
+equations w_b' = P w_c w_a + n_b, and so on, n is the torque over the moment, and the coefficients
+P and Q of b and c have opposite signs. With x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
 w_c, u = w_a^2 and the angle psi, psi' = |PQ|^(1/2) |w_a|, the motion without torque is exactly 2
 pi-periodic in psi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
 Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
-torque changes slowly. They need no elliptic function, and are regular where the body rotates
-exactly about axis a. They end at the separatrix, where w_a reaches 0.
+torque changes slowly. These coordinates need no elliptic function, and are regular where the body
+rotates exactly about axis a. They end at the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -22,12 +22,12 @@ import numpy as np
 from pyharness.model.array_type import Array
 from pyharness.model.scene import Triple
 
-# The torque over the moments (1/s2), three numbers or arrays, at a time (s) and three omegas.
+# Function of time (s) and three omegas (rad/s) that returns the torque over the moments (1/s2).
 Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """Coordinates about one axis; a point is (p1, p2, p3, t), t the time (s)."""
+    """The constants of the coordinates about one axis; a point is (p1, p2, p3, t), t in s."""
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x over w_b
@@ -38,7 +38,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def from_omega(cls, coefficients: Triple, omega: Triple) -> Self | None:
-        """Return the coordinates from omega (rad/s), or None on a separatrix."""
+        """Return the coordinates for an omega (rad/s); None for a sphere, or on a separatrix."""
         found: list[tuple[float, Self]] = []
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
@@ -72,19 +72,19 @@ class Coordinates(NamedTuple):
         return found
 
     def scale(self, point: Array) -> Array:
-        """Return the sizes of a point's components, for relative errors."""
+        """Return the magnitudes of a point's components, to which errors are relative."""
         size = math.sqrt(abs(point[2]) + point[0] * point[0] + point[1] * point[1])
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return the largest component of omega (rad/s) on the orbits of points."""
+        """Return an upper bound of the components of omega (rad/s) on the orbits of points."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
         return math.sqrt(max(float(on_axis), float(on_others)))
 
     def by_omega(self, omega: Array, cosine: Array, sine: Array) -> Array:
-        """Return the derivatives of (p1, p2, p3) by omega, (3, n), at n fixed psi, (n, 3, 3)."""
+        """Return the derivatives of (p1, p2, p3) by omega, (n, 3, 3), at n fixed angles psi."""
         b, c, a = self.axes
         found = np.zeros((len(cosine), 3, 3))
         found[:, 0, b], found[:, 0, c] = cosine * self.on_b, sine * self.on_c
@@ -94,7 +94,7 @@ class Coordinates(NamedTuple):
         return found
 
     def omega(self, point: Array, cosine: Array, sine: Array) -> tuple[list[Array], Array, Array]:
-        """Return omega (rad/s), y and |w_a| at a point."""
+        """Return omega (rad/s), y and |w_a| at a point and the angle of this cosine and sine."""
         y = point[0] * sine + point[1] * cosine
         fast = np.sqrt(point[2] + self.bend * y * y)
         b, c, a = self.axes
@@ -107,7 +107,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return the derivatives of a point by psi; `time` and the subtracted `mean` are in s."""
+        """Return the derivatives of a point by psi; `mean` (s) is subtracted from that of t."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)

@@ -10,23 +10,23 @@ from pyharness.engine.averaged_coordinates import Coordinates
 from pyharness.model.array_type import Array
 from pyharness.model.scene import Triple
 
-_PHASES = 8  # angles in a revolution at which perturbations start
+_PHASES = 8  # angles psi, in a revolution, of initial perturbations
 _MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
 
 
 class Done(NamedTuple):
-    """A macro-step that is complete."""
+    """A completed macro-step."""
 
-    start: Array  # the point at the start
-    by_omega: Array  # derivatives of the start with respect to omega, for some psi
-    error: Array  # shape (4,); of the point at the end
+    start: Array  # shape (4,); the point at the start
+    by_omega: Array  # shape (8, 3, 3); derivatives of the start by omega, at eight psi
+    error: Array  # shape (4,); error of the point at the end
     transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
 
     @classmethod
     def from_start(
         cls, coordinates: Coordinates, start: Array, error: Array, transition: Array
     ) -> Self:
-        """Return a macro-step with its start and the error of its end."""
+        """Return a macro-step, with the derivatives of its start by omega."""
         phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
         cosine, sine = np.cos(phases), np.sin(phases)
         omega = coordinates.omega(start[:, None], cosine, sine)[0]
@@ -37,7 +37,7 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest measured error of omega (rad/s) and amplification at several ends."""
+    """Return the largest error of omega (rad/s) and amplification at up to four ends of steps."""
     count = len(done)
     error, growth = _estimate_end(coordinates, coefficients, done, omega, angle)
     for n in range(1, count, -(-count // _MOST_ENDS)):
@@ -51,12 +51,11 @@ def estimates(
 def _estimate_end(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return them at the end of the last macro-step."""
+    """Return the error of omega (rad/s) and the amplification at the end of the last step."""
     a, b, c = coefficients
     x, y, z = omega
     cosine, sine = np.cos([angle]), np.sin([angle])
-    # The derivatives of omega at the end with respect to the point, and to the time at which the
-    # point is reached.
+    # Derivatives of omega at the end by the point, and by the time at which it is reached.
     back = np.empty((3, 4))
     back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
     back[:, 3] = -a * y * z, -b * z * x, -c * x * y

@@ -14,11 +14,11 @@ from pyharness.model.chebyshev import points, to_coefficients
 
 
 class Slow(NamedTuple):
-    """Matrices of n Chebyshev points from 0 to 1."""
+    """Matrices, shape (n, n), of n Chebyshev points from 0 to 1."""
 
     nodes: Array
-    integral: Array  # values to their integral from 0
-    slope: Array  # values to their derivative
+    integral: Array  # from values to their integral from 0
+    slope: Array  # from values to their derivative
     weights: Array  # of the barycentric formula
 
 
@@ -28,13 +28,13 @@ class Fast(NamedTuple):
     angles: Array
     cosine: Array
     sine: Array
-    mean: Array  # values to their mean; a product is faster than a sum along rows
-    integral: Array  # values, without their mean, to their integral from 0; from the right
+    mean: Array  # weights of the mean; a product is faster than a sum along rows
+    integral: Array  # from values, less their mean, to their integral from 0; from the right
 
 
 @lru_cache(maxsize=16)
 def slow_nodes(count: int) -> Slow:
-    """Return the matrices of `count` Chebyshev points."""
+    """Return `count` Chebyshev points and their matrices."""
     at = points(count)
     values = np.polynomial.chebyshev.chebvander(at, count)
     integrals = np.empty((count, count))
@@ -54,7 +54,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return the arrays of an even `count` of angles."""
+    """Return an even `count` of angles and their arrays."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)
@@ -70,7 +70,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the matrix of barycentric interpolation from `count` nodes."""
+    """Return the matrix of barycentric interpolation from `count` nodes to `at`, from 0 to 1."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -83,7 +83,7 @@ def between_nodes(count: int, at: Array) -> Array:
 
 
 def between_angles(count: int, at: Array) -> Array:
-    """Return the matrix that interpolates from an even `count` of angles (rad)."""
+    """Return the trigonometric interpolation matrix from `count` angles, even, to `at` (rad)."""
     half = 0.5 * (at[:, None] - fast_nodes(count).angles)
     sine = np.sin(half)
     hit = np.abs(sine) < 1e-17

@@ -12,8 +12,8 @@ over psi. The equation is equivalent to
     W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
 
 Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one.
-Newton's method solves the first equation at all Chebyshev points and angles together. Sweeps with
-more of them measure the error.
+Newton's method solves the first equation at all Chebyshev points together. Two sweeps with more
+points and angles measure the error.
 """
 
 from functools import lru_cache
@@ -33,14 +33,14 @@ from pyharness.model.array_type import Array
 
 MOST_SWEEPS = 12
 _LEAST_SWEEPS = 3
-_MORE_NODES, _MORE_ANGLES = 4, 8  # of the sweep that measures the error
+_MORE_NODES, _MORE_ANGLES = 4, 8  # additional ones of the sweeps that measure the error
 _FEWEST_ANGLES = 16
 _DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
-# The iteration has converged if a sweep changes less than the first relative number. Rounding
-# errors may cause changes up to the second.
+# Relative change of a sweep at which the iteration has converged; and the largest change that
+# rounding errors may cause.
 _CONVERGED, _ROUNDED = 1e-15, 1e-12
 _MOST_NEWTON = 10
-_CLOSE = 1e-7  # rad; Newton's method squares it
+_CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
 
 
 class NotResolvedError(Exception):
@@ -50,8 +50,8 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), is the point at psi = 0, its time without a part proportional
-    to psi, and `error` the measured one. `modulus` is the largest square on the orbits.
+    `stroboscopic`, shape (4, nodes), is the point at psi = 0, whose time lacks a part proportional
+    to psi; `error` is its measured error. `modulus` is the largest squared modulus.
     """
 
     def __init__(
@@ -66,13 +66,14 @@ class MacroStep:
     ) -> None:
         """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
 
-        `sizes` are the numbers of nodes and angles, both even.
+        `sizes` are the numbers of nodes and angles, both even; `start_time` is in s. `varies` says
+        whether the torque depends on time.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
         self._slow, self._fast = slow_nodes(sizes[0]), fast_nodes(sizes[1])
         self._integral = length * self._slow.integral.T
-        # Without dependence on time, the time is an integral, and no unknown of Newton's method.
+        # If the torque does not depend on time, t is an integral and no unknown of Newton's method.
         self._n_unknowns = 4 if varies else 3
         self.scale = coordinates.scale(start)
         self.evaluations = 0
@@ -82,7 +83,7 @@ class MacroStep:
             self._solve()
 
     def _solve(self) -> None:
-        # Few angles are enough for the first approximation, and for the Jacobian matrices.
+        # Few angles suffice for the first approximation and the Jacobian matrices.
         few = fast_nodes(max(_FEWEST_ANGLES, self._sizes[1] // 4 * 2))
         slopes = self._slopes(self._start[..., None], few) @ few.mean
         mean = self._start + slopes * (self.length * self._slow.nodes)
@@ -91,7 +92,7 @@ class MacroStep:
         mean = mean + self._newton(self._start + slopes @ self._integral - mean)
         waves = np.zeros((4, *self._sizes))
         change, last = np.inf, np.inf
-        # The time is relative to the duration of the macro-step.
+        # Errors of the time are relative to the duration of the macro-step.
         sizes = self.scale * (1.0, 1.0, 1.0, abs(self.length))
         for sweep in range(1, MOST_SWEEPS + 1):
             residual, waves = self._residual(mean, waves, self._slow, self._fast)
@@ -99,7 +100,7 @@ class MacroStep:
             mean = mean + correction
             change, last = float((np.abs(correction).max(axis=1) / sizes).max()), change
             stalls = sweep >= _LEAST_SWEEPS and not change < 0.5 * last
-            # The first sweep is without the oscillation, and may change nothing for that reason.
+            # The first sweep lacks the oscillation, and may change nothing for this reason.
             if (sweep > 1 and change <= _CONVERGED) or stalls:
                 break
         self._check(mean)
@@ -112,7 +113,7 @@ class MacroStep:
     def mean_slopes(
         coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
     ) -> Array:
-        """Return the mean derivatives by psi at a point, shape (4,)."""
+        """Return the derivatives by psi at a point, averaged over psi, shape (4,)."""
         fast = fast_nodes(angles)
         times = np.full(angles, time)
         found: Array = coordinates.slopes(
@@ -127,7 +128,7 @@ class MacroStep:
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return the derivatives on a grid of nodes and angles."""
+        """Return the derivatives by psi on a grid of nodes and angles, shape (4, nodes, angles)."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -136,7 +137,7 @@ class MacroStep:
         )
 
     def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
-        """Return the residual of the averaged equation, and the next W."""
+        """Return the residual of the equation for V, and the next W."""
         slopes = self._slopes(mean[..., None] + waves, fast, slow)
         right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
         waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
@@ -144,7 +145,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set the Jacobian matrices, and return the right-hand side."""
+        """Set the matrices of Newton's method, and return the mean derivatives, (4, nodes)."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)
@@ -161,7 +162,7 @@ class MacroStep:
         return found
 
     def _newton(self, residual: Array) -> Array:
-        """Return the correction of the solution at the nodes."""
+        """Return Newton's correction of V."""
         n = self._n_unknowns
         found = residual.copy()
         found[:n] = (self._inverse @ residual[:n].ravel()).reshape(n, -1)
@@ -170,18 +171,18 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the error at the nodes, by two finer sweeps."""
+        """Return the error of V at the nodes, by two finer sweeps."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
-        # The change since the start has smaller rounding errors than the point.
+        # The change since the start has smaller rounding errors than V.
         mean = self._start + (self.stroboscopic - self._start) @ nodes.T
         _, waves = self._residual(mean, (nodes @ self._waves) @ turns, slow, fast)
         residual, _ = self._residual(mean, waves, slow, fast)
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return the measured error at an angle (rad), and the state-transition matrix, (4, 4)."""
+        """Return the error of V at an angle (rad), (4,), and its transition matrix, (4, 4)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)
@@ -193,7 +194,7 @@ class MacroStep:
 
     @property
     def end(self) -> tuple[Array, tuple[float, float]]:
-        """Return the point at the end, with time 0, and two parts of that time (s)."""
+        """Return the point at the end with t = 0, and the two summands of its time (s)."""
         found = self.stroboscopic[:, -1].copy()
         found[3] = 0.0
         return found, (self._pace * self.length, float(self.stroboscopic[3, -1]))
@@ -214,7 +215,7 @@ class MacroStep:
         return angle
 
     def at(self, angle: Array) -> tuple[Array, Array, Array]:
-        """Return the points at angles psi (rad), (4, n), and cosines and sines."""
+        """Return the points at angles psi (rad), (4, n), and the cosines and sines of psi."""
         nodes = between_nodes(self._sizes[0], angle / self.length)
         turns = between_angles(self._sizes[1], np.mod(angle, 2.0 * np.pi))
         point = self.stroboscopic @ nodes.T + ((nodes @ self._waves) * turns).sum(axis=-1)
@@ -223,7 +224,7 @@ class MacroStep:
 
 @lru_cache(maxsize=16)
 def _finer(count: int, angles: int) -> tuple[Array, Array, Array]:
-    """Return matrices that interpolate to more nodes and angles, and back."""
+    """Return interpolation matrices to more nodes, to more angles, and back to the nodes."""
     more = slow_nodes(count + _MORE_NODES).nodes
     return (
         between_nodes(count, more),

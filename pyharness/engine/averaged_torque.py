@@ -1,4 +1,4 @@
-"""The torque of a scene as a function of arrays."""
+"""The torque of a scene as a function of arrays, for the method `averaged`."""
 
 import math
 from typing import NamedTuple
@@ -19,7 +19,7 @@ _MOST_DEGREE = 8.0
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return the torque over the moments, and whether it depends on time."""
+    """Return the torque over the moments, and whether it may depend on time."""
     if isinstance(scene.torque, StateTorque):
         return _state_torque(scene, scene.torque), True
     _, constant, rate, sines, cosines = normalized(scene)
@@ -56,21 +56,18 @@ def _state_torque(scene: Scene, given: StateTorque) -> Torque:
 
 
 class _Slot(NamedTuple):
-    """The dependence of a slot of a tape on omega and time.
+    """The dependence of a slot of a tape on omega and time."""
 
-    `degree` is infinite for more than a polynomial and waves; `fastest` (rad/s) is that of the
-    waves, `rate` (1/s) of a slot that is linear in time alone.
-    """
-
-    degree: float = 0.0
-    fastest: float = 0.0
-    rate: float | None = None
+    degree: float = 0.0  # of the polynomial; infinite for operations other than polynomials, waves
+    fastest: float = 0.0  # highest frequency of the waves, rad/s
+    rate: float | None = None  # 1/s, of a slot that is linear in time alone
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError for what a macro-step may miss: a pulse, or a narrow range of energy.
+    Raise InputError if the degree of a recorded torque exceeds 8 or is infinite: a macro-step may
+    miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

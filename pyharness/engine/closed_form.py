@@ -1,7 +1,4 @@
-"""Solutions in closed form: a sphere under any torque, and other bodies without torque.
-
-The latter consist of Jacobi's elliptic functions.
-"""
+"""Closed forms: a sphere under a TorqueLaw; other bodies without torque, by elliptic functions."""
 
 from collections.abc import Sequence
 
@@ -16,12 +13,12 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_CALM = 1e3  # amplifications below it grow with the time, so that the last is the largest
-_MOST_ROWS = 16  # at which the amplification is computed
+_CALM = 1e3  # an amplification below it grows with time, so that the last is the largest
+_MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s) without torque, or 0."""
+    """Return the period of omega (s); 0 under a torque, or if there is none."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -32,7 +29,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the largest error and amplification at the last, and near a separatrix other times."""
+    """Return the largest error and amplification, at the last time or, if large, at 16 times."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -50,8 +47,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    It is ``sensitive`` if amplified rounding errors exceed the tolerance. Raise InputError if there
-    is no closed form, or if the work limit is exceeded.
+    Its ending is ``sensitive`` if amplified rounding errors exceed the tolerance. Raise InputError
+    if there is no closed form, the work limit is exceeded, or the phase is above 1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 
 class CompiledCall(NamedTuple):
-    """A prepared solver as a function for compiled code, as numba calls it.
+    """A prepared solver as a function for compiled code, such as numba's.
 
-    ``function(data, start, t_end, state)`` reads floats at the address `start`, omega (rad/s) and
-    for an attitude a unit quaternion, and writes those at `t_end` (s) to `state`. It returns an
-    integer of `pyharness.h`, 0 if complete. `data` is valid as long as `solver` exists.
+    ``function(data, start, t_end, state)`` reads omega (rad/s), and for an attitude a unit
+    quaternion, as doubles at the address `start`, and writes the state at `t_end` (s) to `state`.
+    It returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver` exists.
     """
 
     function: Any
@@ -22,7 +22,7 @@ def compiled_call(solver: Any) -> CompiledCall:
     """Return a prepared solver as a function for compiled code."""
     from pyharness import _solver
 
-    # This kind of function raises KeyboardInterrupt after Ctrl-C, if Python code calls it.
+    # PYFUNCTYPE, unlike CFUNCTYPE, raises KeyboardInterrupt after Ctrl-C if Python code calls it.
     prototype = PYFUNCTYPE(c_int, c_void_p, c_void_p, c_double, c_void_p)
     return CompiledCall(prototype(_solver.SOLVE_AT), solver._address, solver)
 

@@ -22,7 +22,7 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, between 0 and `found`."""
+    """Return the solution as a function of time, from 0 to the rows of `found`."""
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -36,9 +36,9 @@ def with_events(
     method: str,
     tolerance: float,
 ) -> Trajectory:
-    """Return a trajectory with its events, without what follows a terminal one.
+    """Return a trajectory with its events, and without rows beyond a terminal event.
 
-    `ends` are the first and last requested times (s).
+    `ends` are the first and last requested times (s); `rows` returns further rows.
     """
     sol = found.sol or solution_of(scene, found, rows, method, tolerance)
     events = no_events(len(functions), 3 if found.attitude is None else 7)
@@ -49,12 +49,12 @@ def with_events(
                 period = period_of(scene)
             shown = _first_periods(found, rows, tolerance, period)
             pieces = dense.state_pieces(scene, shown, rows, tolerance, METHODS[method].finest)
-        # A fixed step of a method has a tolerance of 1.
+        # The tolerance 1 stands for a fixed step.
         own = tolerance if tolerance < 1.0 else 0.0
         events = found_events(functions, Solution(pieces, sol, own), period)
     kept = (found.time >= events.first) & (found.time <= events.last)
     cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in row_names(found)}
-    # An overflow remains the ending if it is not beyond a terminal event.
+    # An overflow that no terminal event precedes remains the ending.
     overflowed = found.ended == "overflow" and (
         (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
         or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
@@ -70,10 +70,10 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return a trajectory over at most a few periods (s) on each side of 0."""
+    """Return a trajectory over at most six periods (s) on each side of 0."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
-    # A little more than these periods is not worth another way to find events.
+    # For little more than three periods, repetition would save nothing.
     if last == 0.0 or np.abs(ends).max() <= 2.0 * last:
         return found
     return rows(
@@ -82,6 +82,6 @@ def _first_periods(
 
 
 def with_events_reversed(found: Trajectory) -> Trajectory:
-    """Return a trajectory with its events in reverse order."""
+    """Return the trajectory with its events in reverse order."""
     times, states = found.t_events or [], found.y_events or []
     return replace(found, t_events=[x[::-1] for x in times], y_events=[x[::-1] for x in states])

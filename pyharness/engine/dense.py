@@ -1,4 +1,4 @@
-"""Dense output of every method: Chebyshev polynomials through the method's own results.
+"""Dense output by Chebyshev polynomials through a method's results at their nodes.
 
 Intervals are divided until the last coefficients are far below the tolerance. A closed form is
 evaluated instead.
@@ -22,41 +22,41 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
-# The results at the nodes are computed to this part of the tolerance, because a polynomial may
-# have larger errors than its nodes; and to the second part if the method can't meet the first.
+# Tolerance of the results at the nodes, over the requested one, because a polynomial may have
+# larger errors than its nodes; the second holds if the method can't meet the first.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
-# Largest of the last coefficients of a polynomial, in tolerances, and relative to the state.
+# Bound of the last coefficients of a polynomial, in tolerances, and relative to the state.
 _LAST = 0.02
-# Rounding errors of a method, over the error amplification. They are not smooth.
+# Rounding errors of a method, over the error amplification, which are not smooth.
 _OWN_ROUNDING = 4e-15
 _ROUNDING = 4e-16
-_TAIL = 3  # coefficients whose size is an estimate of those left out
-# A piece has errors of the method that are not smooth if its tail is not much smaller than that of
-# the piece of which it is a part, although the polynomial of the latter was accurate.
+_TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
+# Errors of the method are not smooth if division of an interval does not reduce the tail by this
+# factor, although the polynomial on the whole interval was accurate.
 _DIVIDED = 8.0
 _MOST_PARTS = 64  # into which an interval is divided at once
 _MOST_PIECES = 200_000
-_RADIANS = 2.0  # of rotation in an interval; first guess
-_SHORT = 0.25  # a shorter part of an interval than the largest gap of its nodes could hide
+_RADIANS = 2.0  # rotation in an interval; first guess
+_SHORT = 0.25  # a change in a shorter part of an interval might be hidden between nodes
 
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) without a polynomial, a part of a longer one."""
+    """An interval (s) that has no polynomial yet, part of a longer one."""
 
     low: float
     high: float
     tail: float = math.inf  # of the polynomial of the longer interval
-    whole: Pieces | None = None  # this polynomial
+    whole: Pieces | None = None  # that polynomial
 
     def is_rough(
         self, tail: float, times: Array, values: Array, scale: float, rough: float
     ) -> bool:
-        """Return whether the method has errors, below `rough`, that are not smooth."""
+        """Return whether errors of the method, below `rough`, prevent smaller tails."""
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
-        # A fast wave between few nodes has small tails too, but another polynomial.
+        # A fast wave between few nodes has small tails too, but differs from the longer polynomial.
         apart = np.abs(self.whole(times) - values).max(axis=0)
         apart[:3] /= scale or 1.0
         return bool(apart.max() <= rough)
@@ -81,10 +81,10 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time, between 0 and the rows of `found`, in order.
+    """Return the solution as a function of time, between 0 and the rows of `found`.
 
-    `rows` returns more of them; a tolerance of 1 means a fixed step. Raise InputError if too many
-    polynomials would be needed.
+    `rows` returns further rows; the tolerance 1 stands for a fixed step. Raise InputError if more
+    than 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -98,7 +98,7 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials, from 0 to another time at least."""
+    """Return the solution as polynomials between 0 and the rows of `found`."""
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
@@ -111,11 +111,7 @@ def state_pieces(
 def _first_edges(
     scene: Scene, found: Trajectory, ends: list[float], tolerance: float
 ) -> list[float]:
-    """Return the ends of the first intervals (s), among them all changes of tables.
-
-    A short torque shows in the steps of a Taylor series, at which an interval is therefore divided,
-    but hardly at few nodes.
-    """
+    """Return the ends of the first intervals (s), among them all changes of tables."""
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})
@@ -129,6 +125,7 @@ def _first_edges(
     edges.append(bounds[-1])
     if tape is None and scene.changing is None:
         return edges
+    # Short steps of a Taylor series show a short change of the torque, which few nodes may miss.
     attitude = found.attitude is not None or scene.torque.needs_attitude
     steps: dict[float, float] = {}
     for end in ends:
@@ -146,10 +143,8 @@ def _first_edges(
 def _fitted(
     edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float
 ) -> Pieces:
-    """Return polynomials through the rows of a method, for intervals that are divided as needed.
-
-    `own` are two tolerances of the rows, `rough` is their largest error that is not smooth.
-    """
+    """Return polynomials through the rows of a method on intervals that are divided as needed."""
+    # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
     scale = 0.0
@@ -201,7 +196,7 @@ def _fitted(
 def _of_fixed_steps(
     scene: Scene, ends: list[float], rows: Rows, derivatives: Callable[[Array, Array], Array]
 ) -> Pieces:
-    """Return the cubics with states and derivatives at the ends of steps."""
+    """Return the Hermite cubics between the ends of steps."""
     step = scene.step_size
     steps = [math.ceil(abs(end) / step) for end in ends]
     if max(steps) > _MOST_PIECES:

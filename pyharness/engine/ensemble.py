@@ -12,7 +12,7 @@ from pyharness.model.trajectory import Array
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(BatchResult):
-    """The final states of many scenes, as `solve_many` returns them.
+    """The final states of many scenes, from `solve_many`.
 
     Attributes
     ----------
@@ -23,18 +23,17 @@ class Ensemble(BatchResult):
         apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
         `sensitive` (amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
-        Unit quaternions from body to space, scalar first. This and the following are None if not
-        requested.
+        Unit quaternions from body to space, scalar first. Fields are None if not requested.
     estimates : ndarray, shape (n, 2), or None
-        The columns `error` and `growth`.
+        `error` and `growth`, in columns.
     t_events, y_events : list of list of ndarray, or None
-        For each function and body the times (s) of its events, shape (k,), and the states, shape
-        (k, 3) or (k, 7); None for a body without a result.
+        By function, then body: the times (s) of k events, shape (k,), and the states, shape (k, 3)
+        or (k, 7); None for a body without a result.
     sensitivities : dict of ndarray, or None
-        For each name the derivatives of the final state, shape (n, 3, m) or (n, 7, m) for a
-        parameter of m values; NaN for a body without a result.
+        By name, the derivatives of the final states by a parameter of m values, shape (n, 3, m) or
+        (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
-        The reasons for missing events and sensitivities, by number of the body.
+        The reasons for missing events and sensitivities, by index of the body.
 
     Examples
     --------
@@ -56,16 +55,16 @@ class Ensemble(BatchResult):
 
     @property
     def error(self) -> Array | None:
-        """The estimated errors, shape (n,), as of `Trajectory`; NaN where unknown."""
+        """The estimated errors, shape (n,), as in `Trajectory`; NaN where unknown."""
         return None if self.estimates is None else self.estimates[:, 0]
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
+        """The error amplifications or upper bounds of them, shape (n,); NaN where unknown."""
         return None if self.estimates is None else self.estimates[:, 1]
 
     def estimates_of(self, piece: slice) -> Array:
-        """Return the estimates of m bodies as a kernel writes them."""
+        """Return the estimates of m bodies, shape (2, m), or (2, 0) if not requested."""
         return _NO_ESTIMATES if self.estimates is None else self.estimates[piece].T
 
 

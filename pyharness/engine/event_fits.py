@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors of these values.
 
-A function counts as 0 on an interval if it is 0 to within its error there, and reaches 0 by a kink
-or a jump; a decay has no such interval.
+A zero interval is one on which a function is 0 to within its error, and which it reaches by a kink
+or a jump; a decay to 0 has no such interval.
 """
 
 import math
@@ -27,24 +27,25 @@ from pyharness.model.dense_output import DenseOutput, Pieces
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
-_TAIL = 3  # coefficients whose size is an estimate of those left out
-# Divisions of an interval in two, after which the function is not smooth.
+_TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
+# Halvings of an interval after which a function is taken not to be smooth.
 _MOST_DIVISIONS = 44
-# A function that is 0 from some time on was so many times its error this part of a polynomial of
-# the solution earlier.
+# At a kink or a jump to 0, the function exceeds _SUDDEN times its error at the distance _BEFORE,
+# relative to the interval of a polynomial of the solution.
 _SUDDEN, _BEFORE = 1e3, 0.01
-_MOST_PIECES = 100_000  # that are divided at the same time
-_SHIFT = 2.0**-26  # relative difference of an argument, by which a derivative is estimated
-ROUNDING = 2.0**-50  # of the arguments of a function
+_MOST_PIECES = 100_000  # intervals that are divided at the same time
+_SHIFT = 2.0**-26  # relative difference of an argument for a numerical derivative
+ROUNDING = 2.0**-50  # relative, of the arguments of a function
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a scene for the search for events: polynomials and dense output.
+    """The solution of a scene in which events are searched.
 
-    `tolerance` is that of omega, 0 for a fixed step.
+    `pieces` are polynomials, `sol` is the dense output, and `tolerance` that of omega, 0 for a
+    fixed step.
     """
 
     pieces: Pieces
@@ -52,7 +53,7 @@ class Solution:
     tolerance: float
 
     def states(self, times: Array) -> Array:
-        """Return omega and attitude at `times` (s), one row for each."""
+        """Return omega and attitude at n `times` (s), shape (n, 3) or (n, 7)."""
         return _normalised(self.pieces(times))
 
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
@@ -62,18 +63,18 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values at `times` (s), without the polynomials."""
+        """Return the values at `times` (s) from the dense output, not the polynomials."""
         return self.values(g, times, _normalised(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return the errors of a function by rounding of time and errors of omega and attitude."""
+        """Return the errors of a function due to errors of time, omega, attitude and rates."""
         states = self.states(times)
         rates = self.sol.rates(times, states) if g.event.needs_rates else None
         value = g(times, states, rates)
         shift = _SHIFT * np.abs(times)
         later = np.where(times + shift > times, times + shift, times)
         found = ROUNDING * np.abs(g(later, states, rates) - value) / _SHIFT
-        # A tolerance in excess of the limit would hide pairs of roots.
+        # A larger error would hide pairs of roots.
         own = max(ROUNDING, min(self.tolerance, _COARSEST))
         largest = self._largest_until(times)
         for k in range(states.shape[1]):
@@ -90,7 +91,7 @@ class Solution:
 
     @cached_property
     def _largest(self) -> Array:
-        """The largest component of omega (rad/s) up to the end of each polynomial."""
+        """The largest |omega| (rad/s) from time 0 to the end of each polynomial."""
         sizes = np.abs(self.pieces.values[:, :, :3]).max(axis=(1, 2))
         count = int(np.sum(self.pieces.edges[:-1] < 0.0))
         before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
@@ -108,7 +109,7 @@ def _normalised(states: Array) -> Array:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function's values, and roots where there are none."""
+    """Return converged polynomials through a function's values, and sign changes elsewhere."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
@@ -120,7 +121,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         times.shape
     )
     first, last = values[:, 0].copy(), values[:, -1]
-    # Adjacent intervals have the same value at their common end.
+    # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
     done: list[Fits] = []
     rough: list[Roots] = []
@@ -167,14 +168,14 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 
 
 def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials, with noise, that can be distinguished from 0."""
+    """Return the polynomials that exceed their noise, with the noise."""
     noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
     fits = replace(fits, noise=noise)
     return fits.only(fits.sizes > 2.0 * noise)
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
-    """Return the sign changes between adjacent nodes of intervals."""
+    """Return the sign changes between adjacent nodes as roots."""
     values = values.copy()
     values[:, 0] = first
     is_negative = values < 0.0
@@ -187,10 +188,10 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
 
 @dataclass(frozen=True, eq=False)
 class ZeroIntervals:
-    """The intervals from `low` to `high` (s), ascending, on which a function is 0 to within error.
+    """The zero intervals of a function, from `low` to `high` (s), ascending.
 
-    `noise` is the magnitude below which a value beside them can't be distinguished from 0; `before`
-    and `after` are the signs there, or 0 where the function decays, and at the ends of the
+    `noise` is the magnitude below which a value beside an interval can't be distinguished from 0.
+    `before` and `after` are the signs there; 0 where the function decays, and at the ends of the
     solution.
     """
 
@@ -201,9 +202,9 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return the roots where the integration from 0 reaches the intervals.
+        """Return a root where the integration from 0 reaches an interval.
 
-        If touches do not count, only changes between the two sides are roots.
+        Without `counts_touches`, only intervals with opposite signs on both sides have a root.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before
@@ -221,12 +222,12 @@ class ZeroIntervals:
         return Roots(time, change.astype(int), zeros, zeros, zeros, zeros, lasting)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
-        """Return which roots are in an interval, or undistinguished from one."""
+        """Return which roots are in an interval, or so near that the function is 0 in between."""
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
         found: Index = roots.time <= before
-        # Changes of sign of a function that is not smooth are known to so many rounding errors.
+        # Sign changes of a function that is not smooth are known to so many rounding errors.
         longest = np.diff(solution.pieces.edges).max()
         apart = np.minimum(roots.time - before, after - roots.time)
         found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
@@ -239,14 +240,14 @@ class ZeroIntervals:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
-    """Return the intervals on which a function is 0 to within error."""
+    """Return the zero intervals of a function."""
     if not fits.low.size:
         return ZeroIntervals(*(np.zeros(0) for _ in range(5)))
     fits = fits.only(np.argsort(fits.low))
     sizes, noise = fits.sizes, np.zeros(len(fits.low))
     largest = [sizes.argmax()]
     limit = _noise_of(g, solution, fits.low[largest], fits.high[largest])[0]
-    # Where no value is far above its error, any may be 0.
+    # If no value is far above its error, all polynomials may be 0.
     near = np.flatnonzero(sizes <= max(sizes.max() / _SUDDEN, _SUDDEN * limit))
     noise[near] = 2.0 * _noise_of(g, solution, fits.low[near], fits.high[near])
     zero = near[sizes[near] <= noise[near]]
@@ -273,10 +274,8 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
 def _refined(
     g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
 ) -> Array:
-    """Return the times, between two lists of times, from which on a function is below a level.
-
-    A polynomial may extend beyond a kink; those of the solution are at its ends.
-    """
+    """Return the times, from `ends` toward `others`, up to which a function is below `level`."""
+    # A polynomial of the function may extend beyond a kink; kinks of the solution are at its edges.
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
     k = k[np.abs(solution.values(g, outer[k])) > level[k]]

@@ -1,4 +1,4 @@
-"""Functions whose roots are events: checks, and evaluation."""
+"""Checks and evaluation of the functions whose roots are events."""
 
 import inspect
 import math
@@ -15,18 +15,17 @@ from pyharness.model.values import converted
 _FUNCTIONS_ALLOWED = (
     "allowed: a function of (t, omega) or (t, omega, attitude), or a list of such functions"
 )
-# Values of a function for one time and for many may differ by rounding.
+# Largest relative difference of values for one time and for many, due to rounding.
 _AGREEMENT = 1e-10
 _CHECKED = 9  # values that are compared
 
 
 @dataclass(eq=False)
 class Event:
-    """A ready event of `pyharness.events`.
+    """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude and derivative of omega, and `name` is its call.
-    `terminal` and `direction` are as in `crosses`; `counts_touches` counts roots without a sign
-    change.
+    `function` takes time, omega, attitude and the derivative of omega. `terminal` and `direction`
+    are as in `crosses`; `counts_touches` says whether roots without a sign change are events.
     """
 
     name: str
@@ -40,10 +39,10 @@ class Event:
 
 @dataclass(eq=False)
 class EventFunction:
-    """A checked function of an event.
+    """A checked event.
 
-    `limit` is the number of events that end the integration, or infinite; `is_vectorized` is None
-    if not yet known.
+    The `limit`-th event ends the integration; infinite for none. `is_vectorized` says whether the
+    function accepts arrays, None if not yet known.
     """
 
     name: str
@@ -52,7 +51,7 @@ class EventFunction:
     is_vectorized: bool | None = None
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
-        """Return a row of values each; raise InputError if one is not finite."""
+        """Return the values at n times (s), shape (n,); raise InputError if one is not finite."""
         columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
         found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
         if found is None:
@@ -69,7 +68,7 @@ class EventFunction:
     def _of_arrays(
         self, times: Array, omega: Array, attitude: Array, rates: Array | None
     ) -> Array | None:
-        """Return the values for arrays, or None if the function takes none."""
+        """Return the values for arrays, or None if the function does not accept arrays."""
         try:
             with np.errstate(all="ignore"):
                 found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
@@ -84,7 +83,7 @@ class EventFunction:
             scale = _AGREEMENT * np.abs(each).max()
             if not np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)):
                 return None
-            # One time, or few, do not show that the function accepts arrays.
+            # Agreement at few times does not show that the function accepts arrays.
             self.is_vectorized = True if len(times) > _CHECKED else None
         return found
 
@@ -106,7 +105,7 @@ class EventFunction:
 
 
 def event_functions(events: object, attitude: bool) -> list[EventFunction]:
-    """Return a user's events, one or a list, as checked functions, or raise InputError."""
+    """Return one event or a list of events as checked functions, or raise InputError."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):
@@ -145,7 +144,7 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
 
 
 def _arguments(given: Callable[..., Any], name: str) -> int:
-    """Return the number of arguments of a function, 2 or 3."""
+    """Return the number of arguments that a function accepts, 2 or 3."""
     try:
         signature = inspect.signature(given)
     except (TypeError, ValueError):

@@ -1,9 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
-No Chebyshev polynomial exceeds 1 on the interval, so that |c[0]| > |c[1]| + |c[2]| + ... excludes a
-root. The same bound for the derivative leaves at most one root, and for the second derivative at
-most two, with one extremum between. Other intervals are halved, so that no root is missed
-(Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
+A polynomial with the Chebyshev coefficients c has no root on the interval if |c[0]| > |c[1]| +
+|c[2]| + ... The same bound for the derivative leaves at most one root, and for the second
+derivative at most two, with one extremum between. Other intervals are halved, so that no root is
+missed (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
 """
 
 from dataclasses import dataclass
@@ -15,23 +15,22 @@ from numpy.polynomial import chebyshev
 from pyharness.model.array_type import Array
 from pyharness.model.chebyshev import points, to_coefficients
 
-# A slice, a mask or numbers of the elements of an array.
+# A slice, a mask or indices of the elements of an array.
 Index = Any
-# Nodes of each polynomial.
-NODES = 33
+NODES = 33  # of each polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
-# Divisions of an interval in two, after which a root is as exact as the coefficients.
+# Halvings of an interval after which a root is as exact as the coefficients.
 _MOST_DIVISIONS = 50
 # A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
 # of an interval is never lost to rounding.
 _MARGIN = 1.001
-# Possible error of a polynomial, relative to its largest value on the interval.
+# Largest error of a polynomial, relative to its largest value on the interval.
 FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices for the derivative, and for the two halves."""
+    """Return the matrices of the derivative, the left half and the right half of an interval."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -44,10 +43,10 @@ _DERIVATIVE, _LEFT, _RIGHT = _transforms()
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """Polynomials on p intervals from `low` to `high` (s), by `coefficients`, (p, NODES).
+    """Polynomials on p intervals from `low` to `high` (s), with `coefficients`, (p, NODES).
 
-    `first` and `last` are the function there, with equal signs for adjacent intervals; below the
-    magnitude `noise` it can't be distinguished from 0.
+    `first` and `last` are the function's values at `low` and `high`, equal at common ends. Below
+    the magnitude `noise` the function can't be distinguished from 0.
     """
 
     low: Array
@@ -63,7 +62,7 @@ class Fits:
 
     @property
     def sizes(self) -> Array:
-        """The bounds on the magnitude of each polynomial."""
+        """The upper bounds of the magnitudes of the polynomials, shape (p,)."""
         found: Array = np.abs(self.coefficients).sum(axis=1)
         return found
 
@@ -72,10 +71,10 @@ class Fits:
 class Roots:
     """Candidates for roots at n times (s).
 
-    `change` is the sign change in the order of time, 1 to positive, -1 to negative, 0 for a touch;
-    `slope` (1/s) and `curvature` (1/s2) are those of the polynomial; below the magnitudes `noise`
-    and `near`, function and polynomial can't be distinguished from 0; `lasting` is how long (s) the
-    function remains 0, negative before time 0.
+    `change` is the sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
+    `slope` (1/s) and `curvature` (1/s2) are the polynomial's derivatives. Below `noise` the
+    function, and below `near` the polynomial, can't be distinguished from 0. The function remains 0
+    for `lasting` (s), negative before time 0.
     """
 
     time: Array
@@ -92,14 +91,14 @@ class Roots:
 
 
 def joined(parts: list[Roots]) -> Roots:
-    """Return the roots of several lists in ascending order of time."""
+    """Return the roots of all parts in ascending order of time."""
     columns = (np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0]))
     found = Roots(*columns)
     return found.only(np.argsort(found.time, kind="stable"))
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
-    """Return the values of polynomials, each at its own point (Clenshaw)."""
+    """Return the value of polynomial k at x[k], for all k (Clenshaw)."""
     first = second = np.zeros(len(x))
     for k in range(NODES - 1, 0, -1):
         first, second = 2.0 * x * first - second + coefficients[:, k], first
@@ -107,7 +106,7 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 
 def may_vanish(fits: Fits) -> Array:
-    """Return which polynomials may have a root, by their coefficients."""
+    """Return a mask of the polynomials that may have a root."""
     c = np.abs(fits.coefficients)
     rest = c[:, 1:].sum(axis=1)
     near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))
@@ -116,7 +115,7 @@ def may_vanish(fits: Fits) -> Array:
 
 
 def isolated(fits: Fits) -> Roots:
-    """Return all roots of polynomials, even undistinguished, and extrema that may be 0."""
+    """Return all roots of polynomials, and their extrema that may be 0, ascending in time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     found = [
@@ -171,7 +170,7 @@ def _has_no_root(coefficients: Array) -> Array:
 
 
 def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
-    """Return roots at the points x, from -1 to 1, of some polynomials."""
+    """Return the roots at the points x, from -1 to 1, of the polynomials with these numbers."""
     half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
@@ -203,7 +202,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     c: Array, first: Array, last: Array, slopes: Array, near: Array
 ) -> list[tuple[Array, Index, Index]]:
-    """Return the roots of polynomials with one extremum at most."""
+    """Return tuples of points, sign changes and row numbers, for at most one extremum a row."""
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)

@@ -1,9 +1,8 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
-The solution is a polynomial on each of many intervals. A function of it is approximated on these,
-which are divided until the polynomials have converged, and all their roots are isolated: also close
-and double roots of a smooth function. Where it is not smooth, intervals become tiny, and sign
-changes between nodes are found, but not one that is undone before the next node.
+The function is approximated by polynomials, on intervals that are divided until these converge, and
+all their roots are isolated, also close and double roots of a smooth function. Where it is not
+smooth, intervals become tiny, and only sign changes between nodes are found.
 """
 
 import math
@@ -24,18 +23,15 @@ from pyharness.engine.periodic_events import improved, repeated
 from pyharness.model.array_type import Array
 
 _BLOCK = 4_000  # polynomials whose roots are isolated together
-_STATE_ROUNDING = 2.0**-46  # of polynomials of the state, over their largest values
+_STATE_ROUNDING = 2.0**-46  # error of the state's polynomials, relative to their largest values
 _POLISHES = 3
-# A time is exact if the sign changes within so many of its rounding errors on either side of it.
+# A time is exact if the sign changes within so many of its rounding errors.
 _EXACT = 8.0
 _WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
 
 
 def event_roots(g: EventFunction, solution: Solution) -> Roots:
-    """Return all events of a function, with sign changes in the order of time.
-
-    Those at an end are to, or from, the values beside it.
-    """
+    """Return all roots of an event's function, with sign changes in the order of time."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
         zeros = zero_intervals(g, solution, fits)
@@ -51,13 +47,13 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return roots with the noise at their own times, without extrema not near 0."""
+    """Return the roots with the noise at their times, and without extrema that are not near 0."""
     if not roots.time.size:
         return roots
     noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
     noise = np.minimum(noise, roots.noise)
     value = solution.values(g, roots.time)
-    # A value beyond 0, as seen from those beside the extremum, is on the other side of two roots.
+    # At an extremum beyond 0, the polynomial has missed two roots.
     is_root = (roots.change != 0) | (np.abs(value) <= noise) | (value * roots.curvature < 0.0)
     return replace(roots, noise=noise).only(is_root)
 
@@ -81,10 +77,8 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times of roots, those of inexact sign changes by bisection.
-
-    A root of odd multiplicity is lost in the errors of polynomials, but not of signs.
-    """
+    """Return the times of roots, those of inexact sign changes by bisection."""
+    # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
     bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
     piece = np.clip(np.searchsorted(edges, times) - 1, 0, len(edges) - 2)
@@ -155,7 +149,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     begin = np.flatnonzero(np.diff(group, prepend=-1))
     chosen, size = begin.copy(), np.diff(begin, append=count)
     ends = (*solution.pieces.edges[[0, -1]].tolist(), 0.0)
-    # A jump there and back, both by rounding, is no change of sign.
+    # A jump there and back by rounding is no event.
     is_event = (change != 0) | ~np.minimum.reduceat(is_jump, begin)
     for k in np.flatnonzero(size > 1):
         chosen[k] = _chosen(roots, np.arange(begin[k], begin[k] + size[k]), change[k], ends)
@@ -164,7 +158,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
-    """Return at which times rounding errors of the state decide the sign, as at a jump."""
+    """Return a mask of the times at which rounding of the state decides the sign."""
     found: Index = np.zeros(len(times), dtype=bool)
     if not times.size:
         return found
@@ -180,7 +174,7 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which adjacent roots are a pair only by errors, around an extremum that is 0."""
+    """Return a mask of the pairs of adjacent roots around an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     gap = np.diff(roots.time)
     for k in (slice(None, -1), slice(1, None)):
@@ -196,13 +190,13 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return roots in which a double one is at its extremum."""
+    """Return the roots, with double roots moved to the extremum."""
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
     if not is_double.any():
         return roots
     step = np.zeros(len(roots.time))
     step[is_double] = -roots.slope[is_double] / roots.curvature[is_double]
-    # The errors of the polynomial, and not only the noise, may have moved the root this far.
+    # Errors of the polynomial may have moved the root this far.
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     step[~(np.abs(step) <= widest)] = 0.0
     trial = np.clip(roots.time + step, *solution.pieces.edges[[0, -1]])
@@ -211,7 +205,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the root that stands for a group: an end, or the middle one."""
+    """Return the index of the root that replaces a group: an end, or else the middle one."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -221,9 +215,9 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 
 
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return the times of the events after (1) or before (-1) 0, in the order away from 0.
+    """Return the times of the events after (`side` 1) or before (-1) time 0, away from 0.
 
-    As in SciPy, sign changes at 0 are from 0, and those at the end to 0.
+    As in SciPy, a sign change at time 0 is from the value 0, and one at the end to the value 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0:
@@ -246,7 +240,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return all events on one side of 0, also beyond the polynomials."""
+    """Return the times of all events on one side of 0, by repetition beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
@@ -260,9 +254,9 @@ def _repeated(
 
 @dataclass(frozen=True, eq=False)
 class FoundEvents:
-    """The `times` (s) of the events of each function, ascending, and the `states` there.
+    """The `times` (s) and `states` of the events of each function, ascending.
 
-    `first` and `last` (s) are the terminal ones before and after 0, or infinite.
+    `first` and `last` are the times (s) of the terminal events before and after 0, or infinite.
     """
 
     times: list[Array]
@@ -272,7 +266,7 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return the events if no time but 0 was requested."""
+    """Return no events, of `count` functions, with states of 3 or 7 columns."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 
@@ -282,7 +276,7 @@ def found_events(
 ) -> FoundEvents:
     """Return the events of several functions, without those beyond a terminal event.
 
-    With a period (s), events beyond the polynomials are repetitions.
+    With a period (s), events beyond the polynomials are repeated from those within.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

@@ -1,4 +1,4 @@
-"""Torque terms of fields, and torques fixed in space."""
+"""Torque terms of gravity and magnetic fields, and torques fixed in space."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -19,8 +19,8 @@ def gravity_gradient(
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
     The unit vector r from the centre of attraction is (cos n t, sin n t, 0) about the axes of
-    space. The torque is in equilibrium if a principal axis is along r, in the plane of the orbit
-    stably if its moment is the smaller one in the plane.
+    space. The torque is 0 if a principal axis is along r. In the plane of the orbit this
+    equilibrium is stable if the axis has the smaller of the two moments in the plane.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     moment : three numbers
         The moment m of the dipole about the body axes (A m2).
     field : three numbers, or TorqueLaw
-        The field B (T), or a `TorqueLaw` of it with ``frame="space"``, in tesla.
+        The field B (T) about the axes of space, or a law of it with ``frame="space"``.
 
     Returns
     -------
@@ -121,17 +121,17 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
-    The coils have the moment m = -k b', where b' = R^T B' - omega x b is the rate of b = R^T B that
-    a magnetometer in the body measures. In a constant field the torque -k (|b|^2 omega - (omega .
-    b) b) damps the part of omega that is perpendicular to the field; in one that rotates, the body
-    finally rotates with it.
+    The coils have the moment m = -k b', where b' = R^T B' - omega x b is the rate of the field b =
+    R^T B that a magnetometer in the body measures. In a constant field the torque -k (|b|^2 omega -
+    (omega . b) b) damps the part of omega that is perpendicular to the field. In a rotating field
+    the body finally rotates with the field.
 
     Parameters
     ----------
     gain : float
         The gain k (A m2 s/T).
     field : three numbers, or TorqueLaw
-        The magnetic field B about the axes of space (T), as in `magnetic_dipole`.
+        The field B (T), as in `magnetic_dipole`.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    It is for sums; alone, a ``TorqueLaw(..., frame="space")`` is solved faster.
+    Use it in sums. Alone, a ``TorqueLaw(..., frame="space")`` is solved faster.
 
     Parameters
     ----------

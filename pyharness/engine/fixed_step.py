@@ -1,7 +1,4 @@
-"""The improved Euler method, the Taylor series of three terms, and classical Runge-Kutta.
-
-Section III.2 of the thesis has these single-step methods.
-"""
+"""The single-step methods of section III.2 of the thesis, with a fixed step."""
 
 from collections.abc import Sequence
 
@@ -17,7 +14,7 @@ from pyharness.model.trajectory import Trajectory
 
 
 def fixed_step(name: str) -> Integrator:
-    """Return the solver by ``improved-euler``, ``taylor-3`` or ``rk4``, without error control.
+    """Return the solver named ``improved-euler``, ``taylor-3`` or ``rk4``, without error control.
 
     A step that would pass a requested time is shortened to end there.
     """

@@ -1,4 +1,4 @@
-"""Attitudes from a table of omega, as of a program of the thesis."""
+"""Attitudes from a table of omega, such as a thesis program writes."""
 
 import math
 
@@ -8,19 +8,19 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# The Gauss points are at the fractions _EARLY and 1 - _EARLY of a step. Each exponential has
-# a weighted sum of the omegas at these two points, with the weights _MORE and _LESS.
+# The Gauss points are at the fractions _EARLY and 1 - _EARLY of a step. The omegas there have the
+# weights _MORE and _LESS in each exponential.
 _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
-    """Return the attitudes at the times (s) of a table of omega (rad/s), shape (n, 4).
+    """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
 
-    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003): two
-    exponentials of weighted sums of omega at the Gauss points, from the cubic through two rows and
-    their derivatives. After a rotation that overflows, all attitudes are NaN.
+    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003), with
+    omega at the Gauss points from the cubic through two rows and their derivatives. After a
+    rotation that overflows, all attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])

@@ -1,4 +1,4 @@
-"""Gauss collocation with equal steps, halved until two solutions agree."""
+"""Gauss collocation with equal steps, which are halved until two solutions agree."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,20 +19,20 @@ from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 # Work limit: right-hand sides of all trial integrations together, some ten seconds. A wave of
 # the torque costs half as much as a right-hand side.
 _MOST_EVALUATIONS = 200_000_000
-_ORDER_THAT_SHOWS = 8  # highest order that the error estimate relies on
-# If the relative difference of two solutions is below this limit, shorter steps do not reduce it.
+_ORDER_THAT_SHOWS = 8  # highest order that the error estimate assumes
+# Shorter steps do not reduce a relative difference of two solutions below this limit.
 _ROUNDING = 16 * 2.0**-53
-# rad/s, near the largest number of binary64. If two solutions reach it, the motion overflows.
+# The motion overflows if two solutions reach this omega (rad/s).
 _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
-    """Return a solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
+    """Return the solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
 
-    With d the largest difference in omega between two solutions, and r <= 2 the quotient of their
-    steps, the estimated error of the finer is 2 d / (r**p - 1). The 2 is for safety; p is the
-    order, but at most 8: methods of higher order take longer steps, with which the error does not
-    yet fall at the full order.
+    With d the largest difference of omega between two solutions, and r <= 2 the ratio of their
+    steps, the estimated error of the finer is 2 d / (r**p - 1), with a safety factor of 2; p is the
+    order, but at most 8, because at the longer steps of higher orders the error does not yet fall
+    at the full order.
     """
 
     def solve(
@@ -46,7 +46,7 @@ def gauss(stages: int) -> Integrator:
         lengths = _lengths(times)
         step, spent, reached = _first_step(kernel.rate, float(lengths.min())), 0, 0.0
         most = kernel.most
-        more = 1.0  # estimated steps of the final solution over the steps of the next solution
+        more = 1.0  # estimated steps of the final solution, over those of the next
         pace = 2.0 * stages  # right-hand sides per step
         before: _Solution | None = None
         last = math.inf  # the previous difference of two solutions (rad/s)
@@ -72,16 +72,15 @@ def gauss(stages: int) -> Integrator:
                 n = found.n_rows
                 scale = max(scale, float(np.abs(found.rows[:, :n]).max(initial=0.0)))
                 difference = found.difference(before, n)
-                # If an interval has as many steps as before, the difference does not measure an
-                # error: `known` is then 0.
+                # With as many steps as before in an interval, the difference measures no error, and
+                # `known` is 0.
                 ratio = float((counts / previous).min(initial=2.0))
                 known = ratio ** min(2 * stages, _ORDER_THAT_SHOWS) - 1.0
                 count = int(counts.sum())
                 noise = torque_noise(scene, scene.omega, times[-1], count, scale)
                 floor = _ROUNDING * scale * (1.0 + noise)
                 if growth is None and difference > 0.5 * last:
-                    # Shorter steps did not help: rounding dominates, or the steps are still too
-                    # long.
+                    # Rounding dominates, or the steps are still too long.
                     growth = motion_growth(scene, times[-1])
                 if growth is not None and is_sensitive(growth, tolerance, noise):
                     floor *= growth
@@ -125,14 +124,13 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
-        Both end before the last time, and nearly together. With m the largest |omega| (rad/s)
-        there, m exceeds 1e300 in both, or the finer m exceeds 1.5 coarser m, and this product 1000
-        times every |omega| at a requested time, if any, and `start`, the initial one or that by
-        torque alone.
+        Both then end before the last time, nearly together, at |omega| = m. Either m > 1e300 rad/s
+        in both; or the finer m exceeds 1.5 times the coarser, and this product exceeds 1000 times
+        `start` (rad/s) and every |omega| at a requested time.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
-        # If omega grows slowly, it is larger in the finer solution only because this ends later.
+        # A slowly growing omega is larger in the finer solution only because this ends later.
         if abs(self.reached[0] - coarser.reached[0]) > 0.01 * abs(self.reached[0]):
             return False
         largest, before = (float(np.abs(x.reached[1:]).max()) for x in (self, coarser))
@@ -141,17 +139,13 @@ class _Solution:
 
 
 class _Kernel(NamedTuple):
-    """The function that solves a scene with equal steps, and what determines its steps.
-
-    `rate` (rad/s) is that of the phases of motion and torque, `pushed` the omega (rad/s) by the
-    torque alone, and `most` the work limit in right-hand sides.
-    """
+    """A scene and its times as functions of the step size (s), and bounds for the steps."""
 
     solution: "Callable[[float], _Solution]"
-    counts: Callable[[float], Array]
-    rate: float
-    pushed: float
-    most: float
+    counts: Callable[[float], Array]  # steps in each interval
+    rate: float  # largest frequency of motion and torque, rad/s
+    pushed: float  # omega by the torque alone, rad/s
+    most: float  # work limit, right-hand sides
 
 
 def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) -> _Kernel:
@@ -172,7 +166,7 @@ def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) ->
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of steps in each interval, at most `step` (s) and a relative 1e-6 long."""
+    """Return the number of steps in each interval; one may exceed `step` (s) by a relative 1e-6."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
@@ -184,5 +178,5 @@ def _lengths(times: Sequence[float]) -> Array:
 
 
 def _first_step(rate: float, shortest: float) -> float:
-    """Return a step size (s), a part of `shortest`, in which a phase grows by half a radian."""
+    """Return a step (s), a whole part of `shortest`, with at most half a radian of phase."""
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

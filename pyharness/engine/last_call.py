@@ -1,6 +1,6 @@
-"""The status of this thread's last call of a prepared solver, and its error estimates.
+"""The status and error estimates of this thread's last call of a prepared solver.
 
-A call that raised an error or was interrupted is none.
+Calls that raised an error or were interrupted do not count.
 """
 
 from dataclasses import replace
@@ -48,7 +48,7 @@ class LastCall:
 
     @property
     def ctypes(self) -> CompiledCall:
-        """Return the solver for compiled code, as of numba; `capsule` is for C."""
+        """Return the solver for compiled code, such as numba's; `capsule` is for C."""
         return compiled_call(self)
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
@@ -59,7 +59,7 @@ class LastCall:
         scene = replace(self._scene_of_calls, omega=three("omega0", omega0))
         tolerance, asked, effort = self._given
         method = "taylor" if asked == "quick" else asked
-        # A method with a fixed step takes no tolerance. For such a method `solve` expects 1.
+        # `solve` expects the tolerance 1 for a method with a fixed step.
         tolerance = max(tolerance, METHODS[method].finest)
         return solve(scene, times, method, tolerance, effort=effort, attitude=self._with_attitude)
 
@@ -68,14 +68,15 @@ class LastCall:
         """Return how the last call ended; ``complete`` before the first.
 
         ``gave up``: work limit exceeded, or no correct digit of the phase left; ``refused``: the
-        method does not apply; ``sensitive``: amplified rounding errors exceed the tolerance. To
-        find the last takes microseconds for a closed form, milliseconds for Gauss collocation.
+        method does not apply; ``sensitive``: amplified rounding errors exceed the tolerance. The
+        test for ``sensitive`` takes microseconds for a closed form, milliseconds for Gauss
+        collocation.
         """
         return self._judge()[0]
 
     @property
     def error(self) -> float | None:
-        """Return the last result's estimated error, relative or of the angle (rad), or None."""
+        """Return the estimated error of the last result, relative or an angle (rad), or None."""
         return self._judge()[1]
 
     @property
@@ -85,16 +86,16 @@ class LastCall:
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits, or None."""
+        """Return the number of correct decimal digits of the last result, or None."""
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
-        """Return the number of steps; for Gauss collocation, of right-hand sides."""
+        """Return the steps of the last call; for Gauss collocation, the right-hand sides."""
         return abs(self._counted())
 
     def _counted(self) -> int:
-        """Return the number of steps, negative if the kernel chose `quick`."""
+        """Return the steps of the last call, negative if the kernel chose `quick`."""
         ending = self._ending
         return 0 if ending is None else ending[1]
 

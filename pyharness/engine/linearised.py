@@ -5,18 +5,18 @@ import numpy as np
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-_HUGE = 1e100  # limit of a matrix element, which keeps products finite
+_HUGE = 1e100  # largest matrix element, which keeps products finite
 
 
 def propagators(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the state-transition matrices of omega from close times to the last, (n, 3, 3)."""
+    """Return the state-transition matrices of omega from n close times to the last, (n, 3, 3)."""
     return transitions(times, jacobians(scene, 0.5 * (omega[1:] + omega[:-1])))
 
 
 def transitions(times: Array, slopes: Array) -> Array:
-    """Return the state-transition matrices, (n, m, m), from Jacobians (1/s) between the times."""
-    # The Jacobian hardly changes from one time to the next. Therefore the exponential of the
-    # Jacobian times the interval is the state-transition matrix over this interval.
+    """Return transition matrices from n times (s) to the last, (n, m, m), by Jacobians (1/s)."""
+    # The Jacobian hardly changes in an interval. Therefore the exponential of Jacobian times
+    # interval is the state-transition matrix.
     pieces = exponentials(np.diff(times)[:, None, None] * slopes)
     size = slopes.shape[-1]
     found = np.empty((len(times), size, size))
@@ -44,7 +44,7 @@ def exponentials(small: Array) -> Array:
 
 
 def jacobians(scene: Scene, omega: Array) -> Array:
-    """Return the Jacobian matrices (1/s) at each omega, shape (n, 3, 3)."""
+    """Return the Jacobian matrices (1/s) at n omegas (rad/s), shape (n, 3, 3)."""
     a, b, c = scene.euler_coefficients
     x, y, z = omega.T
     zero = np.zeros(len(omega))

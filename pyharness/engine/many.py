@@ -1,6 +1,6 @@
-"""Solution of many bodies in one call, in parallel in the kernel and in several threads.
+"""Solution of many bodies in one call, side by side in the kernel and in threads.
 
-A result is bit-for-bit the same whatever the other bodies, their order and the threads.
+The other bodies, their order and the number of threads change no bit of a result.
 """
 
 from collections.abc import Iterable, Sequence
@@ -57,7 +57,7 @@ _STARTS = ("omega0", "attitude0")
 _MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
-_UNKNOWN = -1.0  # a kernel's estimate of what it does not know
+_UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 
 
 def solve_many(
@@ -89,18 +89,18 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, which supplies what no array does; or all scenes, without arrays.
+        One scene, whose values hold where no array is given; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
-        Final times, s, of either sign or 0.
+        Final times, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
-        Initial angular velocities, rad/s. One row serves all bodies, here and below.
+        Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
-        Quaternions at time 0, from body to space, scalar first. The default is the scene's; without
-        one, no attitudes are returned.
+        Quaternions at time 0, from body to space, scalar first. The default is that of the scene;
+        if the scene has no attitude, none are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
-        Inertia matrices (kg m2), in place of moments; vectors and attitudes are about their axes.
+        Inertia matrices (kg m2), instead of moments, about the axes of all vectors and attitudes.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
         Constant torques (N m) and their rates (N m/s); over the moments (1/s2, 1/s3) for bodies
         given by coefficients.
@@ -120,27 +120,28 @@ def solve_many(
     estimates : bool
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
-        Functions whose roots are found, as in `solve`; none may be terminal. They need the method
+        Functions whose roots are computed, as in `solve`, but not terminal. They need the method
         `auto`, `taylor` or `closed-form`, and some milliseconds a body.
     sensitivities : iterable of str
-        Names of parameters, as in `solve`, for derivatives of final states by the same methods.
+        Names of parameters, as in `solve`, for derivatives of the final states, by the same three
+        methods.
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
-        An earlier result for as many bodies, or an array for omega, to be overwritten.
+        An earlier result for n bodies, or an array for omega, to be overwritten.
     progress : bool
         Whether to show a progress bar.
 
     Returns
     -------
     Ensemble
-        The final states. A body that can't be solved has NaN and a status with the reason.
+        The final states. A body that can't be solved has NaN, and its status has the reason.
 
     Raises
     ------
     InputError
         If the arrays differ in their numbers of rows, the method can't solve the bodies, the
-        tolerance or effort is out of range, or events or sensitivities can't be computed for any.
+        tolerance or effort is out of range, or no events or sensitivities can be computed.
     NotBuiltError
         If the extension is not built.
 
@@ -171,7 +172,7 @@ def solve_many(
             estimates=boolean("estimates", estimates), threads=threads,
         )  # fmt: skip
     if details is None:
-        # The result of an earlier call may be used again.
+        # `out` may have the details of an earlier call.
         has_details = found.t_events is not None or found.sensitivities is not None
         return replace(found, **_NO_DETAILS) if has_details else found
     with bar_of_bodies(progress):
@@ -257,11 +258,7 @@ def _solve_groups(
     scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of scenes that need several kernel calls.
-
-    Bodies with moments or coefficients share one, those with an inertia matrix another; a torque in
-    space or of the state has its own.
-    """
+    """Return the final states of scenes that one kernel call can't solve."""
     check_alike(scenes)
     if scenes[0].attitude is None and any(each.torque.needs_attitude for each in scenes):
         raise InputError(NO_ATTITUDE)
@@ -276,8 +273,8 @@ def _solve_groups(
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
-        # One scene is not worth the preparation of a vector kernel. With an array, even of the same
-        # torque, the body is solved alone.
+        # One scene is not worth the preparation of a vector kernel. An array of the torque, even of
+        # the same torque, avoids it.
         alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
         part = solve_many(own, times[rows], step=step, **alone, **settings)
         found.omega[rows], found.status[rows] = part.omega, part.status
@@ -289,7 +286,7 @@ def _solve_groups(
 
 
 class _Bodies:
-    """The checked arguments of the kernel: `ready` rows of a scene, replaced by `own` arrays."""
+    """The checked arguments of the kernel: rows of a scene, `ready`, or instead arrays, `own`."""
 
     def __init__(
         self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
@@ -330,7 +327,7 @@ class _Bodies:
         found = place_for(out, self.n, self.attitude is not None, with_estimates)
         if found.estimates is not None:
             found.estimates[:] = _UNKNOWN
-        # A kernel may write a result before it reads the start again.
+        # The kernel may write a result before it reads the start again.
         if np.may_share_memory(self.omega0, found.omega):
             self.omega0 = self.omega0.copy()
         attitude = self.attitude
@@ -357,7 +354,7 @@ class _Bodies:
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the kernel's integer for a method, and the tolerance, or raise InputError."""
+    """Return the kernel's code of a method and the tolerance, or raise InputError."""
     if not isinstance(method, str) or method not in PREPARED:
         raise unknown("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)

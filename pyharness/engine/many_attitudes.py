@@ -27,10 +27,7 @@ def many_attitudes(
     solver: "AttitudeSolver", code: int, omega0: Any, t_end: Any, attitude0: Any = None, *,
     threads: int = 1, out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Solve one scene from n initial omegas and attitudes, as `AttitudeSolver.many` does.
-
-    Torques in space or of the state, changing moments and full matrices are solved one by one.
-    """
+    """Return what `AttitudeSolver.many` does: omegas, (n, 3), attitudes, (n, 4), and statuses."""
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)
@@ -41,7 +38,7 @@ def many_attitudes(
     found = place_for(out, n, with_attitude=True)
     if out is not None:  # the starts may share memory with it
         starts, turns = starts.copy(), None if turns is None else turns.copy()
-    # A subclass does more than the kernel.
+    # A subclass, as for full inertia matrices, does more than the kernel.
     has_kernel = code in _SIDE_BY_SIDE and "__call__" not in vars(type(solver))
     if has_kernel:
         turns = rows_of("attitude0", usual, 4) if turns is None else turns

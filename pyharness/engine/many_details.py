@@ -1,4 +1,4 @@
-"""Events and sensitivities of many bodies, found body by body."""
+"""Events and sensitivities of many bodies, computed body by body."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -104,7 +104,7 @@ class Details:
         return self.scenes[i] if self.scenes else scene_of_row(self.scene, self.rows, i)
 
     def _any_scene(self) -> Scene:
-        """Return the first allowed scene, or else the common one."""
+        """Return the scene of the first valid body, or else the common scene."""
         for i in range(max(map(len, self.rows.values()), default=0)):
             try:
                 return self._scene_of(i)
@@ -114,7 +114,7 @@ class Details:
 
 
 def _checked_rows(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return copies of the given arrays, one row for each body."""
+    """Return copies of the arrays, with one row for each body or for all."""
     rows = rows_of_bodies(arrays)
     for name, shape in (("coefficients", 3), ("omega0", 3), ("attitude0", 4)):
         if arrays[name] is not None:

@@ -16,10 +16,10 @@ def solve_side_by_side(
     solver: Any, starts: Array, times: Array, turns: Array | None, found: Ensemble, piece: slice,
     given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve the bodies in `piece` side by side, and return the numbers of those that are left.
+    """Solve the bodies in `piece` side by side, and return the indices of the unsolved bodies.
 
-    Left is a body whose error can't be measured; all are, if the torque is neither recorded nor in
-    space, or the solver does more than its kernel.
+    A body remains unsolved if its error can't be measured. All do if the torque is neither recorded
+    nor in space, or if the solver does more than its kernel.
     """
     is_plain = "__call__" not in vars(type(solver))
     packed = getattr(solver, "packed_for_lanes", solver.packed) if is_plain else None

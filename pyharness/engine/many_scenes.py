@@ -20,14 +20,14 @@ _MOST_KEPT = 8  # scenes whose arrays are kept
 
 
 class Axes:
-    """The principal axes of n bodies, or of all, and conversions."""
+    """The principal axes of n bodies, or one set for all, and conversions to and from them."""
 
     def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the axes, columns of `axes`, (n, 3, 3), also as quaternions, (n, 4)."""
+        """Store the axes as columns, (n, 3, 3), and as quaternions, (n, 4)."""
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert the arrays `omega0` and `attitude0` of `given`, if named, in place."""
+        """Replace `omega0` and `attitude0` of `given`, if in `names`, by those about the axes."""
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
             self._check("omega0", rows)
@@ -39,7 +39,7 @@ class Axes:
             given["attitude0"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Convert final omegas, (n, 3), and attitudes, (n, 4), in place."""
+        """Convert final omegas, (n, 3), and attitudes, (n, 4), back in place."""
         omega[:] = rotated(omega, self.axes)
         if attitude is not None:
             attitude[:] = turned_back(attitude, self.turns)
@@ -50,9 +50,9 @@ class Axes:
 
 
 def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
-    """Return scenes with full inertia matrices as arrays about principal axes; None as NaN.
+    """Return scenes with full inertia matrices as arrays about principal axes, and these axes.
 
-    They have A, B, C, which rounded moments would give less accurately.
+    None becomes NaN. The arrays have A, B, C, because rounded moments are less accurate.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -83,7 +83,6 @@ def _full_row(scene: Scene) -> dict[str, Any]:
 
 
 def _filled(laws: list[Any]) -> list[Any]:
-    """Return lists of waves filled up to one length."""
     most = max(map(len, laws))
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
@@ -106,12 +105,12 @@ _kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return `checked_rows` of a scene, kept and not to be changed, and its `merged` torque.
+    """Return the shared, read-only `checked_rows` of a scene, with its `merged` torque.
 
-    For few bodies the conversion takes longer than the solution.
+    They are cached, because for few bodies the conversion takes longer than the solution.
     """
-    # Equal scenes may differ in the signs of zeros. Hence an entry holds for one object only, and
-    # keeps it alive so that no other object gets its identity.
+    # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
+    # its scene alive, so that no other object gets its identity.
     found = _kept.get(id(scene))
     if found is not None:
         return found[1]
@@ -124,7 +123,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
-    """Return float arrays with one row per body, or one for all; raise InputError for others."""
+    """Return float arrays with one row per body, or one for all; raise InputError otherwise."""
     rows = {}
     for name, convert in _CONVERSIONS.items():
         values = given.get(name)
@@ -134,7 +133,7 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def check_alike(scenes: Sequence[Scene]) -> None:
-    """Raise InputError if scenes differ in having attitudes, or in step sizes."""
+    """Raise InputError if only some scenes have attitudes, or their step sizes differ."""
     if len({each.step_size for each in scenes}) > 1:
         raise InputError("the scenes have different step sizes; allowed: one step size for all")
     if len({each.attitude is None for each in scenes}) > 1:
@@ -144,7 +143,7 @@ def check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Return arrays for scenes, or raise InputError if one kernel call can't solve all."""
+    """Return the arrays of scenes, or raise InputError if one kernel call can't solve all."""
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
@@ -169,7 +168,7 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return found
 
 
-# The arrays of `solve_many`, in the order in which they are checked.
+# In the order in which `solve_many` checks its arrays.
 _CONVERSIONS: dict[str, Callable[[Any], Array]] = {
     **{
         name: lambda values, name=name: rows_of(name, values, 3)  # type: ignore[misc]

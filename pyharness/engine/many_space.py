@@ -1,7 +1,7 @@
-"""Conversion of many bodies, given by arrays, to one scene each, for `solve_many`.
+"""Conversion of the arrays of `solve_many` to one scene per body.
 
-Full inertia matrices need it, and torques about the axes of space or of the state, whose bodies
-prepared solvers solve here, one after the other.
+Full inertia matrices need it, and so do torques in space or of the state, and changing inertias,
+whose bodies are solved here by prepared solvers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,9 +31,9 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes 
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether no kernel takes several bodies of this kind.
+    """Return whether the general kernel for many bodies can't take the scene.
 
-    Raise InputError for an array of the torque beside one that depends on the state.
+    Raise InputError if its torque depends on the state, and `arrays` has torques too.
     """
     named = [name for name, each in arrays.items() if each is not None]
     if isinstance(scene.torque, StateTorque):
@@ -51,9 +51,10 @@ def solve_one_by_one(
     scene: Scene, t_end: Any, arrays: dict[str, Any], out: "Ensemble | Array | None", *,
     method: str, tolerance: float, effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
-    """Return the final states of bodies that are each solved alone; invalid ones are REFUSED.
+    """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if the torque lacks an attitude, or in space acts on coefficients.
+    Raise InputError if the torque needs an attitude and has none, if the method can't solve the
+    scene, or if a torque in space acts on bodies given by coefficients.
     """
     check_torque(scene, method, attitude=True)
     check_prepared(scene, method)
@@ -79,7 +80,7 @@ def solve_one_by_one(
     if found.estimates is not None:
         found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
-    # All bodies share one solver if they differ in their starts alone.
+    # Bodies that differ in their starts alone share one solver.
     shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
     # `omega0` or `attitude0` may share memory with `out`.
     omega = np.full((n, 3), np.nan)
@@ -126,10 +127,8 @@ _kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}
 def _kept_solver(
     scene: Scene, method: str, tolerance: float, effort: float, with_attitude: bool
 ) -> Any:
-    """Return the prepared solver of a scene, kept because preparation takes long.
-
-    An entry keeps its scene alive, so that no other object gets its identity.
-    """
+    """Return the prepared solver of a scene, cached because preparation takes long."""
+    # An entry keeps its scene alive, so that no other object gets its identity.
     key = id(scene), method, tolerance, effort, with_attitude
     if key not in _kept:
         if len(_kept) >= _MOST_KEPT:
@@ -141,7 +140,7 @@ def _kept_solver(
 
 
 def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return a scene for each body, or None for invalid numbers."""
+    """Return the scene of each body; None for a body with invalid numbers."""
     rows = rows_of_bodies(arrays)
     found: list[Scene | None] = []
     for i in range(count_bodies(rows)):
@@ -153,7 +152,7 @@ def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
 
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques, with checked shapes."""
+    """Return the arrays of bodies and torques that are not None, with checked shapes."""
     shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
     rows = {}
     for name, values in arrays.items():
@@ -165,7 +164,7 @@ def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene of body `i`, or raise InputError."""
+    """Return the scene of body `i`, or raise InputError if its numbers are invalid."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     torque: dict[str, Any] = {
         name.removeprefix("torque_"): own.pop(name)

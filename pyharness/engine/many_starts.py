@@ -14,10 +14,7 @@ from pyharness.model.trajectory import Array
 def many_starts(
     packed: Array, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
-    """Return the final omegas (rad/s), (n, 3), and statuses, (n,), from n initial omegas.
-
-    Raise InputError for another shape.
-    """
+    """Return final omegas (rad/s), (n, 3), and statuses, or raise InputError for wrong shapes."""
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)

@@ -1,4 +1,4 @@
-"""Packing of a scene into one array for kernels."""
+"""The array by which a kernel of a prepared solver receives a scene."""
 
 import numpy as np
 
@@ -34,6 +34,6 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
 def _torque_of(scene: Scene) -> tuple[Array, ...]:
     if not scene.torque.in_space:
         return normalized(scene)
-    # The ratios of the moments are left out, because the packed array contains the moments.
+    # The packed array has the moments, and therefore not their ratios.
     coefficients, _, *torque = normalized_in_space(scene)
     return coefficients, *torque

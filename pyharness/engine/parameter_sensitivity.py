@@ -1,4 +1,4 @@
-"""Sensitivities: derivatives of a solution by parameters, by Taylor series."""
+"""Sensitivities, the derivatives of a solution by parameters, by Taylor series."""
 
 import itertools
 import math
@@ -26,13 +26,13 @@ from pyharness.model.trajectory import Trajectory
 
 # Largest tolerance of the derivatives of one period, and smallest tolerance of any.
 _OF_PERIOD, _FINEST = 1e-13, 1e-15
-# Change of omega in a period, relative, from which on the derivatives of the period are used.
+# Smallest relative change of omega in a period at which the derivatives of one period are used.
 _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
-_THREE = (0.0, 0.0, 0.0)  # as many values as omega0 and the attitude have
-# The parameters whose equations are periodic for a body without torque. The period depends on all
-# of them but the torque, under which it changes with time.
+_THREE = (0.0, 0.0, 0.0)  # stands for omega0 and attitude, which have three columns
+# The parameters whose equations are periodic for a body without torque. All but the torque change
+# the period once; a torque changes it with time.
 _CONSTANT = "torque.constant"
 _PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
 
@@ -40,9 +40,9 @@ _PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
 def checked_names(
     scene: Scene, names: Iterable[str], method: str, attitude: bool
 ) -> tuple[str, ...]:
-    """Return the given names of parameters, each once.
+    """Return the names of parameters without repetitions.
 
-    Raise InputError if one is unknown, or its sensitivities can't be computed.
+    Raise InputError if a name is unknown, or its sensitivities can't be computed.
     """
     place = "sensitivities"
     if method not in _METHODS:
@@ -75,21 +75,20 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], tolerance: float, effort: float
 ) -> dict[str, Array]:
-    """Return the derivatives of `found` by name, of shape (n, 3, m) or (n, 7, m) for m values.
+    """Return the derivatives by each parameter of m values, shape (n, 3, m) or (n, 7, m).
 
-    `tolerance` is relative to the largest in a column so far. Raise InputError if the work limit is
-    exceeded, or a derivative overflows.
+    `tolerance` is relative to the largest derivative in a column so far. Raise InputError if the
+    work limit is exceeded, or a derivative overflows.
     """
     if not names:
         return {}
     times, attitude = found.time, found.attitude is not None
-    # Near the separatrix, an error of omega as large as the distance from it would lead to the
-    # derivatives of another motion.
+    # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
-    # Only a closed form takes no evaluations.
+    # Closed forms alone take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = _period(scene) if is_closed else 0.0
-    # Two periods take as long as the calculation from one period.
+    # The calculation from one period takes as long as an integration over two.
     if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):
         columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
     else:
@@ -101,7 +100,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns of each name, all derivatives, and those at 0."""
+    """Return the columns of each name, the derivatives, (n, 3, m) or (n, 7, m), and those at 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed, forcings = _packed(equations.tape, len(state), equations.forcings)
@@ -123,14 +122,14 @@ def _by_series(
 
 def _period(scene: Scene) -> float:
     """Return the period of omega (s), or 0 if there is none, or omega is nearly constant."""
-    # A function that is 0 now, and has a parameter of this name, may depend on time.
+    # The derivatives of a function that is 0 by its parameters may depend on time.
     period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
     largest = math.hypot(*scene.omega)
     return period if period * np.abs(_slope(scene)).max() > _VARIES * largest else 0.0
 
 
 def _slope(scene: Scene) -> Array:
-    """Return the derivative of omega at time 0 without torque."""
+    """Return the derivative of omega (rad/s2) at time 0 without torque."""
     x, y, z = scene.omega
     if scene.inertia is None:
         return np.array(scene.euler_coefficients) * (y * z, z * x, x * y)
@@ -142,18 +141,16 @@ def _slope(scene: Scene) -> Array:
 def _by_periods(
     scene: Scene, names: Sequence[str], times: Array, period: float, tolerance: float, effort: float
 ) -> tuple[dict[str, slice], Array]:
-    """Return the columns of each name, and all derivatives of a periodic omega, shape (n, 3, m).
-
-    By Floquet's theorem, a perturbation of the initial omega changes the period, and grows by the
-    same multiple of the slope of omega in every period: M = I + N is the matrix of one period,
-    where N has rank 1, and N N = 0. Therefore k periods add up to M^k = I + k N, and the part F
-    that the parameters cause in the first period to k F + k (k - 1)/2 N F. The moments change the
-    period once and for all: their N F is 0.
-    """
+    """Return the columns of each name, and the derivatives of a periodic omega, (n, 3, m)."""
+    # A perturbation of the initial omega changes the period, and thus grows by the same multiple of
+    # the slope of omega in every period. Therefore the state-transition matrix of one period is M =
+    # I + N, where N has rank 1 and N N = 0, and that of k periods M^k = I + k N (Floquet). The part
+    # F that the parameters cause in one period adds up to k F + k (k - 1)/2 N F. For moments, which
+    # change the period once, N F is 0.
     whole = np.floor(times / period)
     rest = times - whole * period
     inner, place = np.unique(np.append(np.clip(rest, 0.0, period), period), return_inverse=True)
-    # The error of one period is repeated in every other one.
+    # Every period repeats the error of the first.
     tolerance = min(tolerance, _OF_PERIOD)
     columns, rows, starts = _by_series(
         scene, (OMEGA0, *(x for x in names if x != OMEGA0)), False, inner, tolerance, effort
@@ -175,7 +172,7 @@ def _by_periods(
 def _packed(
     tape: Tape, n_unknowns: int, forcings: NDArray[np.int32]
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return a tape as the kernel reads it, with combinations in place of outputs."""
+    """Return the kernel's array of a tape, and `forcings` as numbers of its combinations."""
     packed = kernel_tape(tape, n_unknowns)
     # The outputs are the last combinations, which the array counts here.
     first = int(packed[3]) - len(tape.outputs)

@@ -39,8 +39,9 @@ class _Body(NamedTuple):
 class VariedEquations:
     """The equations of motion of a scene, and how they depend on parameters.
 
-    `tape` has partial derivatives of the rates, then the rates. `forcings`, shape (n, m), numbers
-    those of n rates and m columns from 1, or 0 for none. `columns` are those of each name.
+    `tape` has the partial derivatives of the rates as outputs, then the rates. `forcings`, shape
+    (n, m), are the numbers, from 1, of the outputs for n rates and m columns; 0 for a derivative of
+    0. `columns` are the columns of each name.
     """
 
     tape: Tape
@@ -51,7 +52,7 @@ class VariedEquations:
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
     """Return the parameters of a scene by name, except the initial state.
 
-    A name that two summands of the torque have is None.
+    The value of a name that two summands of the torque have is None.
     """
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
@@ -67,7 +68,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations with their derivatives by parameters and initial state."""
+    """Return the equations of motion with their derivatives by the named parameters."""
     body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
@@ -75,7 +76,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at 0, (n,), and its derivatives by column, (n, m)."""
+    """Return the state at time 0, (n,), and its derivatives by parameter, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]
@@ -96,10 +97,8 @@ def _equations(
     values: tuple[tuple[str, tuple[float, ...]], ...],
     attitude: bool,
 ) -> VariedEquations:
-    """Return the equations for pairs of names and values, in the order of columns.
-
-    Names of the initial state have no values, but three columns.
-    """
+    """Return the equations; `values` are pairs of names and values, in the order of columns."""
+    # Names of the initial state have no values, but three columns.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]
     recorder = Recorder(
@@ -116,7 +115,7 @@ def _equations(
         if attitude:
             rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
         tape = with_parameters(recorder.tape(rates), flat)
-    # The derivatives of a rate with respect to all parameters are outputs in a row.
+    # The derivatives of one rate by all parameters are adjacent outputs.
     forcings, columns = [], {}
     parameter = first = 0
     for name, listed in values:
@@ -134,7 +133,7 @@ def _equations(
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
-    """Return the summands of a torque, with names for their numbers if possible."""
+    """Return the summands of a torque, if possible in the form that names their numbers."""
     parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
     return [getattr(part, "named", None) or part for part in parts]
 
@@ -153,7 +152,7 @@ def _parameters_of(part: StateTorque | TorqueLaw) -> dict[str, list[float]]:
 def _torque(
     part: TorqueLaw | StateTorque, time: Any, omega: Any, q: Any, given: Mapping[str, list[Any]]
 ) -> Any:
-    """Return a summand of the torque with symbols for `given` parameters."""
+    """Return a summand of the torque, with the symbols `given` in place of parameters."""
     if isinstance(part, TorqueLaw):
         law: Any = SimpleNamespace(in_space=part.frame == "space")
         for name in ("constant", "rate"):
@@ -182,7 +181,7 @@ def _torque(
 def _rates(
     body: _Body, time: Any, omega: Any, torque: Any, given: Mapping[str, list[Any]]
 ) -> Sequence[Any]:
-    """Return the derivative of omega with symbols for `given` parameters."""
+    """Return the derivative of omega, with the symbols `given` in place of parameters."""
     if body.changing is not None:
         return rates_of_changing(body.changing, time, omega, torque)
     x, y, z = omega

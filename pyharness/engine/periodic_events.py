@@ -1,4 +1,4 @@
-"""Events of a body without torque: those of one period, repeated."""
+"""Events of a body without torque, by repetition of the events of one period."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,19 +10,19 @@ from pyharness.model.errors import InputError
 from pyharness.model.symbols import Recorder
 from pyharness.model.tape import ATTITUDE, N_INPUTS, TIME
 
-# The events are found in so many periods, where the second and third have no end of the solution.
+# Events are searched in so many periods, of which the second is repeated: no end is in or near it.
 PERIODS = 3.0
 _MOST_EVENTS = 5_000_000
 _BLOCK = 100_000  # events that are improved together
-# Half the distance at which the slope of a function is measured, in periods. It is the largest
-# correction of a time too.
+# Half the distance of the values that give a function's slope, and the largest correction of a
+# time, in periods.
 _PROBE = 1e-5
-# Largest error of the time of an event, in periods, before the time is improved.
+# Largest error of the time of an event before its improvement, in periods.
 _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether functions, called once with symbols, depend on omega and its slope alone."""
+    """Return whether all functions, recorded with symbols, depend on omega and its rate alone."""
     return all(map(_is_of_omega, functions))
 
 
@@ -38,17 +38,18 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times of events until `end`, and how many are those of `times`.
+    """Return the times of events until `end` (s), and how many, at the start, are from `times`.
 
-    The latter (s) are of the first PERIODS periods. Raise InputError for too many events.
+    `times` (s) are the events of the first PERIODS periods. Raise InputError for more than
+    5 000 000 events.
     """
     # An event at the end of a period may be found on either side of it, and is not lost here.
     margin = _MARGIN * period
     inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
     if not inner.size:
-        # There may be an event at time 0 alone.
+        # Time 0 may be an event that does not recur.
         return times[times < period], len(times[times < period])
-    # No event is near the beginning of the period that is repeated.
+    # The repeated period begins in the largest gap, far from any event.
     phases = np.sort(inner % period)
     gaps = np.diff(phases, append=phases[0] + period)
     begin = period + phases[gaps.argmax()] + 0.5 * gaps.max()
@@ -68,7 +69,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
 def improved(
     g: EventFunction, times: Array, values: Callable[[EventFunction, Array], Array], period: float
 ) -> Array:
-    """Return the times (s) of events, after one Newton step."""
+    """Return the times (s) of events, improved by one Newton step each."""
     found, probe = times.copy(), _PROBE * period
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]

@@ -13,16 +13,16 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
 FINEST = REGISTRY["auto"].finest
-# Under a torque with fast waves, Runge-Kutta, which averages them, may take fewer operations than a
-# Taylor series, or may be the only one that can solve the scene. The kernel chooses between the two
-# down to the smallest tolerance at which that was seen.
+# Under a torque with fast waves, Runge-Kutta, which averages them, may need fewer operations than
+# the Taylor series, or be the only method that can solve the scene. The kernel chooses between the
+# two, down to the smallest tolerance at which Runge-Kutta was better in tests.
 RK4_OR_TAYLOR = "quick or taylor"
 _FEW_DIGITS = 1e-9
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The decision whether a part, such as ``torque``, is computed, and why."""
+    """The decision whether a part, such as ``torque``, is computed, and the reason."""
 
     part: str
     kept: bool
@@ -31,10 +31,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Plan:
-    """The choices that are made before a scene is solved: the method and the computed quantities.
-
-    `closed_form` is its kind, as ``sphere``; `fallback` a method if `method` can't solve the scene.
-    """
+    """The choices before a scene is solved: the method and the computed quantities."""
 
     scene: Scene
     method: str  # name of the method that was chosen or requested
@@ -45,7 +42,7 @@ class Plan:
 
     @cached_property
     def decisions(self) -> tuple[Decision, ...]:
-        """Return a decision for each part of the scene's solution."""
+        """Return the decisions on all parts of the solution."""
         return tuple(_decisions(self))
 
     @property

@@ -1,4 +1,4 @@
-"""Preparation of a solver: the scene is checked, its method chosen, and both packed for C."""
+"""Preparation of solvers for many calls with one scene."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, overload
@@ -52,9 +52,9 @@ def prepare(
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
-        end, by default as in `solve`. Fixed steps and Gauss collocation do not follow it. If the
-        motion amplifies perturbations by a factor K, no method has a relative error below some
-        1e-15 K.
+        end, by default as in `solve`. It does not change the error of fixed steps and Gauss
+        collocation. If the motion amplifies perturbations by a factor K, no method has a relative
+        error below some 1e-15 K.
     effort : float
         Factor on the work limit of a call, some ten seconds, beyond which the status is `gave up`.
     attitude : bool
@@ -66,14 +66,14 @@ def prepare(
         A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
         `attitude` also a quaternion from body to space, scalar first, shape (4,). Under a torque
         that depends on the state, an initial omega above 2**300 or below 2**-300 rad/s is
-        `refused`; `solve` takes any.
+        `refused`; `solve` accepts it.
 
     Raises
     ------
     InputError
-        If the method is unknown, or can't take the scene or its attitude; if a torque lacks the
-        attitude it needs; if the tolerance or effort is out of range. A call raises it if a
-        changing moment reaches 0 before `t_end`.
+        If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
+        attitude, and `attitude` is false; if the tolerance or effort is out of range. A call raises
+        InputError if a changing moment reaches 0 before `t_end`.
     NotBuiltError
         If the extension is not built.
 

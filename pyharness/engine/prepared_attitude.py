@@ -36,13 +36,13 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
     """A solver of omega and attitude of a scene, prepared for one method.
 
     Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``: three numbers
-    (rad/s), the final time (s), positive, negative or 0, and a quaternion from body to space,
-    scalar first, by default the scene's or (1, 0, 0, 0).
+    (rad/s), the final time (s), positive, negative or 0, and the initial quaternion from body to
+    space, scalar first, by default the scene's or (1, 0, 0, 0).
 
-    It returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at `t_end`;
-    both are NaN if the kernel could not finish, and `status` has the reason. Other arguments raise
-    an InputError. Calls are fastest with arrays of floats and a unit quaternion. Threads may share
-    a solver; it can be copied and pickled.
+    A call returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at
+    `t_end`. Both are NaN if the kernel could not finish; `status` has the reason. Invalid arguments
+    raise an InputError. Calls are fastest with arrays of floats and a unit quaternion. Threads may
+    share a solver; it can be copied and pickled.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
             code = Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else Methods.CLOSED_FORM
         kernel = extension().solve_packed_attitude
         packed, packed_with_gil = packed_scene(scene, code, tolerance, effort), None
-        if chosen.closed_form:  # then there is no torque, and no wave can make a call slow
+        if chosen.closed_form:  # there is then no torque, whose waves could make a call slow
             packed_with_gil = packed.copy()
             packed_with_gil[Places.METHOD] = Methods.CLOSED_FORM
         solver = super().__new__(
@@ -90,17 +90,14 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
     @cached_property
     def packed_for_lanes(self) -> Array:
-        """Return the scene for the kernel that solves bodies side by side under recorded torques.
-
-        A torque in space is recorded, unless it has too many terms.
-        """
+        """Return the array for the kernel of many bodies, with torques in space recorded."""
         if self._code != Methods.SPACE_TORQUE:
             return self.packed
         scene, (tolerance, _, effort) = self.plan.scene, self._given
         try:
             recorded = replace(scene, torque=of_law(scene.law))
             return packed_scene(recorded, Methods.TAPE, tolerance, effort)
-        except InputError:
+        except InputError:  # too many terms to be recorded
             return self.packed
 
 
@@ -118,7 +115,7 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return omega and quaternion in one tuple, and `t_end` (s), of types unknown to C."""
+    """Return arguments of types that C does not know: omega with quaternion, and `t_end` (s)."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]
     return (*start, *attitude), time

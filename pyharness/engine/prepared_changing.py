@@ -28,7 +28,7 @@ class ChangingSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return `Solver.many`; a row is REFUSED if a moment reaches 0 before its time."""
+        """Return `Solver.many`; the status is REFUSED if a moment reaches 0 before the end."""
         return self._many
 
     def _many(
@@ -43,12 +43,12 @@ class ChangingSolver(Solver):
 
 
 class ChangingAttitudeSolver(AttitudeSolver):
-    """An `AttitudeSolver` with the same errors."""
+    """An `AttitudeSolver` whose calls raise InputError if a moment reaches 0 before the end."""
 
     def __call__(
         self, omega0: Numbers, t_end: Number, attitude0: Numbers | Rotation | None = None
     ) -> tuple[Array, Array]:
-        """Return omega (rad/s) and the attitude at `t_end` (s)."""
+        """Return omega (rad/s), shape (3,), and the quaternion, shape (4,), at `t_end` (s)."""
         _check_time(self.plan.scene, number("t_end", t_end))
         return super().__call__(omega0, t_end, attitude0)
 
@@ -56,7 +56,7 @@ class ChangingAttitudeSolver(AttitudeSolver):
 def prepared_changing(
     scene: Scene, method: str, tolerance: float, effort: float, attitude: bool
 ) -> ChangingSolver | ChangingAttitudeSolver:
-    """Return a solver of a scene whose inertia changes, with the arguments of `prepare`."""
+    """Return a solver of a scene whose inertia changes with time."""
     if attitude:
         chosen = attitude_plan(scene, method, tolerance)
         return ChangingAttitudeSolver(chosen, tolerance, method, effort)

@@ -1,6 +1,6 @@
 """Prepared solvers of scenes with a full inertia matrix.
 
-Calls transform to principal axes and back in Python; other solvers call the kernel from C.
+Their calls convert to principal axes and back in Python, and are slower than those from C.
 """
 
 from dataclasses import replace
@@ -32,10 +32,7 @@ def _no_compiled_call(solver: object) -> Any:
 
 
 class InertiaSolver(Solver):
-    """A `Solver` whose omegas are about the axes of the inertia matrix.
-
-    `plan` and `growth` are about principal axes.
-    """
+    """A `Solver` about the matrix's axes; `plan` and `growth` are about principal axes."""
 
     ctypes = capsule = property(_no_compiled_call)
 
@@ -43,7 +40,7 @@ class InertiaSolver(Solver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver; `chosen` has the scene about principal axes, `scene` the matrix."""
+        """Create a solver; `chosen` is for principal axes, `scene` has the matrix."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -72,7 +69,7 @@ class InertiaSolver(Solver):
 
     @property
     def many(self) -> Any:
-        """Return the function ``solver.many(omega0, t_end)``, as `Solver.many` describes."""
+        """Return the function that `Solver.many` describes."""
         return self._many
 
     def _many(
@@ -99,7 +96,7 @@ class InertiaAttitudeSolver(AttitudeSolver):
         cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0,
         scene: Scene | None = None,
     ) -> Self:  # fmt: skip
-        """Create a solver, as `InertiaSolver`."""
+        """Create a solver; `chosen` is for principal axes, `scene` has the matrix."""
         solver = super().__new__(cls, chosen, tolerance, asked, effort)
         assert scene is not None
         solver._scene = scene
@@ -133,16 +130,14 @@ class InertiaAttitudeSolver(AttitudeSolver):
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
-    """Return the principal axes as a matrix of columns, and as a quaternion."""
+    """Return the principal axes, as columns, shape (3, 3), and as a quaternion."""
     about_principal, axes = principal(replace(scene, attitude=IDENTITY))
     return axes, about_principal.attitude or IDENTITY
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3).
-
-    They are summed in a fixed order, so as to be bit-for-bit the same for any n.
-    """
+    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
+    # The fixed order of the sums gives bit-for-bit the same products for any n.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
         [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
@@ -151,7 +146,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Convert attitudes, (4,) or (n, 4), of principal axes to those of the matrix by `turn`."""
+    """Return the attitudes of the matrix's axes from those of principal axes, (4,) or (n, 4)."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

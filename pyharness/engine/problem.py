@@ -1,4 +1,4 @@
-"""Conversion of a scene for the Fortran kernels, and of their results."""
+"""Conversion of scenes to arguments of the Fortran kernels, and of their results."""
 
 import math
 from collections.abc import Sequence
@@ -19,18 +19,19 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the coefficients A, B, C, and the torque over the moments, as five arrays.
+    """Return the coefficients A, B, C, and the torque over the moments in four arrays.
 
-    They are constant (1/s2), rate (1/s3), sines and cosines, columns of three amplitudes and the
-    frequency (rad/s). Raise InputError if one is not finite.
+    The four are constant (1/s2), rate (1/s3), sines and cosines, whose columns are three amplitudes
+    and the frequency (rad/s). Raise InputError if a value is not finite.
     """
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return coefficients, the largest moment over each, and torque over it, in four arrays.
+    """Return A, B, C, the ratios of the largest moment to each, and the torque over the largest.
 
-    Moments are needed. Raise InputError if a value is not finite.
+    The scene must have moments. The torque is as in `normalized`. Raise InputError if a value is
+    not finite.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -60,8 +61,8 @@ def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, A
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without them, a closed form has an error of 1e-10 rad after 1e6 rad. They are 0 for a body given
-    by coefficients, and under a torque, where no kernel uses them.
+    Without these remainders, a closed form has an error of 1e-10 rad after 1e6 rad. They are 0 for
+    a body given by coefficients, and under a torque, where no kernel uses them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -89,9 +90,9 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return a trajectory of the first `n_rows` columns of a kernel's omega and attitudes.
+    """Return the trajectory of a kernel's first `n_rows` columns of omega and attitudes.
 
-    `error` and `growth` are omitted if the last time was not reached.
+    It has no `error` and `growth` if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
     more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
@@ -112,7 +113,7 @@ def rows_trajectory(
 def closed_form(scene: Scene) -> str | None:
     """Return the kind of closed form of a scene, or None.
 
-    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` none.
+    ``sphere`` has A = B = C = 0, ``symmetric`` two equal moments, ``elliptic`` no equal moments.
     """
     law = scene.torque
     if not isinstance(law, TorqueLaw) or law.in_space or scene.changing is not None:
@@ -127,8 +128,8 @@ def closed_form(scene: Scene) -> str | None:
     if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
-        # If one coefficient is 0 and the other two have opposite signs, omega oscillates. If these
-        # have the same sign, or if two coefficients are 0, omega may grow without bound.
+        # If one coefficient is 0, omega oscillates if the others have opposite signs. If these have
+        # the same sign, or two coefficients are 0, omega may grow without bound.
         rest = [x for x in (a, b, c) if x != 0.0]
         return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
     return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"

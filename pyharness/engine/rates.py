@@ -1,4 +1,4 @@
-"""The right-hand side of any scene, for many states."""
+"""The right-hand side of any scene, for arrays of states."""
 
 from dataclasses import replace
 
@@ -15,16 +15,15 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the derivatives of n states: omega (rad/s), (n, 3), or with the quaternion, (n, 7).
+    """Return the derivatives of n states, omega (rad/s), (n, 3), or with quaternion, (n, 7).
 
-    They are not finite where the torque is singular.
+    A derivative is not finite where the torque is singular.
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)
     torque = of_law(bare.torque) if isinstance(bare.torque, TorqueLaw) else bare.torque
     bare = replace(bare, torque=torque)
     omega, attitude = state[:, :3], state[:, 3:]
-    # Components about the principal axes.
     inner = omega @ axes
     if attitude.size:
         turned = product(attitude.T, quaternion_of_axes(axes))

@@ -1,4 +1,4 @@
-"""Ready events: functions of time and state whose roots the function `solve` finds."""
+"""Ready events, the functions of time and state whose roots `solve` computes."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ from pyharness.model.values import Number, Numbers, finite, integer, three
 def crosses(
     axis: int, value: Number = 0.0, *, terminal: bool | int = False, direction: int = 0
 ) -> Event:
-    """Return the event that a component of omega has a given value.
+    """Return the event that a component of omega equals a value.
 
     Parameters
     ----------
@@ -22,10 +22,10 @@ def crosses(
     value : float
         The value (rad/s).
     terminal : bool or int
-        Whether the first event ends the integration; a number n says that the n-th does.
+        Whether the first event ends the integration; with a number n, the n-th event does.
     direction : {-1, 0, 1}
-        1 for increasing values, -1 for decreasing ones, in the direction of integration; 0 for
-        both, and for an extremum that equals the value.
+        1 for increasing, -1 for decreasing components, in the direction of integration; 0 for both,
+        and for an extremum that equals the value.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def crosses(
     Raises
     ------
     InputError
-        If `axis` is none of the three, or `value` is no finite number.
+        If `axis` is not 1, 2 or 3, or `value` is not finite.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def crosses(
 def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega changes its sign.
 
-    A 0 without a change of sign, or at the ends of the integration, is no event.
+    A zero without a sign change, or at the ends of the integration, is no event.
 
     Parameters
     ----------
@@ -67,8 +67,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        1 for changes to a positive sign, -1 to a negative one, in the direction of integration; 0
-        for both.
+        1 for changes to positive, -1 to negative, in the direction of integration; 0 for both.
 
     Returns
     -------
@@ -78,7 +77,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
     Raises
     ------
     InputError
-        If `axis` is none of the three.
+        If `axis` is not 1, 2 or 3.
 
     Examples
     --------
@@ -102,7 +101,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
 def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega has a maximum or a minimum.
 
-    Its derivative, from the equations of motion, is 0 there.
+    It is a root of the component's derivative in the equations of motion.
 
     Parameters
     ----------
@@ -112,7 +111,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
         As in `crosses`.
     direction : {-1, 0, 1}
         Sign change of the derivative in the direction of integration: forward in time, -1 for
-        maxima and 1 for minima; backward, the reverse; 0 for both.
+        maxima and 1 for minima; backward, 1 for maxima and -1 for minima; 0 for both.
 
     Returns
     -------
@@ -122,7 +121,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     Raises
     ------
     InputError
-        If `axis` is none of the three.
+        If `axis` is not 1, 2 or 3.
 
     Examples
     --------
@@ -143,16 +142,16 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
 
 
 def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) -> Event:
-    """Return the event that the magnitude of omega falls below a given value.
+    """Return the event that the magnitude of omega falls to a value.
 
     Parameters
     ----------
     value : float
-        The value (rad/s), above 0, which a damped body does not reach.
+        The value (rad/s), above 0, because a damped body never reaches 0.
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        -1 for falling magnitudes, 1 for rising ones, in the direction of integration; 0 for both.
+        -1 for falling, 1 for rising magnitudes, in the direction of integration; 0 for both.
 
     Returns
     -------
@@ -162,7 +161,7 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
     Raises
     ------
     InputError
-        If `value` is no finite number above 0.
+        If `value` is not finite or not above 0.
 
     Examples
     --------
@@ -193,7 +192,7 @@ def tilt(
     terminal: bool | int = False,
     direction: int = 0,
 ) -> Event:
-    """Return the event that the angle between a body axis and a direction in space has a value.
+    """Return the event that the angle between a body axis and a direction in space equals a value.
 
     It needs ``attitude=True`` in `pyharness.solve`.
 
@@ -208,8 +207,7 @@ def tilt(
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        1 for increasing angles, -1 for decreasing ones, in the direction of integration; 0 for
-        both.
+        1 for increasing, -1 for decreasing angles, in the direction of integration; 0 for both.
 
     Returns
     -------
@@ -251,7 +249,7 @@ def tilt(
 
 
 def _component(unit: list[float], k: int, attitude: Any) -> Any:
-    """Return the component of `unit`, in space, along body axis k."""
+    """Return the component along body axis k of a vector `unit` about the axes of space."""
     scalar, vector = attitude[0], attitude[1:]
     i, j = (k + 1) % 3, (k + 2) % 3
     # Column k of the rotation matrix of a unit quaternion.

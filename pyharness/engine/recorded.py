@@ -39,16 +39,16 @@ def system(scene: Scene) -> Tape:
 
 @lru_cache(maxsize=64)
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
-    """Return a tape as the array that the kernel reads; fortran/modern/tape.f90 describes it.
+    """Return a tape as the kernel's array, which fortran/modern/tape.f90 describes.
 
     The last `n_unknowns` outputs, by default all, are derivatives. Sine and cosine of one angle
-    become one operation, as each recurrence needs the other.
+    become one operation, because the recurrence of one needs the other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs
     operations: list[tuple[int, int, int, int]] = []
     combinations: list[tuple[float, list[tuple[int, float]]]] = []
-    frequencies: dict[int, int] = {}  # the combination that is proportional to time, by slot
+    frequencies: dict[int, int] = {}  # numbers of combinations proportional to time, by slot
     waves: dict[int, int] = {}
     tables: list[Table] = []
 
@@ -82,7 +82,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
         combined(output)
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
-    # f2py refuses an empty array, and a table of no piece is never read.
+    # f2py refuses empty arrays. The kernel does not read these entries.
     breaks = [time for each in tables for time in each.breaks] or [0.0]
     pieces = [number for each in tables for piece in each.pieces for number in piece] or [0.0] * 4
     counts = [
@@ -107,7 +107,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
 
 
 def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
-    """Return integers as bits in floats, two in each."""
+    """Return 32-bit integers as the bits of floats, two in each."""
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
     pairs[: len(integers)] = integers
     return pairs.view(np.float64)

@@ -1,4 +1,4 @@
-"""The bound of the error of a trajectory by `reference`."""
+"""The error bound of a trajectory by the method `reference`."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from pyharness.truth.bounded import ErrorBound, error_bound
 
 
 def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> ErrorBound | None:
-    """Return the proved or estimated error of a trajectory by `reference`, or None."""
+    """Return the proved or estimated error of a trajectory by `reference`; None if not finite."""
     start = None if found.attitude is None else scene.attitude or IDENTITY
     scene = replace(scene, attitude=start)
     largest = max(*map(abs, scene.omega), float(np.abs(found.omega).max(initial=0.0)))

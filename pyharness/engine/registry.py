@@ -22,35 +22,33 @@ from pyharness.model.values import Number, tolerance_of
 # the low orders would need too many steps.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
 _GAUSS_DEFAULT = (1e-6, 1e-10, *6 * (1e-12,))
-# For SciPy's methods. Over a hundred radians with attitude, or if perturbations grow a
-# thousandfold, no method of SciPy meets a smaller tolerance, and Radau takes too long.
+# No method of SciPy meets a smaller tolerance over a hundred radians with attitude, or if
+# perturbations grow a thousandfold; Radau takes too long.
 _SCIPY_DEFAULT = 1e-8
 _DEFAULT = 1e-12
 
 
 @dataclass(frozen=True)
 class Method:
-    """The properties of a method, of this project or SciPy."""
+    """The properties of a method, ours or SciPy's."""
 
     name: str
     title: str
     source: str
     finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
-    # The tolerance if none is requested: the smallest one that the method meets in ordinary scenes
-    # within a fraction of its work limit, but not below 1e-12; 1 if the method takes no tolerance.
+    # Default tolerance: the smallest that the method meets in ordinary scenes within a fraction of
+    # its work limit, but not below 1e-12; 1 if the method takes no tolerance.
     default: float
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
     gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
-    # `order` is the order of the global error in the step size, or 0 if the order varies.
-    # `evaluations` is the number of right-hand sides per step, or 0 if that number varies.
-    order: int = 0
-    evaluations: int = 0
+    order: int = 0  # of the global error in the step size; 0 if it varies
+    evaluations: int = 0  # right-hand sides per step; 0 if the number varies
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
     attitude: bool = False  # propagates the attitude together with omega
     space_torque: bool = False  # takes a torque about the axes of space, together with attitude
-    # Takes a torque that depends on omega or attitude, and propagates the attitude under it.
+    # Takes a torque that depends on the state, and propagates the attitude under it.
     state_torque: bool = False
-    # Takes weak torques alone, also a recorded one that depends on omega; computes no attitude.
+    # Takes only weak torques, recorded ones of time and omega among them; computes no attitude.
     weak_torque: bool = False
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
 
@@ -71,8 +69,8 @@ def _reference(
         return rows_trajectory([], result.omega[:0], 0, len(times), "overflow")
     ended = "complete" if len(result.time) == len(times) else "overflow"
     largest = max(*map(abs, scene.omega), float(np.abs(result.omega).max(initial=0.0)))
-    # An estimate of 0 would be a promise that nothing has tested. If the scene was transformed to
-    # principal axes, the rounding errors of the transformation are not estimated.
+    # No error is returned for a body at rest, as an error of 0 would be untested, and none after a
+    # transformation to principal axes, whose rounding errors are not estimated.
     error = result.error / largest if largest and not isinstance(scene, PrincipalScene) else None
     if error is not None and result.attitude is not None:
         error = max(error, result.angle_error)
@@ -89,10 +87,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver, `name` in the module `room`, that imports it when first called.
-
-    With arguments, `name` makes the solver.
-    """
+    """Return a solver that imports `name`, with arguments its factory, at its first call."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
@@ -202,7 +197,7 @@ REGISTRY = {
             "quick",
             "Runge-Kutta in scaled unknowns, for few digits at the end",
             "fortran/modern/scaled_runge_kutta.f90",
-            # At finer tolerances the rounding errors of its many steps would matter.
+            # At smaller tolerances the rounding errors of its many steps would matter.
             1e-12,
             _DEFAULT,
             _no_rows,
@@ -221,7 +216,7 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, unchecked, or the method's default; raise InputError if no number."""
+    """Return the tolerance, or the method's default; raise InputError if it is no number."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 
@@ -234,7 +229,7 @@ def check_attitude(method: str) -> None:
 
 
 def check_prepared(scene: Scene, method: str) -> None:
-    """Raise InputError if no solver can be prepared, as only by series for torques of the state."""
+    """Raise InputError if the method has no prepared solver for the torque or inertia."""
     if is_recorded(scene) and method not in PREPARED_FOR_STATE:
         what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
         raise InputError(
@@ -244,7 +239,7 @@ def check_prepared(scene: Scene, method: str) -> None:
 
 
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
-    """Raise InputError if the method can't solve a scene because of its torque."""
+    """Raise InputError if the method can't solve the scene because of its torque or inertia."""
     torque, chosen = scene.torque, REGISTRY[method]
     kind = "a torque about the axes of space"
     able: list[str] = []

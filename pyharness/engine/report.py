@@ -1,4 +1,4 @@
-"""The reports of `run` and `plan`, and the picture of a trajectory."""
+"""The reports of the commands `run` and `plan`, and the picture of a trajectory."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -47,10 +47,10 @@ def trajectory_report(
     word: str | None = None,
     bound: "ErrorBound | None" = None,
 ) -> Report:
-    """Return the report of one trajectory of a scene, with a table of its rows and a picture.
+    """Return the report of a trajectory, with a table of its rows and a picture.
 
-    `word` is a program's arithmetic if not binary64, and `form` that of the attitude:
-    ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `bound` is for the method `reference`.
+    `form` is that of the attitude: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is
+    the arithmetic of a thesis program, None for binary64. `bound` is for the method `reference`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
@@ -65,7 +65,7 @@ def trajectory_report(
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    # The nine elements of a matrix fill the width of a terminal, so that most columns are omitted.
+    # The nine elements of a matrix fill the width of a terminal; all else but time is omitted.
     kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
     counted = Table(
         [Column("step", digits(".0f")), *(columns[k] for k in kept)],
@@ -108,7 +108,6 @@ def trajectory_report(
 
 
 def _bounds(bound: "ErrorBound | None") -> list[str]:
-    """Return lines that state the error of the reference."""
     if bound is None:
         return []
     lines = [f"reference: error of any omega at most {bound.text()}"]
@@ -152,14 +151,14 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Mark the last omega of a component by a cross, at the edge if outside the limits."""
+    """Draw a cross at the last omega of a component, or at the edge of the axes if outside."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)
 
 
 def plan_report(scene: Scene, plan: "Plan") -> Report:
-    """Return the report of a plan: the method, and which parts are computed, and why."""
+    """Return the report of a plan: the method, the computed parts, and the reasons."""
     table = Table(
         words("part computed why"),
         [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],

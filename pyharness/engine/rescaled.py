@@ -19,17 +19,16 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
-# The torque that depends on the state is evaluated at so many times.
-_SAMPLES = 9
-# Omegas from the inverse of this value to this value (rad/s) are so far from the limits of
-# binary64 that products of components of different size keep their digits.
+_SAMPLES = 9  # times at which a torque of the state is evaluated
+# From the inverse of this omega to this omega (rad/s), products of components of different size
+# keep their digits.
 _LARGE = 2.0**300
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene with rescaled time, whose solution is factor * omega(factor * t).
 
-    Raise InputError if the torque can't be rescaled (see `rescaling_factor`), or if the inertia
+    Raise InputError if the torque depends on the state and can't be rescaled, or if the inertia
     changes with time.
     """
     is_constant = scene.changing is None
@@ -42,7 +41,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     law = scene.law
 
     def times(values: Triple, power: int) -> Triple:
-        # The factor is applied repeatedly, because its square alone may overflow.
+        # The square of the factor may overflow.
         for _ in range(power):
             first, second, third = values
             values = first * factor, second * factor, third * factor
@@ -63,7 +62,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def is_ordinary(omega: Triple) -> bool:
-    """Return whether products of components of omega neither overflow nor underflow."""
+    """Return whether products of components of omega (rad/s) neither overflow nor underflow."""
     return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
 
 
@@ -73,20 +72,19 @@ def has_ordinary_rows(found: Trajectory) -> bool:
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 by which omega is multiplied so that it is near 1 rad/s.
+    """Return the power of 2 that brings omega near 1 rad/s, as a factor.
 
-    The omega that the torque may cause until `time` (s) counts, for a torque of the state by an
-    estimate. The result is 1 if no rescaling is needed or possible, or if the torque is opaque.
+    It allows for the omega that the torque may cause until `time` (s), for a torque of the state by
+    an estimate. It is 1 if no rescaling is needed or possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0
     state_torque = scene.torque if isinstance(scene.torque, StateTorque) else None
     by_torque = omega_by_torque if state_torque is None else _omega_by_state_torque
-    # The omega that the torque may add counts like the initial omega.
     largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
-    # With an exponent nearer to the limits of binary64 the factor would overflow or underflow.
+    # With a larger exponent the factor would overflow or underflow.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
     if state_torque is not None:
         exponent -= exponent % MULTIPLE
@@ -99,14 +97,11 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of the omega (rad/s) that the torque alone causes from rest until `time` (s).
-
-    Gyroscopic torques are neglected.
-    """
+    """Return a bound of omega (rad/s) from rest until `time` (s), without gyroscopic torques."""
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
-        # Any axis of the body may come to be along the torque.
+        # Any body axis may become parallel to the torque.
         moments = (min(moments),) * 3
     largest = 0.0
     for axis, moment in enumerate(moments):
@@ -146,7 +141,7 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
 
 
 def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether rescaled times and torques do not overflow, and times are not subnormal."""
+    """Return whether rescaled times and torques are finite, and times not subnormal."""
     law = scene.law
     waves = law.sines + law.cosines
     sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
@@ -159,7 +154,7 @@ def _fits(scene: Scene, time: float, factor: float) -> bool:
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
-    """Return the trajectory of a scene rescaled by `factor` in rad/s and s, up to an overflow."""
+    """Return a trajectory of rescaled time in rad/s and s, without rows that overflow."""
     with np.errstate(over="ignore"):
         omega = trajectory.omega / factor
     finite = np.isfinite(omega).all(axis=1)

@@ -1,4 +1,4 @@
-"""Transformations of a scene to an equivalent one: with other axes or signs, or a later time 0."""
+"""Transformations of a scene to an equivalent one, with other axes or signs, or a later time 0."""
 
 import math
 from collections.abc import Callable
@@ -18,9 +18,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, moments are turned too, but never a torque about the axes of space or the
-    attitude. For a torque of the state, `turn` must be a rotation. Raise InputError if the inertia
-    changes with time.
+    If `body` is true, it is applied to the moments too, but never to the attitude or to a torque
+    about the axes of space. For a torque of the state, `turn` must be a rotation. Raise InputError
+    if the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -41,18 +41,18 @@ def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene
 
 
 def axes_of(turn: Callable[[Triple], Triple]) -> Array:
-    """Return the new axes of `turn`, as columns of components about the old axes."""
+    """Return the images of the axes under `turn` as rows, shape (3, 3)."""
     return np.array([turn((1.0, 0.0, 0.0)), turn((0.0, 1.0, 0.0)), turn((0.0, 0.0, 1.0))])
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return a recorded torque from the time `by` (s) on; raise InputError if it is opaque."""
+    """Return a torque whose time 0 is the time `by` (s); raise InputError if it is opaque."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"
         )
 
-    # The first operation of the new tape is the old time, in the first slot after the inputs.
+    # The first operation, in the first slot after the inputs, computes the old time.
     def moved(slot: int) -> int:
         return N_INPUTS if slot == TIME else slot + (slot >= N_INPUTS)
 
@@ -73,10 +73,10 @@ def later(torque: StateTorque, by: float) -> StateTorque:
 def restarted_at(
     scene: Scene, omega: Array, by: float, attitude: Quaternion | None = None
 ) -> Scene:
-    """Return the scene whose time 0 is the time `by` (s) of the given scene.
+    """Return the scene whose time 0 is the time `by` (s) of `scene`.
 
-    `omega` (rad/s) and `attitude`, by default the initial one, are the state then. Raise InputError
-    if the torque is opaque, or needs an attitude that is not given.
+    `omega` (rad/s) and `attitude`, by default the initial one, are the state at that time. Raise
+    InputError if the torque is opaque, or needs an attitude and `attitude` is None.
     """
     first, second, third = (float(w) for w in omega)
     if isinstance(scene.torque, StateTorque):

@@ -17,7 +17,8 @@ MULTIPLE = 16
 def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
 
-    Its outputs are multiplied by 2**(2 * exponent). None if a number is not representable.
+    Its outputs are multiplied by 2**(2 * exponent). The result is None if a number would be
+    rounded.
     """
     scaling = _Scaling(exponent)
     try:
@@ -30,10 +31,10 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
 
 
 class _Scaling:
-    """A tape while it is converted: slot n becomes slot `places[n]`, times 2**`exponents[n]`."""
+    """The conversion of a tape: slot n becomes slot `_places[n]`, times 2**`_exponents[n]`."""
 
     def __init__(self, exponent: int) -> None:
-        """Begin with the unit of time 2**exponent s."""
+        """Begin with the inputs, for the unit of time 2**exponent s."""
         self.operations: list[Operation] = []
         self._unit = exponent
         self._places = list(range(N_INPUTS))
@@ -41,7 +42,7 @@ class _Scaling:
         self._exponents[TIME] = -exponent
         for slot in OMEGA:
             self._exponents[slot] = exponent
-        # The linear combination of each slot that is one.
+        # Slots that are linear combinations.
         self._linear: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
 
     def add(self, operation: Operation) -> None:
@@ -84,10 +85,10 @@ class _Scaling:
         return 0 if linear.constant or not own else min(own, key=abs)
 
     def _unscaled(self, slot: int) -> int:
-        """Return the new slot of an angle or exponent, with its value."""
+        """Return a new slot that has the original value of `slot`."""
         if self._exponents[slot] == 0:
             return self._places[slot]
-        # The kernel recognises an angle proportional to time by its combination.
+        # The kernel recognises an angle proportional to time by its linear combination.
         linear = self._linear.get(slot, Linear(0.0, ((slot, 1.0),)))
         return self._append(Operation("linear", (), self.combined(linear, 0)))
 

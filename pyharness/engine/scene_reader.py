@@ -1,7 +1,4 @@
-"""Reading of scenes from TOML files that users write, with the ready terms of this subpackage.
-
-`pyharness.model.scene_file` writes them.
-"""
+"""Reading of scenes from TOML files; `pyharness.model.scene_file` writes these."""
 
 import os
 from pathlib import Path
@@ -64,7 +61,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene of a file's bytes, or raise InputError, beginning with `where`."""
+    """Return the scene of a file's bytes; raise InputError, which begins with `where`."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)
@@ -97,7 +94,7 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body]; lists for moments, or matrices for rows, are polynomials."""
+    """Return the table [body], with polynomials of time for nested lists of moments or inertia."""
     moments, inertia = table.get("moments"), table.get("inertia")
     if isinstance(moments, list) and _has_lists(moments):
         return {**table, "moments": ChangingMoments(moments)}
@@ -127,7 +124,7 @@ def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTor
     first = _expressions(given) if any(key in given for key in _TEXTS) else law_of_table(given)
     if "terms" not in table:
         return first
-    # Few scenes have ready terms.
+    # Imported late, because few scenes have ready terms.
     from pyharness.engine.term_file import read_terms
 
     terms = read_terms(table["terms"], body)

@@ -1,8 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of a step, our tolerance the error at the requested times. A
-preliminary integration with few digits supplies what relates them: the largest |omega|, the phase,
-in proportion to which local errors add up, and the error amplification.
+SciPy controls the local error of a step, our tolerance limits the error at the requested times. A
+preliminary integration with few digits gives the local tolerance by the largest |omega|, the error
+amplification, and the phase, in proportion to which local errors add up.
 """
 
 import math
@@ -23,30 +23,29 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Largest ratio of the error at the end to the local error. The first table applies to a motion of a
-# few radians. The second table is added for each radian, multiplied by the error amplification.
-# Both were measured on random scenes that the checks do not use, and were increased by half.
+# Largest ratio of the error at the end to the local error: in a motion of a few radians, and added
+# for each radian, times the error amplification. Both were measured on random scenes that the
+# checks do not use, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
-# The ratio that is added for each radian by which the body rotates, if its attitude is requested.
-# The reason is that an error of omega changes the attitude until the end.
+# The ratio that is added for each radian by which the body rotates, if its attitude is requested,
+# because an error of omega changes the attitude until the end.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
 # The local tolerance compensates for an error amplification up to this value. Beyond it, the error
 # grows in proportion to the amplification, as with every method.
 _SENSITIVE = 1e3
-# Factor on the bound of the error if there is intermediate output. Such output is interpolated by a
-# polynomial in each step, whose error is not controlled.
+# Factor on the error bound for intermediate output, which SciPy interpolates without error control.
 _ROWS = 4.0
 # Longest step, in radians of a torque wave. A method that samples a fast wave always at the same
 # phase treats it as a constant torque, although the error estimates are small.
 _WAVE_STEP = 2.0
-# FINEST has the tolerances that the methods claim to meet in motions of a few radians.
+# Smallest tolerances that the methods claim to meet in motions of a few radians.
 _A_FEW = 1.05
 FINEST = {name: _A_FEW * FINEST_STEP * total for name, total in _SUM.items()}
 
 _COARSE = 1e-3
-# The preliminary integration is repeated if the expected omega exceeds the largest omega of the
-# solution by this factor.
+# The preliminary integration is repeated if the expected omega exceeds its largest omega by this
+# factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
@@ -60,21 +59,21 @@ _RADAU_SHARE = 2
 
 class _Ahead(NamedTuple):
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
-    # Integral over time of the largest coefficient times |omega|, plus the phases of the torque
-    # waves (rad). The phase of a wave is limited in proportion to the omega that it can add.
+    # Integral over time of the largest coefficient times |omega|, plus the limited phases of the
+    # torque waves of `_sum_phases` (rad).
     radians: float
     growth: float  # error amplification until the end, at least 1
     turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound of the ratio of an error at the end to that per step; angles are in rad."""
+    """Return a bound of the ratio of the error at the end to the local error; angles in rad."""
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
 
 def finest_tolerance(name: str, scene: Scene, time: float) -> float:
-    """Return the smallest tolerance that SciPy's `name` can meet to `time` (s)."""
+    """Return the smallest tolerance that SciPy's method `name` can meet until `time` (s)."""
     if isinstance(scene.torque, StateTorque):
         return max(FINEST[name], finest_of_state(name, scene, time, _most(name, 1.0)))
     ahead = _Run(scene, time, name).ahead()
@@ -82,7 +81,7 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return an integrator by SciPy's method `name`, which chooses the local tolerance."""
+    """Return an integrator that chooses the local tolerance of SciPy's method `name`."""
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -114,8 +113,7 @@ def scipy_method(name: str) -> Integrator:
             noise = torque_noise(scene, scene.omega, times[-1], scale=ahead.largest)
             is_blurred = noise > 0.0 and is_sensitive(ahead.growth, tolerance, noise)
             if is_blurred:
-                # No step has an error below the rounding of the torque, and the step-size control
-                # would search long for one.
+                # The step-size control would search long for an error below the torque's rounding.
                 step = max(step, ROUNDING * noise)
             allowed = step * ahead.largest
             # The step is limited by the fastest wave that can change omega by more than the local
@@ -127,7 +125,7 @@ def scipy_method(name: str) -> Integrator:
             result = run.solved(name, step, sizes, times, longest)
             low, high = min(scene.euler_coefficients), max(scene.euler_coefficients)
             if result.status == 1 and low <= 0.0 <= high:
-                # Omega is bounded, but its phase can't be computed beyond this time.
+                # Omega is bounded, but its phase has no digit beyond this time.
                 raise run.phase_error(float(result.t_events[0][0]))
         except NoNumberError:
             nothing = np.empty((0, len(run.start)))
@@ -146,12 +144,12 @@ def scipy_method(name: str) -> Integrator:
 
 
 def state_of(scene: Scene) -> tuple[float, ...]:
-    """Return omega (rad/s), and the quaternion if any, at time 0."""
+    """Return the initial omega (rad/s), and the quaternion if any."""
     return (*scene.omega, *(scene.attitude or ()))
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side for omega and attitude, q' = q (0, omega)/2, from omega's."""
+    """Return the right-hand side of omega with the attitude added, q' = q (0, omega)/2."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
         x, y, z, a, b, c, d = state
@@ -167,7 +165,7 @@ def with_attitude(slopes: RightHandSide) -> RightHandSide:
 
 
 def _most(name: str, effort: float) -> float:
-    """Return the work limit, in right-hand sides, without waves."""
+    """Return the work limit, in right-hand sides, for a torque without waves."""
     return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
 
 
@@ -190,13 +188,9 @@ class _Run(Run):
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Integrate with few digits, and return the quantities that set the local tolerance.
-
-        The absolute tolerance is a fraction of an estimate of the largest |omega|: the initial one
-        or, at rest, that by the torque; if the solution is much smaller, the integration is
-        repeated. If omega grows without bound, the estimate, or the omega by torque alone if
-        larger, replaces the largest, and phase and amplification are 0 and 1.
-        """
+        """Integrate with few digits, and return the quantities that set the local tolerance."""
+        # The absolute tolerance is relative to an estimate of the largest |omega|, which may be far
+        # too large for a body at rest.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()
         if scale == 0.0:
             return _Ahead(0.0, 0.0, 1.0)
@@ -208,8 +202,8 @@ class _Run(Run):
                 break
             scale = largest
         if coarse.status != 0:
-            # No tolerance can be met until the end, because omega grows without bound or its phase
-            # has no correct digit left.
+            # Omega grows without bound, or its phase has no correct digit left: no tolerance can be
+            # met until the end, and phase and amplification do not count.
             return _Ahead(max(scale, self._scale_by_torque()), 0.0, 1.0)
         length = abs(float(coarse.t[-1]) * self.unit)
         count = math.ceil(_NODES_PER_RADIAN * 2.0 * min(1e9, self.rate * largest * length))
@@ -229,7 +223,7 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return the largest component of each wave, over its moment (1/s2), and the frequency."""
+    """Return, for each wave, the largest component over its moment (1/s2), and the frequency."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
@@ -238,10 +232,8 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
 
 
 def _sum_phases(scene: Scene, span: float, largest: float) -> float:
-    """Return the sum of the phases (rad) of all torque waves over the time `span` (s).
-
-    Each is at most the omega that the wave can add, relative to `largest`.
-    """
+    """Return the sum of the phases (rad) of all torque waves over the time `span` (s)."""
+    # A phase counts at most as the omega that the wave can add, relative to `largest`.
     found = 0.0
     for push, frequency in _pushes(scene):
         found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)

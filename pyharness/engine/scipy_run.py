@@ -18,11 +18,11 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # solve_ivp accepts no relative tolerance below 100 times the machine epsilon.
 FINEST_STEP = 2.222e-14
-# A phase of so many radians has hardly a correct digit left in binary64. An omega that still grows
-# at this phase becomes infinite in finite time, and LSODA would not return.
+# A phase of so many radians has hardly a correct digit in binary64. An omega that still grows there
+# becomes infinite in finite time, and LSODA would not return.
 LARGEST_PHASE = 1e13
-# LSODA squares the time span to choose its first step. Below 1e-150 s the square underflows to 0,
-# and LSODA does not advance.
+# LSODA squares the time span to choose its first step, and does not advance if the square
+# underflows, below 1e-150 s.
 _SHORTEST_SPAN = 2.0**-300
 # LSODA of older versions of SciPy has one state for all threads, and raises an exception if two
 # integrations alternate. The lock is reentrant, so that a torque may integrate too.
@@ -36,8 +36,8 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    `most` is that of all right-hand sides. The state begins with omega (rad/s). `rate` is the
-    largest Euler coefficient; times omega and time it is the phase (rad).
+    The limit is `most` right-hand sides. The state begins with omega (rad/s). `rate`, the largest
+    Euler coefficient, times omega and time is the phase (rad).
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing, unless overridden; called at 0, after steps, and inside the last."""
+        """Do nothing, unless overridden; called at time 0, after steps, and inside the last one."""
 
     def solved(
         self,
@@ -72,8 +72,8 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`, with dense output if there are no `times`.
 
-        Its times are in `self.unit` seconds, but arguments in s. Raise NoNumberError if Radau's
-        linear algebra refuses a number, or the time is NaN.
+        The result's times are in units of `self.unit` seconds, the arguments in s. Raise
+        NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -82,7 +82,7 @@ class Run:
             return LARGEST_PHASE - self.rate * abs(time * self.unit) * max(map(abs, state[:3]))
 
         phase_left.terminal = True  # type: ignore[attr-defined]
-        # A warning of LSODA only repeats that rows are missing.
+        # LSODA's warning only repeats that rows are missing.
         with (
             np.errstate(all="ignore"),
             warnings.catch_warnings(action="ignore"),
@@ -104,7 +104,6 @@ class Run:
             except InputError:
                 raise
             except (ValueError, ArithmeticError) as error:
-                # Radau's linear algebra refuses numbers that are not finite.
                 if "infs or NaNs" in str(error):
                     raise NoNumberError from None
                 raise InputError(
@@ -113,7 +112,7 @@ class Run:
                 ) from None
 
     def phase_error(self, time: float) -> TimedError:
-        """Return the exception for the largest phase, reached at `time` in `self.unit`."""
+        """Return the exception for a phase above the limit at `time`, in units of `self.unit`."""
         return TimedError(
             f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
             "has hardly a digit left; use a shorter time",
@@ -121,7 +120,7 @@ class Run:
         )
 
     def work_error(self, time: float) -> TimedError:
-        """Return the exception for an integration that exceeded the work limit at `time` (s)."""
+        """Return the exception for an exceeded work limit at `time` (s)."""
         return TimedError(
             f"{self.label} exceeded its work limit at t = {{time}} s after {self.most} "
             "right-hand sides; "
@@ -147,7 +146,7 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from omega, (n, 3), or with attitude, normalised here, (n, 7)."""
+    """Return a trajectory from omega, (n, 3), or with an attitude of any norm, (n, 7)."""
     attitude = None
     if rows.shape[1] > 3:
         attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)

@@ -1,7 +1,7 @@
-"""The Taylor series of a recorded torque, beside an integration of it by SciPy.
+"""The Taylor series of a recorded torque, as a check of an integration by SciPy.
 
-SciPy may pass a short change of the torque. Where the results differ, the steps of the series bound
-SciPy's.
+SciPy may pass a short change of the torque. If the results differ, the steps of the series limit
+those of SciPy.
 """
 
 import math
@@ -15,32 +15,32 @@ from pyharness.model.array_type import Array
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 
-# SciPy's longest step over the steps of the series. LSODA evaluates a torque once in a step.
+# SciPy's longest step over those of the series; LSODA evaluates the torque only once in a step.
 _PART = 0.5
-# Of the series: equations so stiff that it has more are left to SciPy's implicit methods.
+# Stiff equations, which need more steps of the series, are left to SciPy's implicit methods.
 _MOST_STEPS = 20_000
 # Largest ratio of the steps of the series in a span.
 _RATIO = 8.0
-# Tolerance of a step of the series, over that of the result.
+# Tolerance of a step of the series, relative to that of the result.
 _FINER = 0.01
 
 
 class Span(NamedTuple):
-    """A part of an integration: its end, and its longest step (s)."""
+    """A part of an integration: its end (s), and SciPy's longest step in it (s)."""
 
     end: float
     longest: float
 
 
 class Beside(NamedTuple):
-    """The rows of a series, and the spans that its steps bound."""
+    """The rows of a series, and spans with limits of SciPy's steps."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return the times (s) at which a table changes before `end`, and `end`."""
+    """Return the times (s) between 0 and `end` at which a table changes, and `end`."""
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     breaks = [] if torque.tape is None else torque.tape.breaks
@@ -71,7 +71,7 @@ def _spans(lengths: dict[float, float], bounds: Sequence[float]) -> list[Span]:
     least, most, last = math.inf, 0.0, 0.0
     for time, length in lengths.items():
         if time in bounds:
-            # It was cut, and says nothing.
+            # The step ends at a bound, and its length is no measure of the torque.
             spans.append(Span(time, _PART * (length if least == math.inf else least)))
             least, most, last = math.inf, 0.0, 0.0
             continue

@@ -1,6 +1,6 @@
 """SciPy's methods for torques that depend on the state, recorded or opaque.
 
-How such a torque amplifies local errors is unknown. Therefore the local tolerance is reduced until
+The error amplification of such a torque is unknown. Therefore the local tolerance is reduced until
 the difference of two integrations shows that the second meets the tolerance.
 """
 
@@ -25,36 +25,35 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
-# Ratio of the tolerance to the first local tolerance: an ordinary ratio of the error to the local
-# error in a motion of a few radians.
+# Ratio of the tolerance to the first local tolerance, as usual in motions of a few radians.
 _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 # Smallest and largest ratio of a local tolerance to the next.
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
-# Safety factor on the error of the second of two integrations. The error is estimated from their
-# difference, in proportion to the local tolerances, but by no less than a fraction of it. The
-# errors of LSODA, which also changes its order, are not in proportion to the local tolerances, and
-# neither are those under a torque that jumps, as an opaque function may.
+# The estimated error of the second of two integrations is their difference, divided by the ratio of
+# the local tolerances, times _SAFETY; but at least this fraction of the difference. The errors of
+# LSODA, which also changes its order, are not in proportion to the local tolerances, and neither
+# are those under a torque that jumps, as an opaque function may.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
-# The longest step is the time span over this number, which grows with each integration, so that two
-# of them can't pass a short pulse or sample a wave in the same way.
+# The longest step is the time span over this number, which grows with each integration, so that no
+# two pass a short pulse or sample a wave in the same way.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _COARSE = 1e-3
 # The preliminary integration of a body at rest is repeated if omega is smaller than expected by
 # this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
-# LSODA does not return if its steps no longer change the time.
+# Steps that do not change the time; LSODA would not return.
 _MOST_STUCK = 50
-# An omega that has grown by this factor when the phase is too large grows without bound.
+# Omega grows without bound if it has grown by this factor when the phase is too large.
 _UNBOUNDED = 1e3
 # Largest difference from the series of a recorded torque, in tolerances.
 _AGREEMENT = 0.5
-_ORDINARY = 1e100  # rad/s; products of such are numbers
+_ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
-# Work of a right-hand side, in microseconds: without torque, with SciPy's own work; of an operation
-# of a tape; and of an opaque function.
+# Microseconds of a right-hand side without torque, including SciPy; of an operation of a tape; and
+# of an opaque function.
 _WORK, _OPERATION_WORK, _OPAQUE_WORK = 16.0, 0.7, 16.0
 
 
@@ -74,12 +73,13 @@ def solve_state(
 ) -> Trajectory:
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's `name`.
 
-    The error at `times` (s), from the difference of two integrations, is at most `tolerance`.
-    `most` is the work limit in right-hand sides of a body without torque.
+    The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
+    work limit in right-hand sides of a body without torque.
 
-    It ends with ``overflow`` before omega grows without bound or the torque is singular, and is
+    The ending is ``overflow`` where omega grows without bound or the torque is singular, and
     ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
-    opaque function fails, the attitude is missing, or tolerance or work limit can't be met.
+    opaque function fails, the attitude is missing, the tolerance can't be met, or the work limit is
+    exceeded.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
     nothing = np.empty((0, len(run.start)))
@@ -120,7 +120,7 @@ def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return an estimate of the smallest tolerance to `time` (s); 0 if the end is not reached."""
+    """Return the estimated smallest tolerance until `time` (s); 0 if that is not reached."""
     run = _StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
@@ -132,7 +132,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 
 
 def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
-    """Return results whose estimated error is at most `tolerance`, or raise InputError."""
+    """Return rows whose estimated error is at most `tolerance`, or raise InputError."""
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO
     while True:
@@ -147,7 +147,7 @@ def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: 
             return after
         if finer == FINEST_STEP:
             if not (before.is_complete or after.is_complete):
-                # Near the time at which omega becomes infinite no row has the digits.
+                # No row meets the tolerance near the time at which omega becomes infinite.
                 return _agreeing(before, after, tolerance)
             raise InputError(
                 f"tolerance is {tolerance:g}; {run.label} can't meet it here, because two "
@@ -155,7 +155,7 @@ def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: 
                 + (f"differ by {difference:.2g}; " if same_end else "end at different times; ")
                 + f"allowed for this motion: {_allowed(error)}, or a shorter time"
             )
-        # The next integration should have a quarter of the allowed error.
+        # Aim at a quarter of the allowed error.
         ratio = min(_LARGEST_RATIO, max(_RATIO, 4.0 * difference / (ratio * tolerance)))
         before, local = after, finer
 
@@ -165,7 +165,7 @@ def _allowed(error: float) -> str:
 
 
 def _difference(before: _Rows, after: _Rows) -> float:
-    """Return the largest difference, relative or as an angle (rad)."""
+    """Return the largest relative difference of omega, or angle (rad) between attitudes."""
     n = min(len(before.state), len(after.state))
     return float(_differences(before, after, n).max(initial=0.0))
 
@@ -224,7 +224,7 @@ class _StateRun(Run):
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side in which a table changes just after a breakpoint."""
+        """Return a right-hand side that evaluates tables only inside the current span."""
 
         def between(time: float, state: Sequence[float]) -> list[float]:
             low, high = self._between
@@ -233,10 +233,8 @@ class _StateRun(Run):
         return between
 
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side that raises InputError if an opaque function fails.
-
-        The time of a NaN is kept: it is no failure if SciPy passes it by shorter steps.
-        """
+        """Return a right-hand side that raises InputError if an opaque function fails."""
+        # A NaN is a failure only if SciPy does not avoid it by shorter steps.
 
         def guarded(time: float, state: Sequence[float]) -> list[float]:
             try:
@@ -250,7 +248,7 @@ class _StateRun(Run):
                     "in N m",
                     float(time),
                 ) from error
-            # A large omega may be about to become infinite.
+            # A larger omega may be about to become infinite.
             if any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY:
                 self._undefined = float(time)
             return found
@@ -258,7 +256,7 @@ class _StateRun(Run):
         return guarded
 
     def check_undefined(self) -> None:
-        """Raise InputError after a NaN of an opaque function since the last step."""
+        """Raise InputError if an opaque function returned NaN since the last step."""
         if self._undefined is not None:
             raise TimedError(
                 "[torque]: the function returned NaN at t = {time} s; allowed: three finite "
@@ -267,7 +265,7 @@ class _StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Raise NoNumberError if the steps are too short."""
+        """Record the step; raise NoNumberError if too many steps do not change the time (s)."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -279,16 +277,13 @@ class _StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at 0 is not finite; SciPy's first step would never end."""
+        """Return whether a rate at time 0 is not finite; SciPy's first step would not end."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return not all(map(math.isfinite, self.slopes(0.0, self.start)))
 
     def expected_omega(self) -> float:
-        """Return the largest |omega| (rad/s) with few digits.
-
-        Where that ends early, it is the initial one, or what the initial torque causes.
-        """
+        """Return the largest |omega| (rad/s) with few digits, or a guess if not to be computed."""
         scale = max(map(abs, self.start[:3])) or self._pushed()
         for _ in range(_MOST_GUESSES):
             found = self.rows([self.end], _COARSE, scale)
@@ -300,7 +295,7 @@ class _StateRun(Run):
         return scale
 
     def _pushed(self) -> float:
-        """Return the |omega| (rad/s) to which its largest torque brings a body at rest."""
+        """Return the |omega| (rad/s) that the largest torque would cause from rest; 1 if none."""
         times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             rates = [abs(rate) for time in times for rate in self.slopes(time, self.start)[:3]]
@@ -309,13 +304,13 @@ class _StateRun(Run):
         return omega if 0.0 < omega < math.inf else 1.0
 
     def rows(self, times: Sequence[float], local: float, scale: float) -> _Rows:
-        """Return the states at the first of `times` (s); `local` is relative to `scale` (rad/s)."""
+        """Return the states at `times` (s); the local tolerance is relative to `scale` (rad/s)."""
         self._integrations += 1
         sizes = [local * scale] * 3 + [local] * (len(self.start) - 3)
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
-        # SciPy does not know where a table changes: each integration ends there.
+        # Each integration ends where a table changes, because SciPy may pass the change.
         for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
             wanted = own if own and own[-1] == end else [*own, end]
@@ -336,7 +331,7 @@ class _StateRun(Run):
             try:
                 result = self.solved(self.name, local, sizes, wanted, longest, begin, state)
             except NoNumberError:
-                # SciPy returned no rows. They exist at the times before that of the failure.
+                # SciPy returned no rows, although those before the failure exist.
                 wanted = [time for time in wanted if abs(time) < abs(self._reached)]
                 continue
             if result.status == 1 and self._largest < _UNBOUNDED * scale:

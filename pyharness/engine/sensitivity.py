@@ -16,11 +16,11 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING
 
 # A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
-# the tolerance. The fraction allows for a factor of three, by which the computed amplification may
-# be too small because of the norm and of the number of perturbations.
+# the tolerance. The computed amplification may be too small by a factor of three, because of the
+# norm and of the number of perturbations.
 _SHARE = 0.3
-# Relative error of a closed form in addition to an amplified rounding error: the bound that
-# `tests/engine/test_closed_form.py` checks.
+# Relative error of a closed form beside amplified rounding; tests/engine/test_closed_form.py
+# checks it.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
 # Settings of a Taylor series that supplies only the error amplification: a large tolerance, and a
 # work limit of a twentieth of a second.
@@ -29,7 +29,7 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether rounding errors, times `growth` (1 + `noise`), exceed 0.3 tolerances."""
+    """Return whether the unit roundoff times `growth` (1 + `noise`) exceeds 0.3 tolerances."""
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
 
@@ -42,10 +42,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    It is relative to each term, not to their small sum: the ratio of the omegas which the terms
-    would cause alone until `t_end` (s), with rounding in each of `steps` steps, to `scale`, by
-    default the initial |omega| (rad/s) or that by the whole torque. It is 0 if terms do not nearly
-    cancel, or depend on the state and are unknown.
+    The error is relative to each term, not to their small sum. It is the ratio of the omega that
+    each term would cause alone until `t_end` (s), with rounding in each of `steps` steps, to
+    `scale` (rad/s), by default the initial |omega| or that by the whole torque. It is 0 if terms do
+    not nearly cancel, or depend on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -59,9 +59,10 @@ def torque_noise(
 def closed_form_estimate(
     scene: Scene, omega0: Triple, t_end: float, noise: float = 0.0
 ) -> tuple[float | None, float | None]:
-    """Return the estimated error of a closed form at `t_end` (s), and the amplification, or None.
+    """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
 
-    The error is relative to the largest |omega| so far, or the angle (rad) if larger.
+    The error is relative to the largest |omega| so far, or that of the angle (rad) if larger. Both
+    are None if unknown.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -73,17 +74,14 @@ def closed_form_estimate(
         return None, None
     error = ROUNDING * growth * (1.0 + noise) + _CLOSED_FORM_ERROR
     if isinstance(scene, PrincipalScene) and scene.attitude is not None:
-        # The initial omega was rounded after the rotation to principal axes. This error of omega
-        # causes an error of the angle that grows with time.
+        # The initial omega was rounded after the rotation to principal axes, which causes an error
+        # of the angle that grows with time.
         error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
     return error, growth
 
 
 def motion_growth(scene: Scene, t_end: float) -> float | None:
-    """Return the error amplification of a motion to `t_end` (s), or None if unknown.
-
-    It is from the closed form, else from a Taylor series with few digits.
-    """
+    """Return the error amplification of a motion until `t_end` (s), or None if unknown."""
     if isinstance(scene.torque, StateTorque):
         return _recorded_growth(scene, t_end)
     if closed_form(scene):

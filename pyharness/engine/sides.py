@@ -1,4 +1,4 @@
-"""Trajectories in reverse order, or joined at time 0."""
+"""Reversal of trajectories, and joining at time 0."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,14 +17,14 @@ def row_names(found: Trajectory) -> tuple[str, ...]:
 
 
 def in_reverse(found: Trajectory) -> Trajectory:
-    """Return a trajectory with its rows in reverse order."""
+    """Return the trajectory with its rows in reverse order."""
     return replace(found, **{name: getattr(found, name)[::-1] for name in row_names(found)})
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return a backward, in ascending order, and a forward trajectory from time 0 as one.
+    """Return two trajectories, before time 0 in ascending order, and after it, as one.
 
-    Steps and evaluations are added; of error, amplification and ending the worse holds.
+    The result has the sums of steps and evaluations, and the worse error, amplification and ending.
     """
     both = before, after
     rows: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The operation of a recorded torque that is not defined."""
+"""The search for the operation by which a recorded torque is undefined."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,19 +9,19 @@ from pyharness.engine.array_tape import ARRAYS
 from pyharness.model.errors import TimedError
 from pyharness.model.tape import OMEGA, Tape, slot_values
 
-# An operand that is smaller, relative to its value at the beginning, is about to become 0.
+# An operand vanishes if its ratios to its initial value and to its value before the last step,
+# which is very short, are at most these.
 _NEARLY_ZERO = 1e-6
-# Its largest ratio to its value before the last step, which is short beside those of the motion.
 _SHRUNK = 0.9
-# An omega that is larger, relative to the one at the beginning, grows without bound.
+# Omega grows without bound if its ratio to the initial omega is larger.
 _UNBOUNDED = 1e6
 
 
 class SingularError(TimedError):
-    """The exception for a time at which no step is short enough, as `what` is undefined."""
+    """The exception for a time beyond which no step can be taken."""
 
     def __init__(self, what: str | None, time: float) -> None:
-        """Store `what`, None for infinity, and `time` (s)."""
+        """Store the undefined operation, None if omega or torque is infinite, and `time` (s)."""
         where = "at t = {time} s"
         message = f"omega or its torque becomes infinite {where}; allowed: an earlier time"
         super().__init__(f"the torque is not defined {where}: {what}" if what else message, time)
@@ -35,10 +35,11 @@ class SingularError(TimedError):
 def undefined_operation(
     tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
 ) -> str | None:
-    """Return what is not defined at the end of an integration, and what to write instead.
+    """Return a text with the operation that is undefined at the end of an integration.
 
-    The three are inputs of the tape at the beginning, where the last step began, and at the end.
-    None if omega or a quotient becomes infinite.
+    It also says what to write instead. `begin`, `before` and `end` are the inputs of the tape at
+    the beginning of the integration, at the beginning of the last step, and at the end. The result
+    is None if omega or a quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):
@@ -50,7 +51,6 @@ def undefined_operation(
         )
 
     def vanishes(slot: int) -> bool:
-        """Return whether a slot becomes 0: small, and halved by a tiny step."""
         size, step = (abs(x[slot]) if np.isfinite(x[slot]) else 0.0 for x in (at_begin, earlier))
         if begin == end:
             size = step = 0.0

@@ -1,7 +1,7 @@
-"""The function `solve`, which computes the trajectory of a scene at given times by any method.
+"""The function `solve`, which computes the trajectory of a scene by any method.
 
-It integrates from 0 in each direction, and rescales time, so that products of two components of
-omega neither overflow nor underflow.
+It integrates from time 0 in both directions, and rescales time, so that products of two components
+of omega neither overflow nor underflow.
 """
 
 import itertools
@@ -60,43 +60,43 @@ def solve(
     events: object = None,
     sensitivities: Iterable[str] | None = None,
 ) -> Trajectory:
-    """Solve a scene at given times.
+    """Return the trajectory of a scene at requested times.
 
     Parameters
     ----------
     scene : Scene
-        The scene.
+        The body, its torque and its state at time 0.
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
         A name in `pyharness.engine.registry.METHODS`.
     tolerance : float
-        Largest allowed error of a component of omega at `times`, relative to the largest one from 0
-        on. The default depends on the method, 1e-12 for `auto`. A method with a fixed step takes
-        none.
+        Largest allowed error of a component of omega at `times`, relative to the largest |omega|
+        from 0 on. The default depends on the method, 1e-12 for `auto`. Methods with a fixed step
+        take none.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool
         Whether the attitude is computed, from the scene's or (1, 0, 0, 0); the tolerance also
-        applies to its angle (rad). A torque that depends on it, or is about the axes of space,
-        requires it.
+        applies to its angle (rad). Torques that depend on the attitude, or are about the axes of
+        space, require it.
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        within the tolerance. Its polynomials take further integrations; with a fixed step they are
-        cubics on each step.
+        within the tolerance. It takes further integrations. With a fixed step it is a cubic on each
+        step.
     events : callable, Event, or list of these
-        Functions of `(t, omega)` or `(t, omega, attitude)`, perhaps of `pyharness.events`, whose
+        Functions of `(t, omega)` or `(t, omega, attitude)`, or events of `pyharness.events`, whose
         roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
         as in SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept
-        arrays are called with them.
+        arrays are called with arrays.
     sensitivities : iterable of str
-        Names of parameters; `sensitivities` of the trajectory has the derivatives of omega, and of
-        the quaternion, with respect to each: `omega0`; `moments`, `coefficients`, or `inertia`
-        (columns I11, I22, I33, I12, I13, I23); `attitude`, small initial rotations (rad) about the
-        body axes; `torque.NAME`, with NAME a constant of a scene file's expressions, a keyword
-        argument of a function with a number as its default, or `constant`, `rate`, `sines`,
-        `cosines` of a TorqueLaw (four columns a wave: amplitude, frequency). They need the method
-        `auto`, `taylor` or `closed-form`.
+        Names of parameters by which `sensitivities` of the trajectory has the derivatives of omega
+        and of the quaternion: `omega0`; `moments`, `coefficients`, or `inertia` (columns I11, I22,
+        I33, I12, I13, I23); `attitude`, small initial rotations (rad) about the body axes;
+        `torque.NAME`, with NAME a constant of a scene file's expressions, a keyword argument of a
+        function with a number as its default, or `constant`, `rate`, `sines`, `cosines` of a
+        TorqueLaw (four columns per wave: three amplitudes, frequency). The method must be `auto`,
+        `taylor` or `closed-form`.
 
     Returns
     -------
@@ -107,10 +107,10 @@ def solve(
     Raises
     ------
     InputError
-        If the method is unknown, or can't take the scene or its attitude; if a torque lacks the
-        attitude it needs; if the times are not in order; if a changing moment reaches 0; if the
-        tolerance can't be met within `effort`; if dense output needs too many polynomials; if an
-        event has other arguments or results; if sensitivities can't be computed.
+        If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
+        attitude, and `attitude` is false; if the times are not in order; if a changing moment
+        reaches 0; if the tolerance can't be met within `effort`; if dense output needs too many
+        polynomials; if an event has other arguments or results; if sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -142,7 +142,6 @@ def solve(
     if attitude:
         check_attitude(method)
     given = scene
-    # An attitude that was not requested is not computed.
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:
         scene = replace(scene, attitude=start)
@@ -155,12 +154,12 @@ def solve(
         scene.changing.check((values[0], values[-1]))
         # The reference has equations of its own for such a scene.
         scene = scene if method == "reference" else with_constant_body(scene)
-    # The reference rounds no amplitude.
+    # The reference must not round amplitudes, as merging does.
     if method != "reference" and isinstance(scene.torque, TorqueLaw):
         scene = with_merged_waves(scene)
     effort = checked_effort(effort)
     below = [t for t in values if t < 0.0]
-    # The times on either side of 0, in order away from 0.
+    # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
     parts = [
         with_reason(scene, _integrate(chosen, scene, each, tolerance, effort), each[-1])
@@ -203,7 +202,8 @@ def _more_rows(
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For SciPy's methods it grows with many local errors, none below some 2e-14, and amplification.
+    For SciPy's methods, whose local errors are at least some 2e-14, it grows with the phase and the
+    error amplification.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:
@@ -216,12 +216,11 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method `auto`: the plan's, or its fallback."""
+    """Return the trajectory at `times` (s) by the method of the plan, or by its fallback."""
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     try:
-        # A closed form has only rounding errors. Therefore it is also used for tolerances below
-        # the smallest one that it claims to meet.
+        # A closed form, which has only rounding errors, is used below its smallest tolerance too.
         return method.solve(scene, times, tolerance, effort)
     except InputError as refusal:
         if not chosen.fallback:
@@ -235,7 +234,7 @@ def by_plan(
 def _integrate(
     chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
 ) -> Trajectory:
-    """Return the trajectory, on one side of 0, solved in a suitable unit of time."""
+    """Return the trajectory on one side of 0, computed in a suitable unit of time."""
     if not chosen.is_fixed_step and not is_ordinary(scene.omega):
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
@@ -248,13 +247,13 @@ def _integrate(
     except TimedError as refusal:
         raise refusal.slower(factor) from refusal.__cause__
     if isinstance(scene.torque, StateTorque) and not has_ordinary_rows(found):
-        # The omega that the torque causes is larger than it was estimated to be.
+        # The torque causes a larger omega than estimated.
         return chosen.solve(scene, times, tolerance, effort)
     return unscaled(found, times, factor)
 
 
 def _ascending(times: object) -> tuple[list[float], bool]:
-    """Return times (s) in ascending order, and whether reversed, or raise InputError."""
+    """Return ascending times (s), and whether they were descending; or raise InputError."""
     if _are_ascending_floats(times):
         return times.tolist(), False  # type: ignore[attr-defined]
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():

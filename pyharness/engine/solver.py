@@ -42,23 +42,24 @@ CODES = {
 }
 PREPARED = ("auto", *(name for name in CODES if name not in ("sphere", RK4_OR_TAYLOR)))
 
-_FEW_WAVES = 16  # fewer waves than this take less time than releasing the GIL
+_FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 
 
 class Solver(LastCall, BoundKernel):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega0, t_end)``: three numbers (rad/s), and the final time (s), positive,
-    negative or 0. It returns omega at `t_end` (rad/s) as a new array of shape (3,), or in the
-    contiguous array `out` of three floats, which may be `omega0`. Other arguments raise an
-    InputError and leave `out` unchanged. Calls are fastest with an array of floats.
+    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, out=out)``: three numbers
+    (rad/s), and the final time (s), positive, negative or 0. A call returns omega at `t_end`
+    (rad/s) as a new array of shape (3,), or in the contiguous array `out` of three floats, which
+    may be `omega0`. Invalid arguments raise an InputError and leave `out` unchanged. Calls are
+    fastest with an array of floats.
 
     If the kernel could not finish, or an argument is not finite, the result is NaN and `status` has
     the reason.
 
     Threads may share a solver. The kernel releases the interpreter's lock (GIL), unless the
-    solution takes less time than that. Solvers can be copied and pickled, without the status of the
-    last call.
+    solution takes less time than releasing it. Solvers can be copied and pickled, without the
+    status of the last call.
 
     Attributes
     ----------
@@ -82,8 +83,8 @@ class Solver(LastCall, BoundKernel):
     packed: Array
     _packed_with_gil: Array | None
 
-    # The base class binds a kernel to its data in C. A call goes from the interpreter into the
-    # kernel without Python code in between, which would take as long as an easy solution.
+    # The base class binds a kernel to its data in C, because Python code in a call would take as
+    # long as an easy solution.
     def __new__(cls, chosen: Plan, tolerance: float, asked: str, effort: float = 1.0) -> Self:
         """Create a solver; users call `prepare` instead."""
         kernel = extension().solve_packed
@@ -91,7 +92,7 @@ class Solver(LastCall, BoundKernel):
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # The call that keeps the GIL has no fallback, which may take long. If it fails, the
-            # kernel is entered again without the GIL.
+            # kernel is called again without the GIL.
             packed_with_gil = packed.copy()
             packed_with_gil[Places.METHOD] = CODES.get(chosen.closed_form, Methods.CLOSED_FORM)
         solver = super().__new__(cls, kernel, packed, _check, packed_with_gil)
@@ -106,9 +107,9 @@ class Solver(LastCall, BoundKernel):
 
         ``solver.many(omega0, t_end, threads=1, out=None)`` takes `omega0` (rad/s) of shape (n, 3),
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in `out`
-        if given, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
-        others or on threads; its rounding differs from a single call's. Other arguments raise an
-        InputError.
+        unless None, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
+        others or on threads, but may differ by rounding from a single call. Invalid arguments raise
+        an InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -119,8 +120,7 @@ class Solver(LastCall, BoundKernel):
     def method(self) -> str:
         """Return the name of the method of the last call.
 
-        It is `plan.method`, unless the kernel chose between `quick` and `taylor`, or used
-        `plan.fallback`.
+        It is `plan.method`, unless the kernel chose `quick` or `taylor`, or used `plan.fallback`.
         """
         steps = self._counted()
         if not steps:
@@ -139,7 +139,7 @@ def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
 
 
 def no_buffer(out: object) -> str:
-    """Return a text that describes `out` if three floats can't be written into it, else ""."""
+    """Return a description of `out` if three floats can't be written into it, else ""."""
     if not isinstance(out, np.ndarray):
         try:
             return reprlib.repr(out)
@@ -159,7 +159,7 @@ def _code(chosen: Plan) -> int:
     if chosen.closed_form == "sphere":
         return CODES["sphere"]
     if chosen.method == "closed-form":
-        # The closed form refuses a perturbation whose square would underflow. The kernel then
-        # uses the Taylor series, unless the closed form was requested explicitly.
+        # The closed form refuses a perturbation whose square underflows. The kernel then uses the
+        # Taylor series, unless the closed form was requested.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
     return CODES[chosen.method]

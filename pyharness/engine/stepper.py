@@ -1,4 +1,4 @@
-"""A motion step by step, while the user changes torque or state."""
+"""Integration step by step, while the user changes torque or state."""
 
 import math
 from bisect import bisect_left, bisect_right
@@ -25,27 +25,27 @@ from pyharness.model.values import boolean, finite, number, three_floats, tolera
 
 _FINEST = 1e-14  # smallest tolerance of a step
 _DEFAULT = 1e-9
-_MOST_STEPS = 200_000  # whose lengths are listed
+_MOST_STEPS = 200_000  # in `steps_to` and `with_reason`
 
 
 class Stepper:
     """A motion that is computed step by step by Taylor series.
 
-    It is for simulations in which something happens between the steps: a controller changes its
-    torque, a mass is released, an impact changes omega. Otherwise `pyharness.solve` is faster, and
-    estimates its error.
+    Use it if something happens between the steps: a controller changes its torque, a mass is
+    released, an impact changes omega. Otherwise `pyharness.solve` is faster, and estimates its
+    error.
 
     Parameters
     ----------
     scene : Scene
-        The body, its torque and its omega at time 0. Moments or inertia do not change with time,
-        and the torque is not opaque.
+        The body, its torque and its state at time 0. Moments or inertia must not change with time,
+        and the torque must not be opaque.
     tolerance : float, optional
         The largest error of a step: of a component of omega, relative to the largest |omega| so
         far, and of the attitude's angle (rad). Default is 1e-9.
     attitude : bool, optional
-        Whether the attitude is computed, from the scene's or (1, 0, 0, 0). A torque that depends on
-        it, or is about the axes of space, requires it.
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0). Torques that depend on
+        the attitude, or are about the axes of space, require it.
 
     Attributes
     ----------
@@ -56,10 +56,11 @@ class Stepper:
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
     held_torque : ndarray, shape (3,)
-        A torque about the body axes (N m; with Euler coefficients an acceleration, 1/s^2), added to
-        that of the scene and held until it is set again, even if the scene is; 0 at first.
+        A torque about the body axes (N m; for a body given by coefficients an acceleration, 1/s2)
+        that is added to the scene's until it is set again, even if another scene is set; 0 at
+        first.
     scene : Scene
-        The scene. Another one may be set; time, omega and attitude continue.
+        The scene. If another one is set, time, omega and attitude continue.
     steps : int
         The number of steps so far.
 
@@ -83,7 +84,7 @@ class Stepper:
     array([0., 0., 1.])
     """
 
-    # Another name that is set, such as `torque`, is an error.
+    # With slots, setting another name, such as `torque`, is an error.
     __slots__ = (
         "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_packed", "_scene", "_state",
         "_steps", "_tape", "_time", "_tolerance", "_trial",
@@ -121,7 +122,7 @@ class Stepper:
 
     @property
     def scene(self) -> Scene:
-        """The scene; its omega and attitude are those of time 0."""
+        """The scene, whose omega and attitude are those at time 0."""
         return self._scene
 
     @scene.setter
@@ -150,7 +151,7 @@ class Stepper:
 
     @property
     def held_torque(self) -> Array:
-        """The torque that is added to that of the scene (N m, body axes), shape (3,)."""
+        """The torque that is added to the scene's (N m, or 1/s2; body axes), shape (3,)."""
         return _fixed(self._state[self._n :])
 
     @held_torque.setter
@@ -160,9 +161,9 @@ class Stepper:
     def step(self, longest: float = math.inf) -> float:
         """Take one step, as long as the tolerance allows, and return the new time (s).
 
-        `longest` is the longest step (s); a negative one leads to earlier times. A step ends where
-        a table of the torque changes. Raise InputError if `longest` is too small to change the
-        time, or not a number, and if the motion or its torque is singular.
+        `longest` is the longest step (s), negative for a step to an earlier time. A step ends where
+        a table of the torque changes. Raise InputError if `longest` is no number or too small to
+        change the time, and if the motion or its torque is singular.
         """
         longest = number("longest", longest)
         end = self._time + longest
@@ -178,7 +179,7 @@ class Stepper:
         taken = self._take_step(longest)
         self._begin, self._last = self._time, taken
         is_cut = self._time + taken.h == self._time + longest
-        # A step that was cut says nothing of the next one.
+        # The length of a shortened step is no guess for the next one.
         self._trial = max(self._trial, abs(taken.h)) if is_cut else abs(taken.h)
         self._time = end if is_cut else self._time + taken.h
         self._state = taken.state.copy()
@@ -199,7 +200,7 @@ class Stepper:
             )
             if taken.h == 0.0:
                 raise self._singular()
-            # The omega that a body at rest is about to reach was a guess.
+            # For a body at rest, the scale was a guess of the omega that it reaches.
             reached = float(np.abs(taken.state[:3]).max())
             if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
                 return taken
@@ -210,15 +211,15 @@ class Stepper:
         end = finite("time", time)
         while self._time != end:
             self.step(end - self._time)
-            # The sum of time and difference is rounded.
+            # The sum of time and step is rounded.
             if abs(self._time - end) <= math.ulp(end):
                 self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
-        """Return the state at times (s) within the last step, before anything was set.
+        """Return the state at times (s) within the last step, without later changes by the user.
 
-        It is omega (rad/s), shape (3,), or with the quaternion, shape (7,); one column for each of
-        n times. Raise InputError for a time outside the step.
+        It is omega (rad/s), shape (3,), or with the quaternion, shape (7,), and has a column for
+        each of several times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)
@@ -267,7 +268,7 @@ class Stepper:
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         if self._largest > 0.0:
             return self._largest
-        # The omega that a body at rest is about to reach.
+        # A guess of the omega that a body at rest reaches.
         try:
             rates = float_outputs(self._tape, [self._time, *self._state.tolist()])
         except ArithmeticError:
@@ -285,9 +286,9 @@ class Stepper:
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the beginning (s) of each step from 0 to `end`, and the stepper after it.
+    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
 
-    They end before a singularity, and after `most` steps.
+    The steps end before a singularity, and after `most` steps.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
     with suppress(SingularError):
@@ -300,7 +301,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the lengths (s) of the steps to `end`, by their ends, without those at `bounds`."""
+    """Return the lengths (s) of the steps to `end`, by end (s), without steps to `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -310,7 +311,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory with the reason if its torque is not defined."""
+    """Return the trajectory, as ``singular`` with a reason if its torque becomes undefined."""
     if found.ended != "overflow" or not is_recorded(scene):
         return found
     try:
@@ -326,7 +327,7 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the equations for omega, attitude if computed, and held torque as a tape."""
+    """Return the rates of omega, attitude if computed, and held torque as a tape."""
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
     time, *unknowns = recorder.inputs()
@@ -352,7 +353,7 @@ def _three(name: str, values: object) -> tuple[float, ...]:
 
 
 def _fixed(values: Array) -> Array:
-    """Return a copy that can't be changed, as that would not change the motion."""
+    """Return a read-only copy, because changes of a copy would not change the motion."""
     found = values.copy()
     found.setflags(write=False)
     return found

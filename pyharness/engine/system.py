@@ -20,7 +20,7 @@ from pyharness.model.values import Triple
 def system_of(scene: Scene, attitude: bool) -> Tape:
     """Return the equations of motion of a scene with recorded torque and principal axes as a tape.
 
-    They are 16-18 of the thesis and, if `attitude`, q' = q (0, omega)/2.
+    They are equations 16-18 of the thesis and, if `attitude`, q' = q (0, omega)/2.
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
@@ -46,8 +46,8 @@ def is_recorded(scene: Scene) -> bool:
 def with_constant_body(scene: Scene) -> Scene:
     """Return a scene with the same solution whose inertia does not change with time.
 
-    It has A = B = C = 0, and for inertia I and torque N as its torque omega', where I omega' = N -
-    I' omega - omega x (I omega).
+    It has A = B = C = 0, and as its torque omega', where I omega' = N - I' omega - omega x (I
+    omega) for the inertia I and the torque N.
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:
@@ -72,9 +72,9 @@ def with_constant_body(scene: Scene) -> Scene:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return f(t, state) of a scene whose torque depends on the state, NaN where singular.
+    """Return the right-hand side f(t, state) under a torque of the state, NaN where singular.
 
-    The state is omega (rad/s), and the quaternion if there is one.
+    The state is omega (rad/s), with or without the quaternion.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)

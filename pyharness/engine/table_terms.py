@@ -1,7 +1,6 @@
-"""Torque terms given by tables of values over time, and pulses; components about the body axes.
+"""Torque terms given by tables over time, and pulses, with components about the body axes.
 
-Methods by Taylor series begin a step where a table changes, and are as accurate as for a smooth
-torque.
+Taylor series begin a step where a table changes, and are as accurate as for a smooth torque.
 """
 
 import itertools
@@ -28,9 +27,9 @@ _Cubic = tuple[float, float, float, float]
 
 
 def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linear") -> StateTorque:
-    """Return a torque that a table of values over time specifies.
+    """Return the torque that a table of values over time specifies.
 
-    Before the first time it has the first value, and after the last time the last.
+    The first value holds before the first time, and the last value after the last time.
 
     Parameters
     ----------
@@ -85,17 +84,17 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
     """Return a torque that acts within pulses, and is 0 elsewhere.
 
-    Steps of the integration end where a pulse begins or ends.
+    Steps of Taylor series end where a pulse begins or ends.
 
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)
         The times (s) at which the pulses begin, in any order, 1 to 10 000.
     durations : iterable of numbers, shape (n,)
-        The durations (s), above 0. A pulse may begin when another ends, not before. Its impulse is
-        torque times duration, even if its end is rounded.
+        The durations (s), above 0. A pulse may begin when another ends, not before. The impulse of
+        a pulse is torque times duration, even if its end is rounded.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
-        The torque about the body axes (N m) of all pulses, or of each.
+        The torque about the body axes (N m) of all pulses, or one for each pulse.
 
     Returns
     -------
@@ -149,7 +148,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
                 f"begins at {after:g} s; allowed: pulses that do not overlap"
             )
     times, values = [_before(ordered[0][0], ends[0])], [(0.0, 0.0, 0.0)]
-    begun = acting = 0.0  # start and duration (s) of the last pulses, which touch and are equal
+    begun = acting = 0.0  # start and total duration (s) of the last equal pulses that touch
     for n, (begin, length, each) in enumerate(ordered):
         if n and ends[n - 1] == begin and ordered[n - 1][2] == each:
             acting += length
@@ -158,7 +157,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
             begun, acting = begin, length
             if times[-1] == begin:
                 del times[-1], values[-1]
-        # The end is rounded, and the impulse is not: torque times duration.
+        # Compensates for the rounding of the end, so that the impulse is torque times duration.
         factor = acting / (ends[n] - begun)
         x, y, z = each
         times += [begun, ends[n]]
@@ -207,7 +206,7 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return a time before the first, for a constant piece as long as the next."""
+    """Return the time at which a constant piece as long as the first piece begins."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
@@ -226,7 +225,7 @@ def _linear(times: list[float], values: list[float]) -> Table:
 
 
 def _cubic(times: list[float], values: list[float]) -> Table:
-    # SciPy is imported here, because few scenes have a spline.
+    # Imported late, because few scenes have a spline.
     from scipy.interpolate import CubicSpline
 
     with np.errstate(all="ignore"):
@@ -238,7 +237,7 @@ def _cubic(times: list[float], values: list[float]) -> Table:
 
 
 def _between(times: list[float], values: list[float], pieces: Sequence[_Cubic]) -> Table:
-    """Return the table with `pieces`, and constants before and after."""
+    """Return the table with `pieces`, and constants before and after them."""
     if not all(map(math.isfinite, itertools.chain.from_iterable(pieces))):
         raise InputError(
             "[torque] table: a slope or a coefficient overflows; allowed: smaller values, or times "
@@ -259,7 +258,6 @@ def _torque(axes: Sequence[Table]) -> Function:
     reduced = [_reduced(each) for each in axes]
 
     def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
-        # A table with one constant piece is a number.
         return [
             SYMBOLS.table(each, time) if len(each.breaks) > 1 else each.pieces[0][0]
             for each in reduced
@@ -269,10 +267,10 @@ def _torque(axes: Sequence[Table]) -> Function:
 
 
 def _reduced(each: Table) -> Table:
-    """Return a table without breaks between equal constants."""
+    """Return the table without breaks between equal constants."""
     kept: list[tuple[float, _Cubic]] = []
     for time, piece in zip(each.breaks, each.pieces, strict=True):
-        # Equal pieces are constants, because the table is continuous where pieces are not constant.
+        # Equal neighbours are constants, because the table is continuous where pieces vary.
         if not kept or kept[-1][1] != piece:
             kept.append((time, piece))
     breaks, pieces = zip(*kept, strict=True)

@@ -23,14 +23,14 @@ from pyharness.model.trajectory import Array, Trajectory
 def taylor(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory of a scene at `times` (s) by Taylor series, repeated if inaccurate.
+    """Return the trajectory of a scene at `times` (s) by Taylor series.
 
-    `evaluations` are the series of all integrations. Under a torque about the axes of space, these
-    differ by the estimated error, and `growth` is unknown. Raise InputError for an opaque torque,
-    and if the work limit is exceeded.
+    The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
+    Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
+    is None. Raise InputError for an opaque torque, and if the work limit is exceeded.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
-    # The first column is the attitude at time 0. A column for each time follows.
+    # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
@@ -40,7 +40,7 @@ def taylor(
         n_attitudes=n_attitudes, attitudes=joint, effort=work,
     )  # fmt: skip
     if status == GAVE_UP:
-        # After one step it is a forecast.
+        # After one step the kernel forecasts the work.
         how = "would exceed" if steps == 1 else "exceeded"
         count = "" if steps == 1 else f" after {steps} steps"
         raise TimedError(
@@ -54,7 +54,7 @@ def taylor(
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the name and first arguments of the kernel; raise InputError if opaque."""
+    """Return the kernel's name and first arguments; raise InputError for an opaque torque."""
     if isinstance(scene.torque, StateTorque):
         return "tape_rows", (kernel_tape(system(scene)),)
     if scene.torque.in_space:

@@ -1,7 +1,7 @@
 """Taylor series as a method of `scipy.integrate.solve_ivp`, for any differential equation.
 
-The order is fixed; the last terms decide the step (Jorba and Zou 2005, Experimental Mathematics 14,
-section 3).
+The order is constant; the last terms determine the step (Jorba and Zou 2005, Experimental
+Mathematics 14, section 3).
 """
 
 import math
@@ -22,24 +22,24 @@ from pyharness.model.trajectory import Array
 from pyharness.model.values import number
 
 _MOST_OPERATIONS = 20_000
-# The least relative tolerance that SciPy's methods allow.
+# The least relative tolerance of SciPy's methods.
 _LEAST_RTOL = 100.0 * np.finfo(float).eps
-# The least error that is distinguished from 0; its reciprocal is a number too.
+# The least allowed error that counts, whose reciprocal is finite.
 _LEAST_SCALE = 2.0**-1000
-# `solve_ivp` takes an event function that is 0 at the start for one that changes sign in the first
-# step if it has another root there, and misses pairs of roots. The state changes by this part in
-# the first step, and following steps grow at most so many times, as those of SciPy's methods.
+# In the first step, `solve_ivp` misses the root of an event function that is also 0 at the start,
+# and pairs of roots. Therefore the state changes by this part in the first step, and a step is at
+# most so many times as long as the one before, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
-_FIRST_PARTS = 1e-12, 1e-2  # of the step that the tolerances allow
+_FIRST_PARTS = 1e-12, 1e-2  # limits of the first step, over the step that the tolerances allow
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
     It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
-    `fun` is called twice, with symbols, and its arithmetic is recorded; compiled code computes the
-    series, whose order, 8 to 28, follows from the tolerances. The dense output is the series.
+    `fun` is called twice, with symbols, and its arithmetic is recorded. Compiled code computes the
+    series, whose order, 8 to 28, depends on the tolerances. The dense output is the series.
 
     Parameters
     ----------
@@ -52,10 +52,10 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     y0 : array_like, shape (n,)
         The initial state, real.
     t_bound : float
-        The end, before or after `t0`.
+        The final time, before or after `t0`.
     max_step : float, optional
-        The longest step. Default is inf. Shorter ones find both of two roots of an event within a
-        step.
+        The longest step. Default is inf. Shorter steps separate two roots of an event, which
+        `solve_ivp` misses within one step.
     rtol, atol : float or array_like, shape (n,), optional
         The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. A component
         that is 0 is compared with the largest if `atol` is 0. Defaults are 1e-3 and 1e-6.
@@ -141,7 +141,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             return span
         change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
         sizes = np.abs(step.terms[1:] / scale).max(axis=1)
-        # Half the change is in the first term, a quarter in the second, and so on.
+        # The first term may have half the change. Term k then has 2**-k of it.
         with np.errstate(divide="ignore", over="ignore"):
             parts = 0.5 * (change / sizes) ** (1.0 / np.arange(1, len(sizes) + 1))
         first = float(np.clip(parts.min(), *_FIRST_PARTS)) * abs(step.h)
@@ -164,7 +164,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         end = self.t + step.h
         is_cut = end == self.t + self.direction * longest
         self._terms = step.terms
-        # A step that was cut says nothing of the next one.
+        # The length of a shortened step is no guess for the next one.
         self._trial = max(self._trial, abs(step.h)) if is_cut else abs(step.h)
         self._longest = max(self._longest, _MOST_GROWTH * abs(step.h))
         self.t = self.t_bound if is_cut and longest == rest else end
@@ -186,7 +186,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
 
 
 class _Series(DenseOutput):  # type: ignore[misc]
-    """The Taylor series of a step; terms include powers of the step."""
+    """The Taylor series of a step, as dense output; `terms` include powers of the step."""
 
     def __init__(self, t_old: float, t: float, terms: Array) -> None:
         super().__init__(t_old, t)
@@ -198,7 +198,7 @@ class _Series(DenseOutput):  # type: ignore[misc]
 
 
 def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
-    """Return ``fun(t, y)`` of n equations as a tape; raise InputError if it can't be recorded."""
+    """Return ``fun(t, y)``, with n components, as a tape; raise InputError if impossible."""
 
     def record(recorder: Recorder) -> Tape:
         time, *state = recorder.inputs()

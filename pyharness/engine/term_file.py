@@ -1,4 +1,4 @@
-"""Ready terms in scene files: the tables [[torque.terms]]."""
+"""Reading of ready terms, the tables [[torque.terms]] of scene files."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ _LAW = ("constant", "rate", "sines", "cosines")
 
 
 def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
-    """Return the ready terms from the tables [[torque.terms]], or raise InputError."""
+    """Return the ready terms of the tables [[torque.terms]], or raise InputError."""
     if not isinstance(tables, list):
         raise InputError(
             f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"
@@ -62,7 +62,7 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
     for name, parameter in parameters.items():
         if name not in given and parameter.default is Parameter.empty:
             raise InputError(f"{where}, {kind}: {name} is missing; keys: {', '.join(parameters)}")
-    # The torque of pulses has no law.
+    # The torque of pulses can't be a law.
     frames = {} if kind == "pulses" else _FRAMES
     arguments = {
         key: _argument(f"{where}, {key}", value, key, frames.get(key))
@@ -87,7 +87,7 @@ def _inertia(body: dict[str, Any], where: str) -> Any:
 
 
 def _argument(where: str, value: object, key: str, frame: str | None) -> object:
-    """Return a term's argument; a table becomes a law about the axes `frame`, if not None."""
+    """Return a term's argument; with a `frame`, a table becomes a law about its axes."""
     if key == "per_axis":
         return boolean(where, value)
     if frame is None:
@@ -110,6 +110,6 @@ def _one_of(names: tuple[str, ...]) -> str:
 
 
 def _placed(error: InputError, where: str) -> InputError:
-    """Return an error with the place of the term."""
+    """Return the error with the place of the term in its message."""
     message = str(error).removeprefix("[torque]").lstrip(": ")
     return InputError(f"{where}, {message}")

@@ -17,13 +17,13 @@ from pyharness.model.values import converted, finite, number_list, three
 
 
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
-    """Return a recorded function as a ready term, with kind and checked arguments."""
+    """Return a function, recorded, as a ready term with its kind and checked arguments."""
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
 
 
 def _file_value(value: Any) -> Any:
-    """Return an argument in the shortest form of a scene file."""
+    """Return an argument in its shortest form in scene files."""
     if isinstance(value, np.ndarray):
         if value.shape == (3, 3) and is_diagonal(value):
             value = np.diag(value)
@@ -43,11 +43,11 @@ def is_diagonal(matrix: Array) -> bool:
 
 
 def matrix_of(where: str, value: object) -> Array:
-    """Return a finite matrix, shape (3, 3), from a number, a diagonal, or three rows."""
+    """Return a matrix, shape (3, 3), from a number, a diagonal or rows, or raise InputError."""
     if isinstance(converted(value), float):
         return np.diag([finite(where, value)] * 3)
     allowed = "allowed: a number, three numbers for the axes, or three rows of three numbers"
-    # One element more than allowed is read, so that an endless generator is refused.
+    # At most four elements are read, because a generator may be endless.
     given = [each for each, _ in zip(number_list(where, value, allowed), range(4), strict=False)]
     if len(given) != 3:
         count = "more than 3" if len(given) > 3 else str(len(given))
@@ -60,7 +60,7 @@ def matrix_of(where: str, value: object) -> Array:
 def inertia_of(where: str, value: object) -> Array:
     """Return an inertia matrix (kg m2), shape (3, 3), from three moments or three rows.
 
-    Raise InputError unless it is symmetric and positive definite.
+    Raise InputError unless the matrix is symmetric and positive definite.
     """
     if isinstance(converted(value), float):
         raise InputError(f"{where}: {kind_of(value)}; allowed: three moments, or three rows, kg m2")
@@ -73,12 +73,12 @@ def inertia_of(where: str, value: object) -> Array:
 
 
 def law_of_vector(where: str, value: object, frame: str) -> TorqueLaw:
-    """Return a vector over time, from three numbers or a TorqueLaw with this frame."""
+    """Return a vector over time, from three numbers or a TorqueLaw with `frame`."""
     allowed = f'allowed: three numbers, or a TorqueLaw with frame="{frame}"'
     if isinstance(value, TorqueLaw):
         if value.frame != frame:
             raise InputError(f"{where}: a TorqueLaw with frame {value.frame}; {allowed}")
         return value
-    # The list is made here, so that the message says that a law is allowed too.
+    # The message of `number_list`, unlike that of `three`, says that a law is allowed.
     number_list(where, value, allowed)
     return TorqueLaw(three(where, value), frame=frame)

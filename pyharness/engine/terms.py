@@ -1,7 +1,4 @@
-"""Torque terms for damping, control and wheels, with components about the body axes.
-
-A matrix is a number, times the identity, or three diagonal elements, or three rows.
-"""
+"""Torque terms for damping, control and wheels, with components about the body axes."""
 
 from collections.abc import Iterable
 from itertools import islice
@@ -25,8 +22,8 @@ _MOST_COEFFICIENTS = 50
 def damping(matrix: MatrixLike) -> StateTorque:
     """Return the torque -D omega of linear damping.
 
-    The body loses the power omega . D omega (W), never negative if the symmetric part of D is
-    positive semidefinite.
+    The body loses the power omega . D omega (W), which is never negative if the symmetric part of D
+    is positive semidefinite.
 
     Parameters
     ----------
@@ -62,15 +59,15 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     """Return a torque of drag that is an odd polynomial of omega.
 
     It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega, or if `per_axis` of -C_n v_n,
-    with v_n of components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no such polynomial
-    and not smooth at 0; a function with ``numpy.sqrt`` can have it elsewhere.
+    where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no polynomial
+    and not smooth at 0; elsewhere, a torque function with ``numpy.sqrt`` can have it.
 
     Parameters
     ----------
     coefficients : iterable of numbers, three numbers, or three rows of three numbers
         1 to 50 coefficients C_0, C_1, ..., in N m (s/rad)^(2n+1), in the forms of `damping`.
     per_axis : bool
-        Whether the powers are those of the components, instead of those of |omega|.
+        Whether the powers are those of the components, not of |omega|.
 
     Returns
     -------
@@ -116,8 +113,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Alone, with a positive definite K, it leads from every near start to the target, if that is 0 or
-    about a principal axis.
+    Alone, with a positive definite K, it leads from every near omega to the target, if the target
+    is 0 or about a principal axis.
 
     Parameters
     ----------
@@ -161,7 +158,7 @@ def attitude_control(
 ) -> StateTorque:
     """Return the torque -2 k e0 e - K omega, which rotates the body to a target attitude.
 
-    The error quaternion (e0, e) is target* q with the attitude q. A quaternion and its negative
+    The error quaternion (e0, e) is target* q, with the attitude q. A quaternion and its negative
     have the same torque, so that the body does not unwind. For a number k the first term is -k
     sin(angle) about the axis of the error, with the potential k (1 - cos(angle)); the equilibrium
     at 180 degrees is unstable.
@@ -216,8 +213,9 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
 
     The motors exert u on the wheels: h' = u. Without motors h is constant, and the body a gyrostat.
 
-    Either h is the absolute momentum of the wheels about their own axes, and the inertia excludes
-    their moments about these; or h is relative to the body, and the inertia includes them.
+    Either h is the absolute momentum of the wheels about their axes, and the inertia of the body
+    excludes their moments about these axes; or h is relative to the body, and the inertia includes
+    these moments.
 
     Parameters
     ----------

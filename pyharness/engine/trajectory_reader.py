@@ -1,7 +1,7 @@
 """Reading of the files that `Trajectory.save` writes.
 
-Since they may come from anyone, nothing is executed or unpickled, no array is larger than the file,
-and every value is checked.
+Files may come from anyone. Therefore nothing is executed or unpickled, no array is larger than the
+file, and every value is checked.
 """
 
 import hashlib
@@ -48,8 +48,8 @@ _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
-    All numbers, and the results of its methods, are bit-for-bit the same. A torque that no scene
-    file can describe is restored as a list of operations.
+    All numbers, and the results of its methods, are bit-for-bit the same. A torque that scene files
+    can't describe becomes a recorded one.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Raises
     ------
     InputError
-        If the file can't be read, is not by `Trajectory.save` or of another version, was changed or
-        damaged, or is larger than a quarter of this machine's memory.
+        If the file can't be read, is not by `Trajectory.save` or has another version, was changed
+        or damaged, or is larger than a quarter of this machine's memory.
 
     Examples
     --------
@@ -83,9 +83,9 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         header = json.loads(_text(_arrays(content, ["header"])[0], "header"))
         if header["kind"] != KIND:
             raise ValueError("another kind of file")
-    except Exception:  # the packages that read archives raise errors of many types
+    except Exception:  # zipfile, json and NumPy raise errors of many types
         raise damaged from None
-    # Another version may have other arrays.
+    # Checked before the arrays, which may be others in another version.
     check_schema(where, "trajectory file", header.get("schema"), "take a version that reads it")
     try:
         arrays, digest = _arrays(content)
@@ -107,7 +107,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 
 
 def _arrays(content: bytes, names: Sequence[str] = ()) -> tuple[dict[str, Any], str]:
-    """Return the arrays of some names, or all, and the digest of these without `DIGEST`."""
+    """Return the arrays with these names, by default all, and their digest without `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS, SENSITIVITIES)}

@@ -4,8 +4,8 @@ The programs are from a thesis. The package has them as printed and as corrected
 results, and solves Euler's equations by other methods.
 """
 
-# Type checkers take this name for true. Nothing is imported here, because Ctrl-C is not handled yet
-# while a command imports the package.
+# Type checkers assume that this name is true. Nothing is imported here, because Ctrl-C is not yet
+# handled while a command imports the package.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
@@ -79,8 +79,8 @@ __all__ = [
     "subset",
 ]
 
-# The public names by module. A module is imported at the first use of one of its names, so that a
-# program loads only the modules that it needs.
+# The public names by module. Modules are imported at their first use, so that a program loads only
+# those that it needs.
 _SUBMODULES = {
     "checks.compare.comparison": ("Comparison", "compare_programs"),
     "checks.compare.method_comparison": ("compare_methods",),
@@ -108,12 +108,11 @@ _SUBMODULES = {
     "engine.taylor_ivp": ("Taylor",),
     "engine.solve": ("solve",),
 }
-# Public modules, which are imported at their first use too.
+# Public modules, also imported at their first use.
 _MODULES = ("events", "torques")
 
 
-# Type checkers read the imports above. This function is hidden from them, because with it they
-# would accept any attribute name.
+# Type checkers read the imports above; with this function they would accept any attribute.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:

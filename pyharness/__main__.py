@@ -1,6 +1,6 @@
 """The entry point of `python -m pyharness` and of the command `pyharness`."""
 
-# The module `signal` would import others first, for some 10 ms.
+# The module `signal` would first import others, for some 10 ms.
 import _signal as signal  # type: ignore[import-not-found]  # noqa: PLC2701
 import os
 
@@ -12,14 +12,14 @@ def _leave(*_: object) -> None:
         os._exit(130)
 
 
-# The handler is set before all other imports, because before this line Ctrl-C prints a traceback of
-# the interpreter. A shell starts a background process with SIGINT ignored; it then remains ignored.
+# The handler precedes all other imports, during which Ctrl-C would print the interpreter's
+# traceback. A shell starts background processes with SIGINT ignored, which must remain so.
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, _leave)
 
 
 def start() -> None:
-    """Run the command line and end the process, promptly after Ctrl-C, with its status."""
+    """Run the command line and end the process with its status, promptly after Ctrl-C."""
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

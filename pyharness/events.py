@@ -1,7 +1,7 @@
-"""Ready events, which the function `solve` finds along a trajectory.
+"""Ready events for `solve`, which finds them along a trajectory.
 
-An event is an argument of `pyharness.solve`, in ``events=[...]``. A Python function of time and
-omega can be an event too.
+An event is an element of the argument ``events=[...]`` of `pyharness.solve`. A Python function of
+time and omega can also be an event.
 """
 
 from pyharness.engine.event_functions import Event

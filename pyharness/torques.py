@@ -1,4 +1,4 @@
-"""Torques that depend on the state of the body: ready terms, which can be added.
+"""Ready torques that depend on the state of the body: terms, which can be added.
 
 A sum of terms, of torque laws about the body axes, and of Python functions is a torque for
 `pyharness.Scene`. At least one of two summands must be a term.

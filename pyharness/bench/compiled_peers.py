@@ -1,7 +1,7 @@
-"""Runge-Kutta methods of `bench` that numba compiles.
+"""Runge-Kutta methods that numba compiles, for `bench`.
 
-For speed, the source of each right-hand side contains the numbers of its scene, and the stages are
-written out, as by hand.
+For speed, the source of each right-hand side contains the scene's numbers, and loops over stages
+are unrolled.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of classical "rk4", or of "dop8", order 8 of DOP853, by numba."""
+    """Return a maker of a numba kernel for "rk4" or "dop8" (order 8 of DOP853)."""
     import numba
 
     formula: Formula = RK4
@@ -61,8 +61,8 @@ def rates(
 ) -> list[str]:
     """Return the right-hand side of each unknown as Python source.
 
-    `time` and `state` are names in the source. Three unknowns are omega; four more are the
-    quaternion q, with q' = q (0, omega)/2. A, B, C are by default the scene's.
+    `time` and `state` are names in the source. Three unknowns are omega; seven also have the
+    quaternion q, with q' = q (0, omega)/2. `coefficients` are A, B, C, by default the scene's.
     """
     x, y, z, *attitude = state
     moments = scene.moments or (1.0, 1.0, 1.0)
@@ -95,12 +95,12 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return "xyz" for omega, or "xyzabcd" with an attitude."""
+    """Return the names of the unknowns, a letter each, with any quaternion."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the unknowns at the end time, and the count of evaluations, as an `End`."""
+    """Return the state at the end time as an `End`."""
     found = copied_result(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)

@@ -18,11 +18,10 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Three tolerances per decade. The tolerances are so close that a method is compared by its error,
-# even if its error is far below its tolerance.
+# Three tolerances per decade, because methods are compared at equal error, which may be far from
+# the tolerance.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# A function that takes the end time (s) and the setting of an integration, and returns the prepared
-# integration.
+# A function of the end time (s) and the setting, which returns a prepared integration.
 Maker = Callable[[float, float], Ready]
 
 
@@ -36,15 +35,15 @@ class Contender:
 
     @property
     def is_installed(self) -> bool:
-        """Return whether the contender's package is installed."""
+        """Return whether the required package, if any, is installed."""
         return not self.package or find_spec(self.package) is not None
 
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that integrates omega of one scene, and perhaps the attitude."""
+    """A contender that integrates omega of one scene and, if `attitude`, the attitude."""
 
-    # Function that returns a `Maker` for a scene. It makes all preparations, including compilation.
+    # Returns a `Maker` for a scene, after all preparations, including compilation.
     prepare: Callable[[Scene], Maker]
     settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
     order: int = 0  # order of convergence of a method with a fixed step
@@ -73,7 +72,7 @@ def list_own_contenders() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError below 100 eps, as SciPy uses 100 eps and LSODA refuses it."""
+    """Raise InputError below 100 eps, which SciPy would replace by 100 eps, and LSODA refuse."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

@@ -1,6 +1,6 @@
-"""Solvers of `bench --ensemble` that numba compiles at their first call.
+"""Solvers that numba compiles at their first call, for `bench --ensemble`.
 
-Each returns a function for omega at the end time `HORIZON` (rad/s), shape (n, 3).
+Each returns a function that computes omega at the end time `HORIZON` (rad/s), shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ LANES = 64  # bodies in a block
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for slices of `block` bodies, in order or distributed over threads."""
+    """Call `solve` for slices of at most `block` bodies, distributed over `threads` threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -30,10 +30,10 @@ def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int)
 def numba_rk4(
     in_blocks: bool, load: EnsembleLoad, setting: float, threads: int
 ) -> Callable[[], Array]:
-    """Return RK4 by numba.
+    """Return an integration by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over the bodies of a block; else bodies are integrated one
-    by one.
+    If `in_blocks`, each step is a loop over the bodies of a block; else each body is integrated to
+    the end before the next.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies

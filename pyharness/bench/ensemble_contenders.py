@@ -1,4 +1,4 @@
-"""The problem of `bench --ensemble`, and our own solvers of it."""
+"""The problem of `bench --ensemble`, and our contenders."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -29,9 +29,9 @@ def coefficients() -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """Many bodies with the moments `MOMENTS`, each with its omega and constant torque.
+    """Many bodies with the moments `MOMENTS`, their omegas and constant torques.
 
-    The torques are None for torque-free bodies.
+    `torque` is None for torque-free bodies.
     """
 
     name: str
@@ -42,7 +42,7 @@ class EnsembleLoad:
 
     @property
     def n(self) -> int:
-        """Return the number of bodies in the ensemble."""
+        """Return the number of bodies."""
         return len(self.omega0)
 
     @property
@@ -76,7 +76,7 @@ class EnsembleLoad:
     def ends(self) -> Array:
         """Return omega at the end (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
 
-        Quaternions, shape (n, 4), if attitudes are requested.
+        If attitudes are requested, return the quaternions instead, shape (n, 4).
         """
         found = np.empty_like(self.omega0 if self.attitude0 is None else self.attitude0)
         for i, start in enumerate(self.omega0.tolist()):
@@ -92,7 +92,7 @@ class EnsembleLoad:
         return found
 
 
-# A function that takes the bodies, the setting (a tolerance or a number of steps) and the number of
+# A function of the bodies, the setting (a tolerance or a number of steps) and the number of
 # threads. It returns a function that integrates the bodies and returns omega at `HORIZON`, shape
 # (n, 3), or the attitudes, shape (n, 4), of a load that requests them.
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
@@ -111,7 +111,7 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return all ways to prepare the solver by note; a single way has none."""
+        """Return all ways to prepare the solver, by note; the note of a single way is empty."""
         return self.variants or {"": self.prepare}
 
 
@@ -135,7 +135,7 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our contenders: closed form, Taylor and RK4."""
+    """Return our contenders: the closed form, the Taylor method and RK4."""
     return [
         EnsembleContender(
             "closed-form", "none", _make_own("closed-form"), torque_free=True, attitude=True

@@ -26,7 +26,7 @@ _BATCH, _ROUNDS = 0.02, 5
 
 @dataclass(frozen=True)
 class Size:
-    """Our methods' run time per body, on one core, in a call for `bodies`."""
+    """The run times per body of our methods, on one core, in a call for `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]  # s per body, by method
@@ -34,7 +34,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Memory:
-    """The growth (bytes) of a process, to its peak, by one call of a method."""
+    """The memory that one call of a method adds to a process."""
 
     method: str
     bodies: int
@@ -43,15 +43,15 @@ class Memory:
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak over the memory of the call's arrays, or None."""
+        """Return the peak divided by the size of the arrays, or None."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
-    """Measure the run time per body with 1, 10, 100, ... up to `most` bodies.
+    """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    The closed form is measured without torque, by `solve_many` and by a solver prepared before; the
-    others with torque.
+    The closed form is measured without torque, by `solve_many` and by a prepared solver; all others
+    with torque.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -75,9 +75,9 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
 
 
 def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure the memory of a call, for each of `methods`, by default all ours.
+    """Measure the memory of a call for each of `methods`, by default all our methods.
 
-    Each runs in a process of its own, because peak memory never decreases.
+    Each method runs in a new process, because peak memory never decreases.
     """
     found = []
     for method in own_ensembles() if methods is None else methods:
@@ -94,7 +94,7 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of a call's arrays, and the peak memory minus that before the call."""
+    """Print the bytes of a call's arrays, and the increase of peak memory by the call (bytes)."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()

@@ -1,8 +1,8 @@
 """Measurement of ensembles: bodies per second at a target error, and RK4 steps per second.
 
-Each contender uses the coarsest setting whose error on a sample is at most the target, for as many
-bodies as take a fraction of a second. All are called in turn in several rounds. The shortest time
-counts, because other work can only lengthen it. Calls on one core are timed in processor time.
+Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
+interleaved in several rounds. The shortest time counts, because other load can only lengthen it.
+Calls on one core are timed in processor time.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,9 +30,9 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # number of steps of RK4, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). The number of bodies is increased if a call is shorter than the first
-# duration. If the last increase has raised the bodies per second by more than half, it is also
-# increased if the call is shorter than the second duration.
+# Durations of a call (s). The number of bodies is increased if a call is shorter than the first. It
+# is also increased if a call is shorter than the second and the last increase has raised the bodies
+# per second by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -41,7 +41,7 @@ _MOST_STEPS = 1 << 14
 
 @dataclass(frozen=True)
 class Rate:
-    """The speed of one contender and number of threads on one task."""
+    """The speed of one contender, with a number of threads, on one task."""
 
     load: str
     target: float | None  # requested error; None where the steps were prescribed
@@ -60,13 +60,13 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies per second, or steps of all bodies per second if prescribed."""
+        """Return bodies per second or, for prescribed steps, steps of all bodies per second."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
 @dataclass(frozen=True)
 class Rates:
-    """All measured speeds, and the reasons for missing ones."""
+    """All measured speeds, and the reasons for missing measurements."""
 
     seed: str
     bodies: int
@@ -77,10 +77,7 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A load with a target error or, without one, `STEPS` steps of RK4.
-
-    The error is that of the first bodies, a random sample.
-    """
+    """A load with a target error or, without one, with `STEPS` steps of RK4."""
 
     load: EnsembleLoad
     target: float | None
@@ -89,21 +86,18 @@ class _Task:
 
     @property
     def place(self) -> str:
-        """Return a description for messages, such as ``no torque, 1e-06``."""
+        """Return the name of the task for messages, such as ``no torque, 1e-06``."""
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether a contender can do the task.
-
-        It must take the load's torques and attitudes, and be an RK4 solver if steps are prescribed.
-        """
+        """Return whether a contender accepts the task's torques, attitudes and prescribed steps."""
         torque = self.load.torque is not None and each.torque_free
         if torque or (self.load.attitude0 is not None and not each.attitude):
             return False
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error, over each body's largest omega at start or end.
+        """Return the largest error of omega, relative to each body's largest omega at start or end.
 
         For attitudes it is an angle (rad). It is infinite if a component is not finite.
         """
@@ -117,7 +111,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the error, or None; `STEPS` if prescribed."""
+        """Return the coarsest setting that reaches the target or None; `STEPS` without target."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -140,7 +134,7 @@ def measure_ensembles(
     """Measure the speed of all contenders on all loads, at all target errors.
 
     On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
-    at least `least` bodies, if there are as many.
+    at least `least` bodies, or all if the load has fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -184,8 +178,8 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
     if each.setting == "none":
         yield 1.0
     elif each.setting == "tolerance":
-        # These tolerances suffice, because no contender has an error below a hundredth of its
-        # tolerance, or above a thousand times its tolerance.
+        # No contender has an error below a hundredth of its tolerance, or above a thousand times
+        # its tolerance.
         for digits in range(-2, 4):
             if target * 10.0**-digits >= FINEST:
                 yield float(f"{target * 10.0**-digits:.0e}")
@@ -199,10 +193,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return the first bodies that suffice for timing, and the function that solves them.
-
-    At least `least`, if `load` has as many.
-    """
+    """Return enough bodies for timing, at least `least` or all, and the function solving them."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
@@ -215,5 +206,5 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return the processor time for one thread, else the wall clock."""
+    """Return the clock: processor time for one thread, else wall time."""
     return process_time if threads == 1 else perf_counter

@@ -1,6 +1,6 @@
-"""Third-party solvers of `bench --ensemble`: NumPy, SciPy and heyoka, and a list of all.
+"""Third-party solvers for `bench --ensemble`: NumPy, SciPy, heyoka, and a list of all.
 
-Each returns a function for omega at the end time (rad/s), shape (n, 3).
+Each returns a function that computes omega at the end time (rad/s), shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -23,13 +23,13 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
-# Bodies of a batch. heyoka recommends 4 even if a register has 8 numbers, which is slower.
+# Bodies in a batch. heyoka recommends 4 even if a register has 8 numbers, which is slower.
 BATCHES = (4, 8, 16)
 _BLOCK = 4096  # bodies whose arrays fit into the cache
 
 
 def ensemble_peers() -> list[EnsembleContender]:
-    """Return all third-party solvers, installed or not."""
+    """Return all third-party contenders, installed or not."""
     one = EnsembleContender
     blocks, alone = partial(compiled.numba_rk4, True), partial(compiled.numba_rk4, False)
     batches, ensembles = (
@@ -117,10 +117,7 @@ def _integrator(
     with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
     with_attitude: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a batch integrator of `size` bodies, compiled for a tolerance.
-
-    Of the benchmark's bodies, or of `scene`, whose torque depends on the state.
-    """
+    """Return a compiled batch integrator for `size` bodies: the benchmark's, or `scene`'s."""
     import heyoka
 
     x, y, z = heyoka.make_vars("x", "y", "z")
@@ -139,14 +136,14 @@ def _integrator(
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return `rows`, k numbers for each body, divided into batches."""
+    """Return `rows`, shape (n, k), as batches, shape (batches, k, size), padded by the last row."""
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return RK4 with NumPy arrays: a row per component, a column per body of a block."""
+    """Return an integration by RK4 on NumPy arrays: a row per component, a column per body."""
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -186,10 +183,7 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return SciPy's `solve_ivp` for one body after another.
-
-    The right-hand side computes with floats. `threads` has no effect.
-    """
+    """Return an integration by SciPy's `solve_ivp`, body by body; `threads` has no effect."""
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)

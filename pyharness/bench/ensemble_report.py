@@ -27,7 +27,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """Speeds of all solvers, our times by number of bodies, and memory."""
+    """The speeds of all solvers, our times by number of bodies, and our memory."""
 
     rates: Rates
     sizes: Sequence[Size]
@@ -50,7 +50,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest method's speed over that of `row`, with as many threads, or None."""
+    """Return our fastest speed divided by the speed in `row`, for equal threads, or None."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 

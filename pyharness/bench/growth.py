@@ -1,7 +1,7 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-A relative change of the time t, or of an angular rate, by 2**-53 changes the solution by 2**-53 t
-|omega'|, whatever the method. It is the scale of the errors.
+In any method, a relative change of the time t, or of an angular rate, by 2**-53 changes the
+solution by 2**-53 t |omega'|. Errors are compared with this scale.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _STARTS = 8
 
 @dataclass(frozen=True)
 class Growth:
-    """The Taylor method's error at one time, and the effect of rounding this time."""
+    """The Taylor method's error at one time, and the effect of rounding that time."""
 
     time: float  # s
     # Both are relative to the largest angular velocity. `error` is the largest difference between
@@ -43,8 +43,7 @@ def growth(
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    # Several initial states of one motion are used, so that the result does not depend on a
-    # favourable phase.
+    # Several initial states avoid the bias of a favourable phase.
     omega = np.array(scene.omega)
     starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []

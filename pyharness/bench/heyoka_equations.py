@@ -17,10 +17,10 @@ Formula = Callable[..., Sequence[Any]]
 
 
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
-    """Return pairs of an unknown and its derivative: omega, and the scene's attitude.
+    """Return pairs of an unknown and its derivative, for omega and any attitude of the scene.
 
-    A torque that depends on the state is evaluated from its tape, or by `formula` if that is given.
-    Raise InputError for an opaque torque or a table.
+    `formula`, or else the tape, gives a torque that depends on the state. Raise InputError for an
+    opaque torque or a table.
     """
     import heyoka
 

@@ -1,4 +1,4 @@
-"""The loop of all measurements: calls of a task are prepared, then timed in turn."""
+"""The loop of all measurements: a task's calls are prepared, then timed in interleaved rounds."""
 
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ Say = Callable[[str], None]  # receives the current part of a task
 
 
 class Task(Protocol):
-    """A task, such as a workload, with its name in messages."""
+    """A unit of measurement, such as a workload; messages name it by `place`."""
 
     @property
     def place(self) -> str: ...  # noqa: D102

@@ -1,7 +1,7 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-Every contender has settings from coarse to fine. All calls are prepared, made once, and compared
-with the reference. Then, in each round, a batch of each is timed in turn, so that other work
+Every contender has settings from coarse to fine. Each call is prepared, made once, and compared
+with the reference. Batches of all calls are then timed in interleaved rounds, so that other load
 affects all alike; the median counts.
 """
 
@@ -52,8 +52,8 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 class Workload:
     """A scene, and the time to which its motion is integrated."""
 
-    # For a case the label is its number, with an `L` if T = 100 s (`3L`), or with any other T that
-    # is not 3 s. For a random scene it is the number of the scene, and for a torque term its name.
+    # For a case its number, followed by `L` if T = 100 s (`3L`), or by any other T that is not 3 s.
+    # For a random scene its number, for a torque term its name.
     label: str
     scene: Scene
     horizon: float  # T, s
@@ -69,15 +69,15 @@ class Workload:
 
     @property
     def place(self) -> str:
-        """Return the name in messages, as ``case 5`` or ``scene 12``."""
+        """Return the name for messages, such as ``case 5`` or ``scene 12``."""
         return f"{'scene' if self.kinds else 'case'} {self.label}"
 
     @property
     def group(self) -> str:
         """Return the name of the group over which ratios are averaged.
 
-        Groups share the end time; with attitudes or at 3 s, scenes with and without torque are
-        apart.
+        The scenes of a group share the end time. With attitudes or at 3 s, torque-free scenes form
+        a separate group.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -104,7 +104,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a contender has no result for a workload; `setting` may be None."""
+    """The reason why a contender has no result for a workload."""
 
     workload: Workload
     method: str  # name of the contender
@@ -114,7 +114,7 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Finding:
-    """The results of a run: times, errors, and refusals."""
+    """The results of a run: times, errors, and failed attempts."""
 
     workloads: list[Workload]
     rows: list[Row]
@@ -136,11 +136,11 @@ class Finding:
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return cases of Table 1, each to an end time T.
+    """Return cases of Table 1, each with an end time T.
 
-    By default 2 to 7 to 3 s, and 3 (nearly symmetric) and 4 (unsymmetric, torque-free) to 100 s;
-    with `attitude`, from the axes of space, 1 to 7 to 3 s and all but 6 to 100 s. `case` and
-    `horizon` (s) select one.
+    By default these are Cases 2 to 7 to 3 s, and 3 and 4 also to 100 s. With `attitude`, which is
+    initially that of the axes of space, they are 1 to 7 to 3 s, and all but 6 also to 100 s. `case`
+    and `horizon` (s) select one.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -161,10 +161,7 @@ def measure(
     progress: Progress = no_progress,
     clock: Clock | None = None,
 ) -> Finding:
-    """Return times and errors of every contender on every workload.
-
-    `clock` (s) is by default the wall clock.
-    """
+    """Return times and errors of all contenders on all workloads; `clock` is in s."""
     clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
@@ -190,7 +187,7 @@ def measure(
                 continue
             say(contender.name)
             key = (place, contender.name)
-            # The same compiled code is used for all end times of a scene.
+            # One compiled code serves all end times of a scene.
             begin = clock()
             try:
                 if key not in makers:
@@ -210,9 +207,9 @@ def measure(
 
 
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the relative error of omega, or the attitude's (rad) if larger; else None.
+    """Return the relative error of omega, or the attitude's (rad) if larger.
 
-    None if the result is not finite or a required attitude is missing.
+    Return None if the result is not finite or a required attitude is missing.
     """
     error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
@@ -227,9 +224,10 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega (rad/s) over the largest component of `truth`, or None.
+    """Return the error of omega divided by the largest component of `truth`, or None.
 
-    Over `scale` (rad/s) if that is larger. None if it is not finite, or the reference ends before.
+    The divisor is `scale` (rad/s) if that is larger. The error is None if it is not finite, or if
+    the reference ends before.
     """
     if len(truth.omega) == 0:
         return None

@@ -21,9 +21,10 @@ def measured_report(
 ) -> Report:
     """Return the report of a benchmark.
 
-    `title` is a Markdown heading, `worth` says how far numbers can be compared, `parts` are titled
-    tables. `record` returns the JSON, `data` is the table with full precision, `pictures` are
-    functions by name. `packages` are those whose versions are listed, `command` repeats the report.
+    `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers, and
+    `parts` are titled tables. `record` returns the JSON, `data` is the table with full precision,
+    `pictures` are functions by name. The versions of `packages` are listed; `command` repeats the
+    report.
     """
     here, built = machine(packages), build()
     versions = [
@@ -57,10 +58,9 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return a line for each reason, from tuples (contender, reason, task).
+    """Return one line per reason, from tuples (contender, reason, task).
 
-    It names at most the first `most` tasks of a contender; those with the same reason and tasks
-    share a line.
+    A line lists at most `most` tasks. Contenders with the same reason and tasks share a line.
     """
     places: dict[tuple[str, str], list[str]] = {}
     for who, why, where in reasons:

@@ -1,4 +1,4 @@
-"""Third-party integrators in `bench`, each as its documentation recommends for speed."""
+"""Third-party integrators for `bench`, set up for speed as their documentation recommends."""
 
 import warnings
 from collections.abc import Callable
@@ -20,7 +20,7 @@ _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
 
 def peers() -> list[SceneContender]:
-    """Return all third-party solvers of single scenes, installed or not."""
+    """Return all third-party contenders for single scenes, installed or not."""
     # 2**-52 is the default tolerance of heyoka.
     finest = (*TOLERANCES, 2.0**-52)
 
@@ -45,9 +45,9 @@ def peers() -> list[SceneContender]:
 
 
 def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
-    """Return a maker of heyoka, with one integrator for each tolerance.
+    """Return a maker of heyoka integrations, with one integrator for each tolerance.
 
-    Each run first resets time and state. `formula` is that of `heyoka_equations`.
+    Each run first resets time and state. `formula` is as in `heyoka_equations`.
     """
     import heyoka
 
@@ -57,7 +57,7 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
-            # The time of the compilation is measured, so that no code of an earlier one is used.
+            # Compilation is timed, so code from an earlier compilation must not be reused.
             heyoka.llvm_state.clear_memcache()
             if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):
                 heyoka.llvm_state.set_diskcache_enabled(False)
@@ -89,13 +89,12 @@ def _right_hand_side(scene: Scene) -> RightHandSide:
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return the factor from relative to absolute tolerance: a number, or seven with attitude."""
+    """Return the absolute over the relative tolerance: a number, or one for each unknown."""
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
-    """Return a maker of `solve_ivp`, without dense output and with Python floats."""
     from scipy.integrate import solve_ivp
 
     slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
@@ -128,8 +127,8 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # The call is repeated, because counting the evaluations needs an option for additional
-            # output, which the timed call does not have.
+            # The call is repeated, because the evaluations are counted only with an option that the
+            # timed call omits.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)

@@ -29,10 +29,7 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Return error against run time and evaluations, a row for each workload.
-
-    `data` is saved with the picture.
-    """
+    """Return error against run time and evaluations, a row for each workload, with its `data`."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -110,7 +107,7 @@ def _frame(axes: "Axes", load: Workload, label: str) -> None:
 
 
 def draw_slopes(axes: "Axes") -> None:
-    """Draw the slopes of orders 2, 4 and 8, in the empty upper right corner."""
+    """Draw lines with the slopes of orders 2, 4 and 8 in the empty upper right corner."""
     low, high = axes.get_xlim()
     begin = high * (low / high) ** 0.3
     for order in _SLOPES:
@@ -127,7 +124,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Return the Taylor method's error and the effect of one rounding against time, by case."""
+    """Return the Taylor method's error and the effect of rounding the time, by case."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

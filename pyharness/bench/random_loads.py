@@ -1,7 +1,7 @@
-"""Random scenes of several kinds; no method was tuned on them.
+"""Random scenes of several kinds, on which no method was tuned.
 
-Seed and number determine a scene. It is accepted, or drawn again, by its motion from the second
-reference (`integer_series`).
+A seed and a number determine a scene. Its motion, by the second reference (`integer_series`),
+decides whether it is accepted.
 """
 
 import math
@@ -24,11 +24,12 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload of a seed and a number (from 1), which takes the torques in turn.
+    """Return the workload of a seed and a number (from 1).
 
-    It is drawn again if its error amplification is `MOST_GROWTH` or more, or the body turns less
-    than once or more than 300 times. With `attitude` it starts from the axes of space, and has no
-    `truth`, as `integer_series` does not propagate it.
+    Kinds of torque alternate with the number. A scene is drawn again if its error amplification is
+    `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
+    `attitude` it is initially aligned with the axes of space, and has no `truth`, because
+    `integer_series` propagates no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
@@ -41,8 +42,8 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     while True:
         scene, horizon = by_torque(source, name, law, speed, body)
         try:
-            # This fast estimate rejects scenes with an amplification far above the limit. Near the
-            # limit, the solution of the reference decides.
+            # This fast estimate rejects scenes with an amplification far above the limit. The
+            # reference decides on scenes near the limit.
             if conditioning(scene, horizon).amplification > 2.0 * MOST_GROWTH:
                 continue
             path = integer_series(scene, [horizon])

@@ -1,6 +1,6 @@
 """The reports of `bench`.
 
-A ratio is the run time of the baseline solver over that of another, at the same error.
+A ratio is the run time of the baseline solver divided by the run time of another, at equal error.
 """
 
 import math
@@ -36,7 +36,7 @@ _DRIFT = (
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
     """Return a table for each workload, mean ratios, and the machine.
 
-    For random scenes there are distributions of the ratios instead.
+    For random scenes, tables of the distribution of ratios replace the others.
     """
     drawn, data = _random(finding), _data(finding)
     return measured_report(
@@ -67,7 +67,6 @@ def _spread_data(finding: Finding) -> Table:
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
-    """Return a table of ratios by kind of scene, for every solver and error."""
     heads = ("mean", "smallest", "25 %", "median", "75 %")
     columns = [
         Column("kind", left=True),
@@ -110,7 +109,7 @@ def savings_report(found: Sequence[Saving]) -> Report:
 
 
 def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
-    """Return the report of the Taylor method's error against time, by case of Table 1."""
+    """Return the report of the Taylor method's error against time, for cases of Table 1."""
     time, error = digits(".3g"), digits(".2g")
     columns = (
         *words("case"), Column("time", time, unit="s", full=time),
@@ -248,9 +247,9 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason of missing results, with the first of them."""
-    # Reasons may end with an expected time or with the step at which a run ended, which differ from
-    # case to case. These ends are removed, so that equal reasons share a line.
+    """Return a line for each reason of missing results, with the first examples."""
+    # Reasons may end with an expected time or with the step at which a run ended, which differ
+    # between cases. These ends are removed, so that equal reasons share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

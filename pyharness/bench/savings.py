@@ -1,7 +1,4 @@
-"""Time saved by leaving out what a plan finds unnecessary for a scene.
-
-With and without it, the computation is timed in interleaved batches.
-"""
+"""Time saved by leaving out the computations that a plan finds unnecessary for a scene."""
 
 import subprocess
 import sys
@@ -33,15 +30,15 @@ class Saving:
 
     @property
     def ratio(self) -> float:
-        """Return the time with the part over that without."""
+        """Return the time with the part divided by the time without."""
         return self.with_it / self.without
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the saving of each part.
+    """Return the saving by each part that can be left out.
 
-    They are the integration (if there is a closed form), the torque as a function of time, dense
-    output, the velocity, and the imports of SciPy and of the reference.
+    The parts are the integration (if there is a closed form), the torque as a function of time,
+    dense output, the velocity, and the imports of SciPy and of the reference.
     """
     constant = case_scene(5)
     times = [t_end * k / 100.0 for k in range(1, 101)]
@@ -76,8 +73,8 @@ def _solver(scene: Scene, method: str, t_end: float, tolerance: float) -> Callab
 
 
 def _as_if_varying(scene: Scene) -> Scene:
-    # The rate of change of the torque is too small to change a bit of the result, but it forces the
-    # kernel to evaluate the torque at each time.
+    # This rate is too small to change a bit of the result, but forces the kernel to evaluate the
+    # torque at each time.
     return replace(scene, torque=replace(scene.law, rate=(1e-300, 0.0, 0.0)))
 
 
@@ -88,5 +85,5 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the run times of functions with and without a part."""
+    """Return the times of calls with and without a part."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

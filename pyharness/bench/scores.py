@@ -14,7 +14,7 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 @dataclass(frozen=True)
 class Score:
-    """The times in which a contender reaches the target errors on a workload."""
+    """The times in which a contender reaches target errors on a workload."""
 
     method: str  # name of the contender
     # For each target error, the time (s) of the fastest setting that reaches it; None if no setting
@@ -41,7 +41,7 @@ class Spread:
 
 
 def yardstick(finding: Finding) -> str | None:
-    """Return the contender that is the baseline; None if none was measured."""
+    """Return the name of the baseline contender; None if none was measured."""
     names = list(dict.fromkeys(row.method for row in finding.rows))
     return next((name for name in (*YARDSTICKS, *names) if name in names), None)
 
@@ -75,7 +75,7 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return each contender's geometric mean ratios, one for each target error.
 
-    None if contender or baseline misses the error on a workload.
+    A mean is None if the contender or the baseline misses the error on a workload.
     """
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
@@ -89,10 +89,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
-    """Return the distributions of ratios, by contender, error and kind.
-
-    The baseline, whose ratios are 1, has none.
-    """
+    """Return the distributions of ratios by contender, error and kind, without the baseline."""
     tables = {
         load.label: {each.method: each.ratios for each in scores(finding, load)}
         for load in finding.workloads

@@ -1,4 +1,4 @@
-"""The solvers of `bench --terms`."""
+"""The contenders of `bench --terms`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ _TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
 
 def term_methods() -> list[SceneContender]:
-    """Return our solver of single bodies: `auto`, prepared."""
+    """Return our contender for single bodies, `auto`, without coarse tolerances."""
     return [
         replace(each, settings=_TOLERANCES[:-1])
         for each in list_own_contenders()
@@ -30,7 +30,7 @@ def term_methods() -> list[SceneContender]:
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
     """Return heyoka and DOP853, installed or not.
 
-    heyoka computes the torque of a ready term by its formula, and an expression from its tape.
+    heyoka computes a ready term's torque by its formula, and an expression's from its tape.
     """
     formulas = {each.scene.name: each.formula for each in scenes}
 
@@ -45,6 +45,6 @@ def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
 
 
 def body_contenders() -> list[EnsembleContender]:
-    """Return our and heyoka's solver of many bodies, each on one core."""
+    """Return our and heyoka's contender for many bodies, each on one core."""
     found = [*own_ensembles(), *ensemble_peers()]
     return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

@@ -42,7 +42,7 @@ _PUSH = (0.05, 0.02, 0.1)
 class TermScene:
     """A scene of the `kind` READY or EXPRESSION.
 
-    `formula` computes a ready term's torque independently; None for an expression.
+    `formula` is an independent implementation of a ready term's torque; None for an expression.
     """
 
     kind: str
@@ -52,13 +52,13 @@ class TermScene:
 
 @dataclass(frozen=True, eq=False)
 class TermBodies(EnsembleLoad):
-    """Many bodies with one such torque, each with its own initial omega."""
+    """Bodies that share a torque which depends on the state, and differ in their initial omega."""
 
     body: Scene  # the body, its torque, and the initial attitude of all
 
     @property
     def scene(self) -> Scene:
-        """Return the scene that all bodies share."""
+        """Return the shared scene."""
         return self.body
 
     @property
@@ -78,7 +78,7 @@ class TermBodies(EnsembleLoad):
 
 
 def term_scenes() -> list[TermScene]:
-    """Return nine ready terms, then the expressions, with attitudes where needed."""
+    """Return nine scenes with ready terms, then the expressions, with attitudes where needed."""
     turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
     ready: dict[str, tuple[Any, Formula]] = {
         "damping": (terms.damping(_D), _damping),
@@ -105,7 +105,7 @@ def _scene(name: str, torque: Any) -> Scene:
 
 
 def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
-    """Return the workloads: each scene to each end time."""
+    """Return a workload for each scene and end time."""
     return [
         Workload(
             each.scene.name, each.scene, time, (each.kind,), reference(each.scene, [time]),
@@ -117,7 +117,7 @@ def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
 
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
-    """Return the problems of `n` bodies; the text `seed` determines their omegas."""
+    """Return the problems of `n` bodies; `seed` determines their initial omegas."""
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
@@ -189,7 +189,7 @@ def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
 
 
 def _about_body(vector: Sequence[Any], q: Sequence[Any]) -> list[Any]:
-    """Return R^T times a vector, R from body to space."""
+    """Return R^T times a vector, where R rotates from body to space."""
     a, b, c, d = q
     rows = [
         [1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],

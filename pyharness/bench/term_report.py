@@ -1,6 +1,6 @@
 """The report of `bench --terms`.
 
-A ratio is the run time of heyoka over ours at the same error.
+A ratio is the run time of heyoka divided by our run time, at equal error.
 """
 
 import statistics
@@ -37,7 +37,7 @@ _SHORT = "{:.0e}"
 
 @dataclass(frozen=True)
 class Terms:
-    """The results for single bodies and for many."""
+    """The results for single and for many bodies."""
 
     single: Finding
     many: Rates
@@ -56,7 +56,7 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return tables of single bodies, of many, and mean ratios."""
+    """Return tables for single bodies, for many bodies, and of mean ratios."""
     return measured_report(
         "# Torques that depend on the state",
         _WORTH,
@@ -98,7 +98,7 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return the ratio at each target error, or None."""
+    """Return heyoka's run time divided by our run time at each target error, or None."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
@@ -111,7 +111,7 @@ def _body_row(rates: Rates, name: str, target: float, method: str) -> Rate | Non
 
 
 def _body_ratio(rates: Rates, name: str, target: float) -> float | None:
-    """Return our bodies per second over heyoka's, or None."""
+    """Return our bodies per second divided by heyoka's, or None."""
     own, other = (_body_row(rates, name, target, each) for each in (MANY_OURS, MANY_HEYOKA))
     return own.rate / other.rate if own and other else None
 
@@ -121,7 +121,7 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 
 def _over_dop853(finding: Finding, load: Workload) -> float | None:
-    """Return DOP853's run time over ours at the same tolerance, or None."""
+    """Return DOP853's run time divided by our run time at the same tolerance, or None."""
     by, own = (
         next((row.seconds for row in _rows(finding, load, name)
               if row.setting == DOP853_TOLERANCE), None)
@@ -240,7 +240,7 @@ def _notes(found: Terms) -> list[str]:
 
 
 def _batches(rates: Rates) -> str:
-    """Return how often each batch size of heyoka was fastest, as a sentence."""
+    """Return a sentence on how often each batch size of heyoka was fastest."""
     counts = Counter(row.note for row in rates.rows if row.method == MANY_HEYOKA)
     told = ", ".join(f"{note} ({n} of {counts.total()})" for note, n in counts.most_common())
     return f" heyoka's fastest: {told}." if told else ""

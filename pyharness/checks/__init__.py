@@ -1,1 +1,1 @@
-"""The checks: each compares a value with a limit, and names the command that repeats it."""
+"""Checks: each compares a value with a limit, and names the command that repeats the comparison."""

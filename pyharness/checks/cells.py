@@ -1,6 +1,6 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-A cell is a program with a case of Table 1, some of its defects and readings.
+A cell is a combination of a program, a case of Table 1, defects and readings.
 """
 
 from collections.abc import Iterator
@@ -38,7 +38,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check that a suite makes of one cell."""
+    """Return the name of a suite's check of one cell."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
@@ -58,7 +58,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 
 
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
-    """Return the check that both versions agree; a listed difference must still occur.
+    """Return the check that Fortran and twin agree or, if `is_listed`, that they still differ.
 
     `options` are the stop constant (1/s) and whether the stop test may end the run.
     """

@@ -1,4 +1,4 @@
-"""Checks: their names, their results, and the selection of the checks that are computed."""
+"""Checks: names, results, and the selection of those to compute."""
 
 import math
 import traceback
@@ -12,8 +12,7 @@ from pyharness.model.errors import InputError, NotBuiltError, printable
 from pyharness.model.scene import Scene
 from pyharness.truth.bounded import ErrorBound
 
-# Beginning of the note of a check if a method could not solve the problem, or if it refused to
-# exceed its work limit.
+# Beginning of a check's note if a method could not solve the problem or reached its work limit.
 REFUSED = "refused: "
 # Suites whose ids name the problem before the method that solves it.
 _CIRCUMSTANCE_FIRST = ("random", "external")
@@ -29,11 +28,11 @@ BITS = Basis(
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a check; its parts, joined by slashes, form the id, as in ``cells/two-term``.
+    """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify` or a trial of `stress`, `subject` a program or method,
     `circumstance` a problem, `setting` a tolerance, step size or listing, and `quantity` the number
-    that is compared. `options` repeat the check, beside ``--only``.
+    that is compared. `options` are added to the command that repeats the check.
     """
 
     suite: str
@@ -47,14 +46,14 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the id, unique within a run; in some suites circumstance is before subject."""
+        """Return the id, unique in a run; in some suites the circumstance precedes the subject."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
 
     @property
     def place(self) -> str:
-        """Return the parts of the name after suite and subject, joined by slashes."""
+        """Return circumstance, setting and quantity, joined by slashes."""
         return "/".join(filter(None, (self.circumstance, self.setting, self.quantity)))
 
     @property
@@ -67,8 +66,8 @@ class Name:
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
-        """Return the check that `value` does not exceed `limit`; a value of NaN fails."""
-        # Values of NumPy's types occur here and can't be written as JSON.
+        """Return the check that `value` does not exceed `limit`; NaN fails."""
+        # NumPy's numbers can't be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, basis, note)
 
@@ -84,7 +83,7 @@ class Name:
         return Check(self, bool(passed), value, limit, basis, note)
 
     def described(self, value: float | None, note: str = "") -> "Check":
-        """Return a check without a limit: it only reports `value`, and can't fail."""
+        """Return a check without a limit, which reports `value` and can't fail."""
         return Check(self, True, None if value is None else float(value), None, None, note)
 
 
@@ -106,7 +105,7 @@ class Check:
     )
 
     def __post_init__(self) -> None:
-        """Raise ValueError if there is a limit without a basis, or a basis without a limit."""
+        """Raise ValueError if only one of limit and basis is present."""
         if (self.limit is None) != (self.basis is None):
             raise ValueError(f"{self.id}: a limit has a basis, and a basis has a limit")
 
@@ -122,7 +121,7 @@ class Check:
 
     @property
     def mark(self) -> str:
-        """Return the mark of the limit: proved, derived or measured; empty without a limit."""
+        """Return the mark of the basis: proved, derived or measured; empty without a limit."""
         return self.basis.mark if self.basis else ""
 
     @property
@@ -145,7 +144,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """The result of a check in a random scene; the report groups by these three quantities."""
+    """The result of a check in a random scene, with three quantities by which the report groups."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan  # requested tolerance
@@ -154,9 +153,9 @@ class Sample(Check):
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A deferred computation of the checks whose ids begin with the id of `name`.
+    """A deferred computation of all checks whose ids begin with the id of `name`.
 
-    ``make(name)`` is called only if one of them is requested.
+    ``make(name)`` is called only if one of these checks is requested.
     """
 
     name: Name
@@ -169,7 +168,10 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield finished checks and requested deferred ones; exceptions not `raised` fail."""
+    """Yield all finished and the requested deferred checks.
+
+    An exception becomes a failed check, unless its type is in `raised`.
+    """
     for each in attempts:
         if isinstance(each, Check):
             yield each
@@ -194,8 +196,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites; an exception becomes a failed check.
 
-    NotBuiltError is raised again, and in the suites `of_the_user` InputError, which a mistake in
-    the user's input causes.
+    NotBuiltError is raised again. So is InputError in the suites `of_the_user`, where the user's
+    input causes it.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):
@@ -224,7 +226,7 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key for checks: failed ones last, then by the ratio of value to limit."""
+    """Return a sort key: passed checks before failed ones, then by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf
@@ -233,10 +235,10 @@ def severity(check: Check) -> tuple[bool, float]:
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` requests the check with this id, by whole parts; if empty, it does."""
+    """Return whether the id or its first parts are in `only`, or `only` is empty."""
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 
 def may_hold(id: str, only: Sequence[str]) -> bool:
-    """Return whether `only` may request a check whose id is `id` or begins with it."""
+    """Return whether `only` may request a check whose id equals or begins with `id`."""
     return selected(id, only) or any(each.startswith(id + "/") for each in only)

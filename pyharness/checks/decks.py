@@ -1,8 +1,7 @@
-"""Checks of the Fortran port against the decks, which are compiled from the author's own cards.
+"""Checks of the Fortran port against the decks, which are compiled from the author's cards.
 
-Their results depend on neither the port nor the twins. TAPE5 is compared bit for bit, the printed
-page as text. An overflow ends a run of the port; the deck continues, but must not produce finite
-omega.
+The decks depend on neither the port nor the twins. TAPE5 is compared bit for bit, the printed page
+as text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator
@@ -28,7 +27,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original, the corrected, and both with each single change."""
+    """Return the original and corrected listings, and each with every single change."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -39,7 +38,7 @@ def listings(program: str) -> list[Listing]:
 
 
 def decks(chosen: Selection) -> Iterator[Check]:
-    """Yield checks that every deck agrees with the port; none without a Fortran compiler."""
+    """Yield checks that each deck agrees with the port; none without a Fortran compiler."""
     asked = [
         (of_cell("decks", listing, case), listing, case)
         for program in PROGRAMS
@@ -80,7 +79,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
 
 
 def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return faults after the port's last row; only an overflow is followed, by no finite omega."""
+    """Return faults in the deck's records after the port's last row."""
     rest = deck.tape5[steps:]
     if not overflowed:
         return [f"{len(rest)} records more"] if len(rest) else []

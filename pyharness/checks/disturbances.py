@@ -1,7 +1,7 @@
-"""Propagation of small perturbations by a step of each program, measured by running it.
+"""Amplification of perturbations by a step of each program, measured by running it.
 
-`theory.amplification` derives the same from the schemes alone, exactly, so that limits allow only
-for rounding. J is the Jacobian of Euler's equations (13-15 of the thesis).
+`theory.amplification` derives it exactly from the schemes, so that limits allow only for rounding.
+J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 from collections.abc import Callable, Sequence
@@ -52,7 +52,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix that is measured by running a program and also derived by theory."""
+    """A vector or matrix, measured by running a program and derived by theory."""
 
     found: Array  # as measured
     derived: Array  # of the same shape
@@ -85,15 +85,15 @@ def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
 
 
 def eigenvalues(scene: Scene) -> Array:
-    """Return the eigenvalues of J at the initial omega times the step size: values of z."""
+    """Return the eigenvalues of J at the initial omega, times the step size."""
     return np.asarray(np.linalg.eigvals(np.array(jacobian(scene, scene.omega), dtype=float)))
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of a first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of known degree, so that differences over enough neighbours are exact but
-    for rounding.
+    A step is a polynomial of known degree, so that differences over enough neighbours are exact
+    except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -110,10 +110,10 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Return a spinning top's perturbation after all steps of a scene, measured and derived.
+    """Return a top's perturbation after all steps of a scene, measured and derived.
 
-    omega3 is the spin, the others are the perturbation. C and the torque are zero, so that the
-    equations are linear and the perturbation may have any size.
+    omega3 is the spin; omega1 and omega2 are the perturbation. C and the torque are zero, so that
+    the equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -136,7 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    It is step number `step` of a run of the Python version with steps of 1 s.
+    It is step `step`, of 1 s, of a run of the Python port.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -158,8 +158,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
     z is bisected along `direction`, -1 or 1j, over runs of a spinning top. With the defect
-    `base-not-restored` omega may have a constant part, which would hide the growth; its change from
-    step to step is then measured.
+    `base-not-restored`, omega may have a constant part that would hide the growth; therefore its
+    change from step to step is measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -190,7 +190,7 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which `dt-accumulates` moves the points in a step (from 1), else 1."""
+    """Return the factor by which the defect `dt-accumulates` moves the points in step `step`."""
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
@@ -198,8 +198,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     """Return the derivative of a collocation step at an unsteady omega, measured and derived.
 
     With step size h, omega becomes omega + h F + h**2/2 J F + w h**3 Q(F), where F is the
-    right-hand side and Q its quadratic part. Only the weight w depends on the positions of the
-    points.
+    right-hand side and Q its quadratic part. Only the weight w depends on the collocation points.
     """
     program, h = listing.program, scene.step_size
     moved = _moved(listing, step)
@@ -230,7 +229,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return a derivative by differences, their reach (rad/s), and its rounding over a step's."""
+    """Return the derivative, the reach of its differences (rad/s), and its rounding factor."""
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
@@ -248,8 +247,7 @@ def _differentiated(
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
     """Return a bound on the rounding error of omega in a step, in units of 2**-53 rad/s.
 
-    It is proportional to the terms of the step, summed with positive signs; `sizes` bounds
-    abs(omega).
+    It is proportional to the sum of the absolute terms of the step; `sizes` bounds abs(omega).
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":

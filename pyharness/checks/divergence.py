@@ -1,4 +1,4 @@
-"""Step sizes at which runs diverge: predicted by linear stability, and found by running."""
+"""Step sizes at which runs diverge: predicted by linear stability, and measured."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -26,11 +26,11 @@ DOUBLING = Basis(
 
 @dataclass(frozen=True)
 class Divergence:
-    """The smallest step size (s) for which runs diverge, as found by running and as predicted.
+    """The smallest step size (s) for which runs diverge, measured (`found`) and predicted.
 
-    A run diverges if a component overflows or exceeds twice its true maximum; `found` is 0 if it
-    does with the smallest step tried. By linear stability, the wobble about axis 3 doubles with
-    `predicted`. `limit` is relative.
+    A run diverges if it overflows or a component exceeds twice its true maximum; `found` is 0 if
+    the smallest step tried diverges. By linear stability, the wobble about axis 3 doubles with
+    `predicted`. `limit` bounds their relative difference.
     """
 
     found: float
@@ -55,7 +55,7 @@ def divergence(
         wobble = 2.0 * max(bounds[:2])
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
-    # Between two results, a peak may be missed by half the angle of a step.
+    # Between two steps, a peak may be missed by half the angle of a step.
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
@@ -65,7 +65,7 @@ def divergence(
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step (s) with which a run exceeds twice the largest true omega.
 
-    Return 0 if it is below `smallest` (s), infinity if there is none.
+    Return 0 if it is at most `smallest` (s), infinity if there is none.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

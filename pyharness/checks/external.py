@@ -1,7 +1,7 @@
 """Checks of every method against published results that were not computed here.
 
-The limit is the sum of the accuracy of the published number, the error that the method may have,
-and the effect of rounding the problem's numbers to binary64.
+The limit is the sum of the accuracy of the published number, the method's error, and the effect of
+rounding the problem's numbers to binary64.
 """
 
 import math
@@ -43,11 +43,11 @@ _SOLVED = (
 )  # fmt: skip
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
-# A number is rounded when it is read, and once more when a method uses it.
+# A number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
-# Methods that must solve every problem that any method solves: `auto` chooses a suitable method,
-# and `closed-form` evaluates a formula.
+# A method must solve every problem that it accepts: `auto` chooses a suitable method, and
+# `closed-form` evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _PUBLISHED = Basis(
@@ -65,12 +65,12 @@ _Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
-    """Yield checks of every method that takes a problem: ``external/<problem>/<time>/<method>``.
+    """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value and limit, in the problem's unit, are those of the component with the largest ratio.
+    Value and limit are in the problem's unit, for the component with the largest ratio.
     """
     for problem in problems:
-        # Times of one sign are solved together, so that a replay of one check gives the same bits.
+        # Times of one sign are solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):
             values = sorted(
                 (value for value in problem.values if float(value.time) * side > 0.0),
@@ -97,7 +97,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without result: a user's problem may take it too long."""
+    """Return the check of a method without result, which may refuse only a user's problem."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -132,9 +132,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the change of attitude by rounding the scene's numbers at each time (rad).
+    """Return the changes of attitude by rounding the scene's numbers, at each time (rad).
 
-    First-order changes are added in magnitude. Without a solution, only quaternions are rounded.
+    The magnitudes of first-order changes are added. Without a solution, only quaternions are
+    rounded.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -165,8 +166,7 @@ def _side(problem: Problem, values: Sequence[Value], only: Sequence[str]) -> Ite
             elif (result := results[row]) is not None:
                 yield _check(name, problem.unit, value, result, rounding[value.time])
             else:
-                # In the problems of this package LEQT1F solves the equations of the longest steps,
-                # so that this is a failure.
+                # In the package's problems LEQT1F solves the equations of the longest steps.
                 note = "no step long enough for the linear equations"
                 yield name.judged(problem.path is not None, note)
 
@@ -176,7 +176,7 @@ def _as_far_as_solved(
 ) -> tuple[list[_Row], str]:
     """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    An earlier time may be within the work limit.
+    If `solve` refuses all values together, it may still solve the earlier times.
     """
     try:
         return solve(values), ""
@@ -196,7 +196,7 @@ def _as_far_as_solved(
 
 
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) at each value; None if always singular."""
+    """Return omega and its error bound (rad/s) at each value; None for a singular program."""
     if method in PROGRAMS:
         return [_program(problem, value, method) for value in values]
     return [*_solved(problem.scene, [float(value.time) for value in values], method)]
@@ -229,9 +229,9 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    The step is halved until the error, twice the last change, is below a tenth of the published
-    accuracy or is rounding: half a unit in the last place per step. Return None if even the longest
-    step is singular.
+    The step is halved until the estimated error, twice the last change over 2**order - 1, is below
+    a tenth of the published accuracy or is rounding: half a unit in the last place per step. Return
+    None if even the longest step is singular.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -244,18 +244,17 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
         stepped = replace(scene, step_size=time / steps, steps=steps)
         rows = run(stepped)
         if rows.ier is not None and rows.ier.any():
-            # LEQT1F declares the matrices of tiny steps singular. The program then has order 1.
+            # LEQT1F reports the matrices of tiny steps as singular; the program then has order 1.
             break
-        # With steps that are far too long, a run may overflow, although it does not with shorter
-        # steps.
+        # A run with too long steps may overflow, although it does not with shorter ones.
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
         if omega is not None and before is not None:
             halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
             rounding = steps * _HALF_ULP * _scale(scene, omega)
             result = omega, halving + rounding
-            # Two coarse runs may agree by accident. The estimate counts only if halving has reduced
-            # it.
+            # Two coarse runs may agree by chance, so that the estimate counts only if halving
+            # reduces it.
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
@@ -272,25 +271,25 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
     judged = []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
-            # Subtract in decimals, because the print may have more digits than binary64.
+            # Decimals, because the print may have more digits than binary64.
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # A difference of NaN counts as the worst, although every comparison with NaN is false.
+    # NaN counts as the largest difference, although every comparison with NaN is false.
     worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     distance, limit, note = worst
     return name.bounded(distance, limit, _PUBLISHED, note)
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at both ends (rad/s), so that limits become no wider."""
+    """Return the largest abs(omega) at both ends (rad/s), so that limits are not too wide."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
     """Return the change of omega by rounding a scene's numbers (rad/s), by printed time.
 
-    It is zero where no solution reaches; the method's check reports why.
+    It is zero beyond the last solution; the method's check reports why.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -298,7 +297,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
         try:
             return [*_moves(scene, times, "taylor")]
         except InputError:
-            # A closed form reaches later times than a series.
+            # A closed form solves later times than a series.
             return [*_moves(scene, times, "auto")]
 
     rows, _ = _as_far_as_solved(solve, values)

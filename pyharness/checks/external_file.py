@@ -1,6 +1,6 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file has a scene, the source, and the digits as printed, from which the accuracy follows.
+A file has a scene, its source, and the printed digits, from which the accuracy follows.
 """
 
 import math
@@ -29,7 +29,7 @@ _LONGEST_PRINT = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A published number as text and as a decimal number, with a bound on its error."""
+    """A published number with its digits, its value, and a bound on its error."""
 
     print: str  # its digits as printed
     value: Decimal  # the value of these digits
@@ -40,7 +40,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Pointing:
-    """A published attitude as a unit quaternion, with a bound on its error (rad)."""
+    """A published attitude."""
 
     attitude: Quaternion  # unit quaternion
     accuracy: float  # bound on its error, rad
@@ -48,7 +48,7 @@ class Pointing:
 
 @dataclass(frozen=True)
 class Value:
-    """The results that are published for one time: omega, an attitude, or both."""
+    """The published results at one time: omega, an attitude, or both."""
 
     time: str  # time as printed (s); taken as exact
     # angular velocity in the unit of the problem, None where nothing is printed
@@ -58,7 +58,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem: a scene, its source, and the results published for several times."""
+    """A published problem: a scene, its source, and its results at several times."""
 
     name: str  # the name of its file
     # the problem as a sentence, its publication, the page there, the conditions of its results
@@ -75,8 +75,8 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    It is half a unit of the last digit, at least the stated error `good_to`. Raise InputError if
-    `text` is no number or is too large for binary64.
+    The accuracy is half a unit of the last digit, or the stated error `good_to` if that is larger.
+    Raise InputError if `text` is not a number or too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")
@@ -99,7 +99,7 @@ def read_problem(path: str | Path) -> Problem:
 
 @cache
 def problems() -> tuple[Problem, ...]:
-    """Return the published problems that belong to the package, ordered by name."""
+    """Return the published problems of the package, ordered by name."""
     return tuple(_read(path, None) for path in sorted(_FOLDER.glob("*.toml")))
 
 
@@ -191,7 +191,7 @@ def _value(entry: object, sequence: object) -> Value:
 def _pointing(
     where: str, entry: dict[str, Any], sequence: object, good_to: float
 ) -> Pointing | None:
-    """Return the attitude in one `[[value]]` entry, a quaternion or Euler angles, if any."""
+    """Return the attitude in a `[[value]]` entry, from a quaternion or Euler angles, or None."""
     given = [key for key in ("attitude", "angles_deg") if key in entry]
     if not given:
         return None
@@ -201,7 +201,7 @@ def _pointing(
     count, prints = {"attitude": 4, "angles_deg": 3}[key], entry[key]
     if not isinstance(prints, list) or len(prints) != count:
         raise InputError(f"{where}: {key} must be a list of {count} texts")
-    # If the entry has an omega, `good_to` is the accuracy of omega and not of the attitude.
+    # Beside an omega, `good_to` is the accuracy of omega and not of the attitude.
     alone = 0.0 if "omega" in entry else good_to
     figures = [figure(f"{where}: {key}", text, alone) for text in prints]
     values = [float(each.value) for each in figures]

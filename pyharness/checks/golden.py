@@ -1,6 +1,6 @@
-"""The golden record: the trajectories that this version computes, as exact text.
+"""The golden record: the trajectories of this version, as exact text.
 
-Each program or method has a file. The entry of a trajectory has its command, how the run ended, a
+Each program or method has a file. An entry has the command of a trajectory, how the run ended, a
 digest of all rows, and the first, tenth and last row as hexadecimal floats.
 """
 
@@ -53,7 +53,7 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trajectory of the golden record, with the command and the scene that produce it."""
+    """A trajectory of the golden record, and how to compute it."""
 
     source: str  # the program or method, which is the name of its file
     name: str  # the last parts of the id of its check, as in ``case-3/original``
@@ -62,7 +62,7 @@ class Recorded:
     tolerance: float | None  # requested of the method; None if every bit is compared
 
     def run(self) -> Trajectory:
-        """Run the program or method on the scene, and return the trajectory."""
+        """Return the trajectory, computed anew."""
         if self.source in PROGRAMS:
             listing = (Listing.original if self.name.endswith("original") else Listing.corrected)(
                 self.source
@@ -72,7 +72,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories of the record: all cases by methods and both versions of programs."""
+    """Yield the trajectories to record, by each method and each version of each program."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -91,9 +91,9 @@ def recorded() -> Iterator[Recorded]:
 def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
-    Fixed steps must agree to the last bit, methods that state an error within twice this error,
-    because processors and compilers round differently; so may another mathematical library under
-    waves.
+    Methods with a tolerance must agree within twice the tolerance, because processors and compilers
+    round differently. All others must agree bit for bit, unless another mathematical library
+    computes waves: then within the amplified rounding errors.
     """
     if not chosen.record.is_dir():
         return
@@ -135,7 +135,7 @@ def _compared(
         return name.judged(False, moved, limit=0.0, basis=_RECORD)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    # Step, time and TIME must be equal, since no tolerance applies to them.
+    # No tolerance applies to step, time and TIME.
     same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
@@ -167,11 +167,11 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
-    """Return the files of a new golden record, by name, and its differences from the old."""
+    """Return the files of a new golden record, by name, and its differences from the old record."""
     try:
         known = read_record(folder) if folder.is_dir() else {}
     except InputError:
-        # The old record is damaged, so that every trajectory counts as new.
+        # If the old record is damaged, every trajectory counts as new.
         known = {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     files: dict[str, list[dict[str, Any]]] = {}
@@ -218,7 +218,7 @@ def _digest(rows: Array, run: Trajectory) -> str:
 
 
 def _rows(entry: dict[str, Any]) -> Array:
-    """Return an entry's rows: step, time, TIME as written, omega and, for programs, velocity."""
+    """Return an entry's rows: step, time, recorded TIME, omega and, for programs, velocity."""
     return np.array([[float(row[0]), *map(float.fromhex, row[1:])] for row in entry["rows"]])
 
 

@@ -1,7 +1,7 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-The errors of the programs of the thesis are reported without a bound. A flow has the error
-amplification and rounding errors of the motion.
+Errors of the programs of the thesis are reported without a bound. The flow of a scene has its error
+amplification and rounding errors.
 """
 
 import math
@@ -43,8 +43,8 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
 
-# Our methods that are tried at two tolerances: a middling one, and one near the finest, where
-# rounding shows.
+# Our methods that run at two tolerances: a middling one, and one near the finest, where rounding
+# shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
@@ -54,7 +54,7 @@ FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:
-    """Return the true omega of a scene at `time` (s): elliptic functions without torque."""
+    """Return the true omega of a scene at `time` (s), by elliptic functions if torque-free."""
     flow = flow or conditioning(scene, time)
     if not _is_free(scene):
         return reference_truth(scene, [time], flow=flow)
@@ -70,8 +70,8 @@ def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# A function that returns the checks of one method, from the true solution, a tolerance and the name
-# of the checks. The tolerance is None for runs with the scene's step size.
+# A function that returns the checks of one method, from the true solution, a tolerance (None for
+# the scene's step size) and the name of the checks.
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
@@ -80,7 +80,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of the trial named `suite`."""
+    """Yield deferred checks of all methods in the extreme scenes of the trial `suite`."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -96,13 +96,13 @@ def check_methods(
     tolerances: Callable[[str, Scene, float], Sequence[float | None]] | None = None,
     judged: Judged | None = None,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of the error of each method at `time` (s) in the scene of `name`.
+    """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
 
-    By default, the limit is the sum of three terms: the tolerance (for a fixed step without torque,
-    a bound from the order) and the rounding error, both amplified, and the error of the true
-    solution. Without the first, or if the sum leaves fewer than two digits of omega, there is no
-    limit. Without torque, energy and momentum always have one, because the flow does not amplify
-    their errors. A method fails if it refuses a scene that it must solve.
+    By default, the limit is the sum of the tolerance, amplified (for a fixed step without torque, a
+    bound from the order), the rounding error, amplified, and the error of the true solution. There
+    is no limit if the first is unknown, or if the sum leaves fewer than two digits of omega.
+    Without torque, energy and momentum always have a limit, because the flow does not amplify their
+    errors. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -121,8 +121,9 @@ def check_methods(
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
     """Return omega at `time` (s) by the method `name`, and how the run ended.
 
-    Without a tolerance the solver is prepared with the scene's step size; `auto` and `quick` always
-    are. Only refusals of prepared solvers are returned; others raise InputError.
+    Without a tolerance, a method runs as a solver prepared with the scene's step size; `auto` and
+    `quick` are always prepared. Refusals of prepared solvers are returned; other methods raise
+    InputError.
     """
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
@@ -134,9 +135,9 @@ def _steps(scene: Scene, time: float) -> int:
 
 
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse a scene; every other refusal is a fault.
+    """Return whether a method may refuse a scene.
 
-    `closed-form` may without a closed form, `quick` always, and series if the phase of a wave
+    `closed-form` may if there is no closed form, `quick` always, and series if the phase of a wave
     exceeds 1e8 radians.
     """
     method, scene = tried.method, tried.scene
@@ -148,25 +149,25 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
-    """Return the limit of a method's error relative to the largest omega: steps and rounding.
+    """Return the limit of a method's error, relative to the largest omega.
 
-    It is None if no bound on the steps is known, infinite if it leaves no two digits of omega.
+    It is None if no bound on the steps is known, infinite if it leaves fewer than two digits of
+    omega.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # A closed form accumulates no errors of steps. To its own error only the rounding of A, B
-        # and C is added.
+        # A closed form has no errors of steps; only the rounding of A, B and C is added to its
+        # error.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # In steps of this size the method promises no error. It promises only to conserve energy
-        # and momentum.
+        # In steps of this size the method bounds no error; it only conserves energy and momentum.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
 
 
 DERIVED = Policy(_derived, promises.STEPS, refusable)
-"""Policy whose limit is the promised error of a method plus rounding, amplified by the flow."""
+"""Policy whose limit is a method's promised error plus rounding, amplified by the flow."""
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
@@ -192,7 +193,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
             # Each step rounds omega, its sums, and the last iteration.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
-        # The result of `conserved` is at most the error of omega.
+        # `conserved` returns at most the error of omega.
         limit = DERIVED.limit(truth, tried)
         most = min(math.inf if limit is None else limit, total + total * total)
         found = conserved(scene, answer.omega[-1], truth.flow.largest)
@@ -200,13 +201,13 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
 
 
 def scene_of(name: Name) -> Scene:
-    """Return the scene that the name of a check must have."""
+    """Return the scene of a check's name, which must have one."""
     assert name.scene is not None
     return name.scene
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return the bound on the sum of the errors of the steps, relative to the largest omega."""
+    """Return a bound on the summed errors of steps, relative to the largest omega, or None."""
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
         steps = _steps(tried.scene, truth.end)
@@ -217,9 +218,10 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     """Return the smallest error of `omega` that explains its drift of energy and momentum.
 
-    It is relative to `largest` (rad/s). Both are sums of q w**2 over the components w, with q the
-    moments or their squares. An error e of every component changes the sum by at most 2 e times the
-    sum of q abs(w), so that the change found requires at least e.
+    The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
+    the components w, where q is the moment or its square. An error e of every component changes
+    such a sum by at most 2 e times the sum of q abs(w), so that the observed change requires at
+    least e.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():
@@ -239,7 +241,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
 
 def describe_programs(name: Name) -> Iterator[Attempt]:
-    """Yield deferred reports of the largest relative error of each program, both versions."""
+    """Yield deferred reports of each program's largest relative error, original and corrected."""
     scene = scene_of(name)
     every = max(1, scene.steps // _ROWS)
     rows = slice(every - 1, None, every)
@@ -264,6 +266,6 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest absolute difference in the rows that both arrays have."""
+    """Return the largest absolute difference over the rows that both arrays have."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""The comparison of a method's result with the true solution, and the limits of the error."""
+"""Comparison of a method's result with the true solution, and limits of the error."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,14 +22,14 @@ from pyharness.truth.reference import Reference, reference
 
 # Relative error beyond which the linearised flow no longer predicts the error.
 LINEAR = 0.01
-# Relative to the largest omega. A limit of this size is no restriction, because two vectors omega
-# of this magnitude differ by no more.
+# Relative to the largest omega, the difference of two vectors of this magnitude; a larger limit is
+# no restriction.
 MOST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's answer to a check: its results, at all times or the last, or its refusal."""
+    """A method's results, at all times or the last, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
     attitude: Array | None = None  # shape (n, 4), where it was requested
@@ -50,7 +50,7 @@ def of_end(method: str, end: End) -> Answer:
 
 
 def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Return the answer of a candidate at all `times` (s), with attitudes if the scene has one."""
+    """Return a candidate's answer at all `times` (s), with attitudes if the scene has one."""
     run = candidate.rows(scene, list(times))
     has_rows = run.has_all_rows and run.time.tolist() == list(times)
     if has_rows and (run.attitude is None) == (scene.attitude is None):
@@ -60,7 +60,7 @@ def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answe
 
 @dataclass(frozen=True, eq=False)
 class MethodRun:
-    """A deferred run of a method on a scene; without `tolerance`, with the scene's step size."""
+    """A deferred run of a method on a scene; `tolerance` is None for a fixed step."""
 
     method: str
     tolerance: float | None
@@ -69,7 +69,7 @@ class MethodRun:
 
     @cached_property
     def answer(self) -> Answer:
-        """Return the answer of the run, made once; an InputError becomes the refusal in it."""
+        """Return the answer, computed once; an InputError becomes its refusal."""
         try:
             return self.ask()
         except InputError as refusal:
@@ -85,13 +85,13 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run until `time` (s); `method` decides on limit and messages."""
+    """Return a deferred run of a candidate to `time` (s); `method` determines the limit."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true solution of a scene at some times, and the conditioning until the last time.
+    """The true solution of a scene at some times, and its conditioning until the last time.
 
     Attributes
     ----------
@@ -102,14 +102,13 @@ class Truth:
     flow : Conditioning
         Error amplification and rounding errors of the motion.
     attitude, angle_error : ndarray of shape (n, 4) or None, float
-        True quaternions, compared instead of omega if given, and a bound on their error (rad).
+        True quaternions, which are compared instead of omega, and a bound on their error (rad).
     is_signed : bool
         Whether the sign of a quaternion counts.
     data : float
         Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether it is a closed form without torque: `data` is known, energy and momentum are
-        conserved.
+        Whether it is a torque-free closed form: `data` is known, energy and momentum are conserved.
     scene, reference, effort : Scene, Reference and float, or None
         The scene, its reference solution and the factor on the work limit, if that was used.
     """
@@ -129,7 +128,7 @@ class Truth:
 
     @cached_property
     def bound(self) -> ErrorBound | None:
-        """Return the bound of the reference's error, relative or an angle (rad), else None."""
+        """Return the error bound of the reference, relative or an angle (rad), or None."""
         if self.scene is None or self.reference is None:
             return None
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
@@ -150,7 +149,7 @@ class Truth:
         return self.error / (self.flow.largest or 1.0)
 
     def error_of(self, answer: Answer) -> float:
-        """Return the largest error of an answer: an angle (rad), or omega's, relative."""
+        """Return the largest error of an answer: an angle (rad), or omega's relative error."""
         if self.attitude is None:
             difference = float(np.abs(answer.omega - self.omega[-len(answer.omega) :]).max())
             if self.flow.largest == 0.0:
@@ -164,7 +163,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return infinite error amplification, on which limits of closed forms do not depend."""
+    """Return a flow of infinite amplification, for closed forms, whose limits do not use it."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -174,13 +173,13 @@ def reference_truth(
     effort: float | None = None,
     flow: Conditioning | None = None,
 ) -> Truth:
-    """Return the true solution of a scene at all `times` (s) by the high-precision reference.
+    """Return the reference solution of a scene at all `times` (s).
 
     Raise InputError if it does not reach them.
     """
     flow = flow or conditioning_at(scene, times)
-    # The reference's steps are accurate to 1e-22. The precise series is requested where the flow
-    # amplifies errors by more than 1e3.
+    # The reference's steps have errors of 1e-22, too large if the flow amplifies them by more than
+    # 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution grows without bound")
@@ -192,7 +191,7 @@ def reference_truth(
 
 @dataclass(frozen=True)
 class Policy:
-    """A rule for judging methods: the limit of the error, and the scenes that they may refuse."""
+    """A rule for judging methods: the limit of the error, and the permitted refusals."""
 
     limit: Callable[[Truth, MethodRun], float | None]
     basis: Basis
@@ -200,9 +199,9 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit of a method's error: its steps' and roundings', and the truth's own.
+    """Return the limit of a method's error: its steps, its rounding, and the truth's error.
 
-    It is relative to the largest omega, or an angle (rad), as is `made`, the sum of the errors of
+    It is relative to the largest omega, or an angle (rad). So is `made`, the sum of the errors of
     the steps, which `growth` multiplies.
     """
     if truth.attitude is not None:
@@ -211,12 +210,12 @@ def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> flo
 
 
 def lively(growth: float) -> float:
-    """Return the factor on a tolerance in a limit: `growth` above `LIVELY`, else 1."""
+    """Return the factor on the tolerance in a limit: `growth` if above `LIVELY`, else 1."""
     return growth if growth > LIVELY else 1.0
 
 
 def linear(limit: float) -> float:
-    """Return an error limit, or infinity above `LINEAR`, where linearised equations fail."""
+    """Return the limit, or infinity above `LINEAR`, where linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -227,7 +226,7 @@ def tolerance_of(tried: MethodRun) -> float:
 
 
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether `closed-form` refuses without a form, or `quick` because A, B or C is 0."""
+    """Return whether `closed-form` or `quick` refuses a scene for which its formula fails."""
     if tried.method == "quick":
         # `quick` requires that A, B and C are not 0.
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
@@ -241,7 +240,7 @@ def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], 
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), FLOW, has_no_form)
-"""Policy whose limit is the tolerance itself, plus rounding amplified by the flow."""
+"""Policy whose limit is the tolerance, plus rounding amplified by the flow."""
 IF_CALM = Policy(_granting(lively), FLOW)
 """Policy whose limit is the tolerance, plus rounding amplified by the flow.
 
@@ -252,10 +251,10 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 
 
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
-    """Return the check that a method's error is within the limit, or its refusal permitted.
+    """Return the check that a method's error is within its limit, or its refusal permitted.
 
-    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene that
-    has no closed form.
+    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
+    without closed form.
     """
     answer = tried.answer
     if answer.refusal:

@@ -1,4 +1,4 @@
-"""The kinds of checks of `verify`; the first part of a check's id is its kind."""
+"""The kinds of checks of `verify`; a check's id begins with its kind."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -32,29 +32,28 @@ _THIN_EXTERNAL = [
 ]
 
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
-    # Fortran against the Python twin for every program, case, listing and reading: the bits of the
-    # whole trajectory, the counters, and where the stop test ended the run.
+    # Fortran against the Python twin for every cell: all bits of the trajectory, the counters, and
+    # the stop.
     "cells": cells,
-    # Our own arithmetic of machine words: test vectors of the CDC, binary64 against the processor,
-    # and the compiled programs against the Python twins in other words.
+    # Our arithmetic of machine words: test vectors of the CDC, binary64 against the processor, and
+    # the compiled programs against the Python twins in other words.
     "words": words,
-    # The decks, compiled from the author's own cards, against the Fortran port: TAPE5 and the
-    # page.
+    # The decks, compiled from the author's cards, against the Fortran port: TAPE5 and the page.
     "decks": decks,
     # Every step of the corrected programs against its scheme, within rounding.
     "schemes": schemes,
     # The step and the reason of the Runge-Kutta program's stop, against the formula of its test.
     "stops": stops,
-    # Modern methods against the reference, within the requested tolerance.
+    # Methods against the reference, within the requested tolerance.
     "methods": methods,
     "prepared": prepared,
     # Attitudes against the reference, in the cases and by prepared solvers.
     "attitudes": attitudes,
-    # The power with which the error decreases as the step is halved. Corrected programs are
-    # compared with `solve_ivp`, methods with a fixed step with the reference.
+    # The power with which the error decreases as the step is halved: of corrected programs against
+    # `solve_ivp`, of methods with a fixed step against the reference.
     "orders": orders,
     # Programs, methods and attitudes in scenes drawn from a seed, half of them of the difficult
-    # kinds in `NASTY`; and methods under torques that depend on omega or attitude.
+    # kinds in `NASTY`; methods under torques that depend on omega or attitude.
     "random": lambda chosen: chain(
         random_programs(chosen),
         random_methods(chosen),
@@ -63,7 +62,7 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     ),
     # Methods and programs against published results that were not computed here.
     "external": _external,
-    # Trajectories against those in the golden record, which an earlier run has written.
+    # Trajectories against the golden record of an earlier run.
     "golden": golden,
 }
 # These kinds read files that the user may specify.
@@ -71,6 +70,6 @@ _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Yield the results of the checks that `chosen` requests, computed as they are requested."""
+    """Yield the results of the requested checks, each computed when it is reached."""
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

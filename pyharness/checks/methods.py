@@ -1,7 +1,7 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-A tolerance applies to the error of omega relative to the largest omega, or to the angle of the
-attitude error (rad). A prepared solver is set up once by `prepare` for a scene and many calls.
+Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad). A
+prepared solver is set up once by `prepare` for a scene and many calls.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -37,11 +37,11 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-# Times (s): one far after the times of the cases, and the times for prepared solvers.
+# Times (s): one long after the end of the cases, and the times for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those among them that also propagate the attitude.
-# The torques of the cases are not weak.
+# Methods with a tolerance, and those that also propagate the attitude. The torques of the cases are
+# not weak.
 _SOLVED = tuple(
     name
     for name, each in METHODS.items()
@@ -53,14 +53,14 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega by every method, at all times of a case and one later."""
+    """Yield deferred checks of omega by every method, at a case's times and a later one."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of prepared solvers, forward and back in time.
+    """Yield deferred checks of prepared solvers, to positive and negative times.
 
     With the scene's step size, they must agree bit for bit with the unprepared method.
     """
@@ -74,7 +74,7 @@ def prepared(chosen: Selection) -> Iterator[Attempt]:
 
 
 def attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes, by `solve` and prepared."""
+    """Yield deferred checks of attitudes, by `solve` and by prepared solvers."""
     for case in cases(chosen):
         scene = replace(case_scene(case), attitude=START)
         times = (*scene.times()[9::10], _LATER)
@@ -84,7 +84,7 @@ def attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def cases(chosen: Selection, thin: Sequence[int] = (4, 5)) -> Sequence[int]:
-    """Return the numbers of the cases that are checked: all, or `thin` in the self-test."""
+    """Return the numbers of the cases to check: all, or `thin` in the self-test."""
     return thin if chosen.thin else list(case_numbers())
 
 
@@ -117,13 +117,13 @@ def _prepared(
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run by `solve` at all `times` (s), with a tolerance that SciPy can meet."""
     if method in SCIPY_METHODS and scene.attitude:
-        # SciPy's methods can't be requested to have so small an error over a long time.
+        # SciPy's methods can't reach such a small error over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
     return by_rows(method, tolerance, scene, times)
 
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
-    """Return a deferred call of a prepared solver at `time` (s), after one with another omega."""
+    """Return a deferred call of a prepared solver to `time` (s), after another initial omega."""
     prepare = attitude_candidate if scene.attitude else prepared_candidate
     return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
 
@@ -133,7 +133,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check of the bits after 100 steps against `solve` or the kernel."""
+    """Return the check that 100 steps agree bit for bit with `solve` or the kernel."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:

@@ -1,7 +1,7 @@
-"""Checks of the order of methods: the power with which errors decrease as the step is halved.
+"""Checks of methods' orders: powers of the step size with which errors decrease.
 
-Programs are measured against `solve_ivp`, fixed-step methods and the programs' translational
-velocity, which no other method computes, against the reference.
+Programs are compared with `solve_ivp`. Methods with a fixed step are compared with the reference.
+So is the programs' translational velocity, which no other method computes.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,10 +26,10 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
-# solve_ivp gives the true solution here. The finest tolerance that it meets is requested.
+# The method of solve_ivp that serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Number of successive halvings in which the order must show, and the deficit allowed in the last
-# one. The largest deficit that occurs is .006.
+# Number of successive halvings that must show the order, and the largest deficit in the last. The
+# largest deficit that occurs is .006.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(
@@ -37,7 +37,7 @@ _SLACK = Basis(
     "order of a method with a fixed step: at most 0.2 below the theoretical one",
     "`pyharness verify --only orders`, where the largest deficit is .006",
 )
-# Steps of the first of the runs from which an order is measured in any scene, and of the last.
+# Numbers of steps in the coarsest and the finest run from which an order is measured.
 _FEWEST, _MOST = 16, 4096
 
 
@@ -66,7 +66,7 @@ def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> C
         velocity = (
             program_candidate(Listing.corrected(name.subject), may_stop=False).rows(scene).velocity
         )
-        # A run without velocity counts as a run without rows, for which no order can be determined.
+        # A run without velocity counts as one without rows, whose order is undecided.
         return np.empty((0, 3)) if velocity is None else velocity
 
     due = PROGRAM_REGISTRY[name.subject].order
@@ -82,15 +82,15 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return a scene with the few steps until `time` (s) from which an order is measured."""
+    """Return a scene with `_FEWEST` steps until `time` (s), the coarsest run for an order."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    It is only described if the scene is too fast or sensitive for so few steps, or has a table:
-    steps do not end where it changes, which lowers the order.
+    The order is only reported if the scene is too fast or sensitive for at most 4096 steps, or has
+    a table: steps do not end where a table changes, which lowers the order.
     """
     method = name.setting or name.subject
     run, due = method_candidate(method, 1.0), METHODS[method].order
@@ -106,14 +106,14 @@ def _has_tables(scene: Scene) -> bool:
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most `_ORDER_SLACK` too low, or the error rounding."""
+    """Return the check that an order is at most `_ORDER_SLACK` too low, or errors are rounding."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)
 
 
 def _by_ivp(scene: Scene) -> Reference:
-    """Return the solution by `solve_ivp`; its error is its finest tolerance times largest omega."""
+    """Return the solution by `solve_ivp`, with its tolerance (rad/s) as error."""
     tolerance = 1.01 * finest(_IVP, scene, scene.times()[-1])
     run = method_candidate(_IVP, tolerance).rows(scene)
     largest = float(np.abs(run.omega).max())

@@ -1,4 +1,4 @@
-"""The pictures of the checks: results of any trial, Brouwer's law, regions of linear stability."""
+"""Pictures of the checks: trials, Brouwer's law, and regions of linear stability."""
 
 import re
 import textwrap
@@ -30,9 +30,9 @@ _COARSE = 1e-6
 
 
 class _Mark(NamedTuple):
-    """A check as a plotted point, with the properties that place and style it.
+    """A plotted check, with the properties that determine its position and style.
 
-    `kind` is the circumstance's name before its first number. Marks with the same `rank` and `what`
+    `kind` is the circumstance's name before its first number. Marks with equal `rank` and `what`
     form a series.
     """
 
@@ -54,16 +54,17 @@ def _mark(check: Check) -> _Mark:
     kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
     rank = name.setting or name.quantity
     with suppress(ValueError):
-        # All coarse tolerances form one series of marks, and all fine tolerances form another.
+        # All coarse tolerances form one series of marks, and all fine tolerances another.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
     what = name.quantity if name.quantity in _MARKERS else ""
     return _Mark(name.subject, kind, name.circumstance, rank, what, check)
 
 
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
-    """Return a picture of the checks of a trial: values and limits, in a panel for each method.
+    """Return the picture of a trial, with values and limits in a panel for each method.
 
-    Problems are in the order of trial, but kinds stay together. Raise InputError without values.
+    Problems are in the order of the trial, grouped by kind. Raise InputError if no check has a
+    value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -85,7 +86,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # Label each circumstance by the part of its name that differs within its kind.
+    # The label of a circumstance omits the name of its kind.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -103,7 +104,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         f"Coarse: tolerances of {_COARSE:g} and more, fine: below.",
     )
     lines = [line for each in told for line in textwrap.wrap(each, int(13.0 * inches))]
-    # The title belongs to the legend, because a separate title and the legend would overlap.
+    # The legend has the title, because a separate title would overlap it.
     figure.legend(
         handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
         frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
@@ -117,7 +118,7 @@ def _label(rank: str, what: str) -> str:
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
-    """Return the horizontal position of each problem, with space for the name of its kind."""
+    """Return each problem's horizontal position, leaving space for the name of its kind."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
     places = {}
     place = 0.0
@@ -155,7 +156,7 @@ def _panel(
                 linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
             )  # fmt: skip
     axes.set_yscale("log")
-    # Place the title above the names of the kinds.
+    # The names of the kinds are below the title.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -180,7 +181,7 @@ _OF_METHODS: dict[str, dict[str, Any]] = {
 
 
 def length_picture(found: Sequence["Drift"]) -> Picture:
-    """Return a picture of the errors in a motion's energy and phase against the number of steps."""
+    """Return the errors of energy and phase against the number of steps, for each motion."""
     from matplotlib.figure import Figure
 
     motions = list(dict.fromkeys(each.motion for each in found))
@@ -223,7 +224,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# The curves can be told apart without colour, by dashes and line width.
+# Dashes and widths distinguish the curves without colour.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},
@@ -235,7 +236,7 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Return a picture of the regions of stability in z, step size times eigenvalue."""
+    """Return the regions of stability in the plane of z, step size times eigenvalue."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

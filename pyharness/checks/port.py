@@ -1,7 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-The results must agree bit for bit in all cells and in random scenes. `docs/how-to/ports.md`
-describes the protocol.
+Results must agree bit for bit in all cells and in random scenes. `docs/how-to/ports.md` describes
+the protocol.
 """
 
 import math
@@ -35,7 +35,7 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A run that is requested from a port: a program with its listing, and a scene.
+    """A run to request from a port.
 
     `of` is the name of its check, and `options` of ``verify --port`` request it alone. `lipschitz`
     is the constant of the stop test (1/s).
@@ -55,16 +55,17 @@ class Cell:
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
-        """Return the trajectory of the Python version of the program."""
+        """Return the trajectory of the Python port of the program."""
         run = PROGRAM_REGISTRY[self.listing.program].run
         return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
 
 
 @dataclass(frozen=True)
 class PortCheck(Check):
-    """The comparison of a port with our Python program in one run.
+    """The comparison of a port with the Python twin in one run.
 
-    `difference` has the first step that differs and the value of each variable.
+    `difference` has the first step that differs, with the value of each variable; `seconds` is the
+    time of the answer.
     """
 
     seconds: float | None = None
@@ -72,7 +73,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the requested cells, whose names begin as one of `cells`; all if it is empty."""
+    """Return the cells whose names begin with an element of `cells`, or all if it is empty."""
     return [
         Cell(
             cell_name(listing, case), of_cell("port", listing, case),
@@ -88,9 +89,9 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, named as ``random/7/two-term``, in the order of their numbers.
+    """Return runs in random scenes, named as ``random/7/two-term``, ordered by number.
 
-    A number in `cells` (leading parts of names, empty for all) may exceed `draws`.
+    `cells` has leading parts of names, or is empty for all; its numbers may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -106,10 +107,10 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port, started by `command`, gives the same bits in the given runs.
+    """Yield checks that a port, started by `command`, returns the same bits in all runs.
 
-    An invalid answer fails and ends the comparison. `patience` is in s. Raise InputError if
-    `command` is empty.
+    An invalid answer fails and ends the comparison. `patience` is the longest wait (s). Raise
+    InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -131,13 +132,13 @@ def refuse_port(command: str) -> None:
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:
-    """Return the command that checks a port, started by `command`, in one run or in all."""
+    """Return the command that repeats a port's checks, in one run or in all."""
     verb = f"python -m pyharness verify --port {shlex.quote(command)}"
     return verb if cell is None else f"{verb} {cell.options}"
 
 
 def check_answer(process: PortProcess, command: str, cell: Cell) -> PortCheck:
-    """Return the check of the answer to a run; raise PortError if it is not valid."""
+    """Return the check of a port's answer to a run; raise PortError if it is invalid."""
     begin = time.perf_counter()
     line = process.ask(cell.request)
     seconds = time.perf_counter() - begin
@@ -168,7 +169,7 @@ def _port_check(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return texts that describe how a port's answer differs from our Python program's run."""
+    """Return descriptions of the differences of a port's answer from the twin's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     step = _first_step(wanted, given)
@@ -204,7 +205,7 @@ def _apart(due: Any, row: Any) -> list[float]:
 
 
 def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
-    """Return the first step that differs for JSON, in hexadecimal texts because of inf and nan."""
+    """Return the first step that differs, as hexadecimal texts, because JSON has no inf and nan."""
     step = _first_step(wanted, given)
     if step is None:
         return None

@@ -1,6 +1,6 @@
 """The process of a port or an integrator, which answers requests line by line.
 
-It must answer within a time limit, and is ended together with all processes that it started.
+It must answer within a time limit. It is ended together with all processes that it started.
 """
 
 import contextlib
@@ -21,8 +21,7 @@ PATIENCE = 60.0  # s for a run, including the start of an interpreter that compi
 _LARGEST = 1 << 26  # most bytes of an answer
 _PIECE = 1 << 16
 _TO_END = 1.0  # s that a port may take to end after it has closed its input or output
-# Limit on the rounds of searching for processes that a port has started, and of reading its last
-# output.
+# Limit on the rounds of searching for a port's child processes, and of reading its last output.
 _ROUNDS = 100
 _PROBE = 10.0  # s for the answer to a single request of the other protocol
 # An example of a command, for each option that has one.
@@ -35,7 +34,7 @@ class PortError(Exception):
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
-    """Return program and arguments as a shell splits them; raise InputError if there are none."""
+    """Return program and arguments, split as by a shell; raise InputError if there are none."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -49,7 +48,7 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError if `command` answers `line`, a request of the option `instead`."""
+    """Raise InputError if `command` answers `line`, a request for the option `instead`."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")
@@ -59,8 +58,8 @@ def _processes_with(mark: str) -> list[int]:
     """Return the ids of live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # A process may have ended meanwhile, or belong to another user. A process that has ended
-        # and waits for its parent has no environment any more.
+        # A process may have ended, or belong to another user. An ended process that waits for its
+        # parent has no environment.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))
@@ -68,15 +67,15 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """The running process of a port, as a context manager; raises PortError if it can't start."""
+    """The process of a port, a context manager that raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
-        """Store command, longest wait for an answer (s), and the option that gave the command."""
+        """Store the command, the longest wait (s), and the option that named the command."""
         self._words = split_command(command, option)
         self._patience = patience
 
     def __enter__(self) -> Self:
-        """Start the port in a process group of its own, which can be ended with a shell between."""
+        """Start the port in its own process group, so that child processes can be ended too."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
         self._told = b""  # the last part of what the port wrote to stderr
         try:
@@ -107,8 +106,8 @@ class PortProcess:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End the port's process and all processes that it started, whatever they are doing."""
-        # If all processes of the group have ended, the group is not found. macOS reports this as
+        """End the port's process and all its child processes."""
+        # A group whose processes have all ended is not found, which macOS reports as
         # PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -126,9 +125,9 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Send the request `line` and return the answer, each one line without a line feed.
+        """Send the request `line` and return the answer, each a line without a line feed.
 
-        Raise PortError for no answer in time, too much, or a second line.
+        Raise PortError for a late, too long or second line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"
@@ -177,14 +176,13 @@ class PortProcess:
         except subprocess.TimeoutExpired:
             return "it closed its input or output before it had answered"
         how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-        # Read what is still in the pipe after its writer has ended. A child process may continue to
+        # The pipe may still have output of the ended process. A child process may continue to
         # write.
         for _ in range(_ROUNDS):
             if not self._hear():
                 break
         said = self._told.decode(errors="replace").split("\n")
         told = [printable(each.strip()) for each in said if each.strip()]
-        # Take the last line that names an error, because some interpreters print their version
-        # after it.
+        # The last line that names an error, because some interpreters print their version after it.
         told = [each for each in told if "rror" in each] or told
         return f"it ended {how} before it had answered{f': {told[-1][:200]}' if told else ''}"

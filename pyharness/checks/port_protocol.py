@@ -1,4 +1,4 @@
-"""The lines that a port reads and writes; docs/how-to/ports.md describes every field."""
+"""The lines that a port reads and writes, described in docs/how-to/ports.md."""
 
 import json
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from pyharness.model.values import parsed_float
 from pyharness.thesis.equations import card_torque
 
 VARIABLES = ("TIME", "U1", "U2", "U3", "V1", "V2", "V3")
-"""Columns of each row of results, in the order of TAPE5; their units are s, rad/s and m/s."""
+"""Columns of each row of results, in the order of TAPE5: s, rad/s and m/s."""
 ENDINGS = ("complete", "stopped", "overflow")
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The result of one run of a program by a port.
+    """A port's result of one run.
 
     `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`; `ier` has the
-    error code of each step, None for a program that prints none.
+    error code of each step, or is None for a program that prints none.
     """
 
     rows: Array
@@ -39,9 +39,9 @@ class Answer:
 def request(
     scene: Scene, listing: Listing, lipschitz: float | None = None, may_stop: bool = True
 ) -> bytes:
-    """Return the line of JSON that requests a run of a program; its decimals are exact.
+    """Return the line of JSON that requests a run; its decimals represent floats exactly.
 
-    `lipschitz`, by default that of the author's decks, is the constant of the stop test (1/s).
+    `lipschitz` is the constant of the stop test (1/s), by default that of the author's decks.
     """
     asked = {
         "schema": SCHEMAS["port request"],
@@ -65,7 +65,7 @@ def requested_scene(scene: Scene) -> dict[str, Any]:
 
 
 def read_answer(line: bytes, steps: int) -> Answer:
-    """Return a port's answer to a scene with `steps` steps; raise PortError if it is invalid."""
+    """Return a port's answer for `steps` steps; raise PortError if it is invalid."""
     given = read_object(line)
     for name in ("rows", "ended", "stop", "ier"):
         if name not in given:
@@ -88,7 +88,7 @@ def read_answer(line: bytes, steps: int) -> Answer:
 
 
 def read_object(line: bytes) -> dict[str, Any]:
-    """Return the JSON object in a line that another process wrote; raise PortError otherwise."""
+    """Return the JSON object in another process's output; raise PortError otherwise."""
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -119,21 +119,21 @@ def _stop(stop: object) -> Stop:
 
 
 def read_list(where: str, value: object) -> list[Any]:
-    """Return a JSON list; raise PortError, with `where` in front, for any other value."""
+    """Return a JSON list; raise PortError, naming `where`, for any other value."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
 
 
 def read_whole(where: str, value: object) -> int:
-    """Return a whole number; raise PortError, with `where` in front, for any other value."""
+    """Return a whole number; raise PortError, naming `where`, for any other value."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value
 
 
 def read_number(where: str, value: object) -> float:
-    """Return a JSON number, or one in hexadecimal or decimal text; raise PortError otherwise."""
+    """Return a number, from JSON or decimal or hexadecimal text; raise PortError otherwise."""
     if type(value) is float:
         return value
     try:

@@ -1,4 +1,4 @@
-"""The report of `verify --port`: the first step that differs, and the times of the answers."""
+"""The report of `verify --port`: first differing steps, and times of the answers."""
 
 import statistics
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, at least one: failures with their steps, and times."""
+    """Return the report of a port's checks, at least one."""
     title = [f"{command}: against the twins, bit for bit"]
     if seed:
         title.append(f"seed of the random scenes: {seed}")
@@ -26,14 +26,14 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
     extra = {"port": command, "seconds": _total(checks), **({"seed": seed} if seed else {})}
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
-    # The steps follow the list of failures, which is the second section.
+    # Sections for steps follow the list of failures, the second section.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
     return checks_report("verify", checks, text, page, **extra)
 
 
 def step_section(check: PortCheck) -> Section:
-    """Return a line and a table of all variables in the first step that differs, exactly."""
+    """Return the exact values of all variables in the first step that differs."""
     assert check.difference is not None
     rows = [
         [

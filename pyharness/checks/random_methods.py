@@ -1,9 +1,9 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
-The true omega comes from `integer_series`, the attitude from `reference`. An entry point is `solve`
-or a prepared solver with one method. A tolerance applies to the error of omega relative to the
-largest until the last time, or to the angle of the attitude error (rad). If the motion amplifies
-perturbations K times, rounding alone causes errors of 2e-15 K.
+The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
+`solve` or a prepared solver, with one method. A tolerance applies to the error of omega, relative
+to the largest omega until the last time, or to the attitude error (rad). With the error
+amplification K, rounding alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -39,10 +39,9 @@ from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.truth.integer_series import integer_series
 
-# Of each pair of draws, one has a plain scene, and the other a scene of a kind in `NASTY`. Methods
-# are tried in one of 4 pairs, because the true solution takes longer than the methods. Methods in
-# Python or in decimal arithmetic take longer than the true solution, and are tried in one of 60
-# pairs. Attitudes are tried in one of 20 draws.
+# The draws of a pair are a plain scene and a scene of a kind in `NASTY`. Methods run in one of 4
+# pairs, because the true solution takes longer than the methods. Methods in Python or decimal
+# arithmetic take longer still, and run in one of 60 pairs; attitudes in one of 20 draws.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EFFORT = 0.05  # factor on the work limit of the reference, for an attitude
 ROUNDING = 2e-15  # relative, for an error amplification of 1
@@ -65,7 +64,7 @@ Entrances = Mapping[str, Callable[[], MethodRun]]
 def truth_of(drawn: Draw) -> Truth:
     """Return the true omega of a draw at 0.4 of its end time and at its end time.
 
-    Raise InputError if it is unbounded, too fast, or lost to rounding.
+    Raise InputError if omega is unbounded, too fast, or lost to rounding.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -77,11 +76,11 @@ def truth_of(drawn: Draw) -> Truth:
 
 
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
-    """Return whether a method may refuse the scene of its run `tried` with the message `why`.
+    """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` may not, closed forms only near the limits of binary64, `quick` always. Others may for
-    `_MAY_REFUSE` (diverging or too fast) and above the amplification `_CALM`; SciPy also for too
-    fine a tolerance.
+    `auto` may not; closed forms may only near the limits of binary64, `quick` always. Other methods
+    may for `_MAY_REFUSE` (diverging or too fast), and if the amplification exceeds `_CALM`; SciPy's
+    also for too fine a tolerance.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -108,12 +107,12 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 POLICY = Policy(_limit, CAMPAIGN, may_refuse)
 """Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
 
-The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
+The tolerance is amplified only above an error amplification of `LIVELY`.
 """
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield deferred checks of omega from every entry point; some scenes have no true solution."""
+    """Yield checks of omega from every entry point; one for a scene without true solution."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -124,7 +123,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # There is no true solution to compare with: the motion diverges, or is too fast.
+            # Without true solution, the motion diverges or is too fast.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.name_draw(number, "no-truth")
             again = chosen.name_draw(number).replay
@@ -134,7 +133,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of attitudes where the true one is known and not lost to rounding."""
+    """Yield deferred checks of attitudes, if the true attitude is known despite rounding."""
     tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
@@ -152,7 +151,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
         try:
             truth = reference_truth(scene, times, _EFFORT) if asked else None
         except InputError:
-            # The motion is too fast or too long for any true solution, or it diverges.
+            # The motion diverges, or is too fast or long for any true solution.
             continue
         if truth and allowed(truth, 0.0, 1.0) < 1.0:
             yield from _sampled(chosen, number, asked, truth, IF_CALM)
@@ -163,7 +162,7 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return a deferred run for each entry point, by its name; slow ones in few draws."""
+    """Return a deferred run by name of the entry point; slow methods run in few draws."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:
@@ -183,7 +182,7 @@ def _prepared(name: str, drawn: Draw) -> MethodRun:
 
     def ask() -> Answer:
         end = prepared_candidate(name, tolerance, primed=True).end(drawn.scene, drawn.time)
-        # Every end before the last time counts as a refusal.
+        # An end before the last time counts as a refusal.
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
     return MethodRun(name, tolerance, drawn.scene, ask)
@@ -197,7 +196,7 @@ def _sampled(
 
 
 def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
-    """Run a solver and return the check of its error, with tolerance and amplification."""
+    """Return the check of a run's error, with its tolerance and error amplification."""
     one = tried()
     found, tolerance = judge(name, one, truth, policy), tolerance_of(one)
     growth = truth.flow.amplification

@@ -1,6 +1,6 @@
 """Checks of methods in random scenes whose torque depends on omega or attitude.
 
-It is the sum of recorded functions, or of ready terms. The reference's series of it
+Torques are sums of recorded functions or of ready terms. The reference's series for them
 (`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
@@ -32,22 +32,22 @@ from pyharness.model.extension import ENDS
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
 
-# One of 20 draws of a run has such a scene, and in one of 80 the methods in Python are tried too.
+# One of 20 draws has such a scene; one of 80 also runs the methods in Python.
 _EVERY, _EVERY_SLOW = 20, 80
 _EFFORT = 0.2  # factor on the work limit of the reference
 _EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
-# Methods in Python or in decimal arithmetic. The finest tolerances take them too long.
+# Methods in Python or decimal arithmetic, for which the finest tolerances take too long.
 _FINE = 1e-9
 _SLOW = ("reference", *SCIPY_METHODS)
 
 
 def random_torques(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega and attitude where the truth is known, from entry points."""
+    """Yield deferred checks of omega and attitude, if the true solution is known."""
     for number in range(0, chosen.draws, _EVERY):
         if not chosen.may_ask(f"random/{number}"):
             continue
         source = Random(f"torque {chosen.seed}/{number}")
-        # Both kinds of torque occur in the draws in which all methods are tried.
+        # Both kinds of torque occur in the draws that run all methods.
         kind = (number // _EVERY + number // _EVERY_SLOW) % 2
         scene, time = (draw, draw_ready)[kind](source)
         is_slow = number % _EVERY_SLOW == 0 and not chosen.thin
@@ -59,7 +59,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
         try:
             truth = reference_truth(scene, (_EARLIER * time, time), _EFFORT) if entrances else None
         except InputError:
-            # The motion is too fast or too long for any true solution, or it diverges.
+            # The motion diverges, or is too fast or long for any true solution.
             continue
         if truth and ROUNDING * truth.flow.amplification < 1.0:
             for subject, tried in entrances.items():
@@ -69,7 +69,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
 def _entrances(
     scene: Scene, time: float, source: Random, is_slow: bool
 ) -> dict[str, Callable[[], MethodRun]]:
-    """Return a deferred run for each entry point, with tolerances from 1e-3 to the finest."""
+    """Return a deferred run by name of the entry point, at tolerances from 1e-3 to the finest."""
     times, digits = (_EARLIER * time, time), source.random()
     slow = _SLOW if is_slow else ()
 
@@ -110,10 +110,10 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 POLICY = Policy(_limit, CAMPAIGN, _may_refuse)
-"""Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
+"""Policy whose limit is the sum of three terms.
 
-The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`. The limit also
-contains the error of the true solution.
+They are the tolerance, `ROUNDING` times the error amplification, and the error of the true
+solution. The tolerance is amplified only above an error amplification of `LIVELY`.
 """
 
 

@@ -1,4 +1,4 @@
-"""The report of checks: each failure, a summary by kind, the JSON record, the JUnit cases."""
+"""The report of checks: failures, a summary by kind, the JSON record, the JUnit cases."""
 
 import math
 from collections import Counter
@@ -27,10 +27,7 @@ def checks_report(
     page: Sequence[Section] | None = None,
     **extra: Any,
 ) -> Report:
-    """Return the report of the checks that a command made, for the screen and for files.
-
-    The JSON record also has the fields `extra`.
-    """
+    """Return the report of a command's checks; `extra` are further fields of the JSON record."""
     return Report(
         verb,
         text,
@@ -52,7 +49,7 @@ def summary_page(
     depth: int = 1,
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """Return a page for a job: verdict, table of groups by `depth` parts of ids, and failures."""
+    """Return a Markdown page: verdict, a table by the first `depth` parts of ids, and failures."""
     failed = [check for check in checks if not check.passed]
     lines: list[str] = []
     for check in failed[:_MOST_ON_PAGE]:
@@ -67,7 +64,7 @@ def summary_page(
 
 
 def _code(text: str) -> str:
-    """Return a text as code in Markdown, in which a port can't write links or tags."""
+    """Return a text as Markdown code, in which a port can't write links or tags."""
     return f"`{text.replace('`', chr(39))}`"
 
 
@@ -86,7 +83,7 @@ def marks(checks: Sequence[Check]) -> str:
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend for the marks of limits with their numbers; empty without limits."""
+    """Return a legend of the marks, with the number of limits of each; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -99,7 +96,7 @@ def basis_note(checks: Sequence[Check]) -> list[str]:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the printed sections: title, failures, groups by `depth` parts of ids, and verdict."""
+    """Return the printed sections: title, failures, a table by `depth` parts of ids, verdict."""
     table: Section = [*basis_note(checks), _groups(checks, depth)]
     return [title, listed_singly(checks), table, more, [verdict(checks)]]
 
@@ -117,11 +114,11 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks with the commands that repeat them; on all, if few."""
+    """Return lines on failed checks, with the commands that repeat them; on all if few."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
-        # The command is never shortened, so that it can be copied.
+        # The command is not shortened, so that it can be copied.
         lines += [f"FAILED {check.id}{_format_outcome(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
@@ -148,10 +145,10 @@ _SAMPLES = (
 
 
 def samples(checks: Sequence[Check], rounding: float) -> Section:
-    """Return a table of the worst ratio of error to tolerance, by entry point and tolerance.
+    """Return a table of the worst ratios of error to tolerance, by entry point and tolerance.
 
-    The error is less `rounding` times the amplification, in three ranges of which samples are
-    counted.
+    `rounding` times the amplification is subtracted from the error. The columns are three ranges of
+    the amplification, each with the number of samples.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -172,7 +169,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the errors of the references: largest proved, largest estimate, and wrong."""
+    """Return lines on the references: largest proved error, largest estimate, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []
@@ -188,7 +185,7 @@ def references(checks: Sequence[Check]) -> Section:
 
 
 def verdict(checks: Sequence[Check]) -> str:
-    """Return a line with the number of checks and the number of failed ones."""
+    """Return a line with the numbers of all and of failed checks."""
     failed = sum(not check.passed for check in checks)
     made = counted(len(checks), "check")
     return f"{made}, {failed} failed" if failed else f"{made}, all well"

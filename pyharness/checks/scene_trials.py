@@ -1,6 +1,6 @@
-"""Stress trials of one scene that the user specifies, with any torque that can be recorded.
+"""Stress trials of a scene from the user, with any torque that can be recorded.
 
-They apply to every scene: the error against the reference, and transformations that must not change
+They apply to every scene: errors against the reference, and transformations that must not change
 the motion.
 """
 
@@ -45,7 +45,7 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
-# Methods that are also tried at their finest tolerance. It takes the methods in Python too long.
+# Methods that also run at their finest tolerance, for which methods in Python take too long.
 _FINE = ("auto", "taylor", "closed-form")
 _PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
@@ -56,7 +56,7 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name, repeated by the command's `options`.
+    """Return the trials of a scene by name; `options` are those of the command that repeats them.
 
     Raise InputError if the torque is opaque, or needs an attitude that is missing.
     """
@@ -175,8 +175,8 @@ def _invariance(scene: Scene, name: Name) -> Iterator[Attempt]:
             yield Attempt(own, partial(_compared, scene, tolerance, make))
 
 
-# A function of a scene and of a method with its tolerance. It returns two states that must agree,
-# and a bound of their relative difference.
+# A function of a scene, a method and its tolerance. It returns two states that must agree, and a
+# bound of their relative difference.
 Way = Callable[[Scene, str, float], tuple[State, State, float]]
 
 

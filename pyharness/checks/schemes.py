@@ -1,7 +1,7 @@
 """Checks of the corrected programs against their schemes, by recomputing every step.
 
-Fortran and twin could share a fault too small to change the order. Each step is recomputed from the
-program's state before it; only the rounding of one step may differ.
+Fortran and twin could share a fault too small to change the order. Each step is therefore
+recomputed from the program's previous state; only its rounding errors may differ.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Roundings of a rate, including the stages that lead to it, and of the sum to which it is added.
+# Roundings of a rate with its stages, and of the sum to which it is added.
 _ROUNDINGS = 32.0
 _ONE_STEP = Basis(
     "derived",
@@ -33,17 +33,16 @@ _ONE_STEP = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A stage, or collocation point, of every step: rows of omega (rad/s) and velocity (m/s)."""
+    """The values of a stage, or collocation point, in every step: omega and velocity."""
 
-    # shape (n, 6); the arguments of the right-hand sides (rad/s, m/s), and the right-hand sides
-    # (rad/s2, m/s2)
+    # shape (n, 6); arguments (rad/s, m/s) and values (rad/s2, m/s2) of the right-hand sides
     state: Array
     rate: Array
     rounding: Array  # shape (n, 6); bound on the difference of two computations of the rate
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of steps: the largest difference over its rounding bound."""
+    """Yield deferred checks of steps; the value is the largest ratio of difference to bound."""
     for case in cases(chosen, (7,)):
         for program in PROGRAMS:
             yield Attempt(
@@ -65,12 +64,12 @@ def _compared(scene: Scene, name: Name) -> Check:
 
 
 def is_whole(scene: Scene, run: Trajectory) -> bool:
-    """Return whether a run has a row for every step of the scene, with translational velocity."""
+    """Return whether a run has omega and velocity for every step of the scene."""
     return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
 
 
 def rows(run: Trajectory) -> Array:
-    """Return omega (rad/s) and translational velocity (m/s) after every step, shape (n, 6)."""
+    """Return omega (rad/s) and velocity (m/s) after every step, shape (n, 6)."""
     assert run.velocity is not None
     return np.hstack([run.omega, run.velocity])
 
@@ -93,12 +92,12 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
     parts = np.array([float(part) for part in PARTS[name]])
     powers = np.arange(1, len(parts) + 1)
     matrix = np.power.outer(parts, powers - 1)
-    # Integrate the polynomial through the rates at the collocation points over the step.
+    # The weights integrate the polynomial through the rates at the collocation points.
     weights = np.linalg.solve(matrix.T, 1.0 / powers)
     points = [
         _stage(scene, part, first.state + part * scene.step_size * first.rate) for part in parts
     ]
-    # The programs first solve for the coefficients of t, t**2, ...
+    # This matrix is the programs': they solve for the coefficients of t, t**2, ...
     condition = float(np.linalg.cond(powers * matrix, np.inf))
     return _put_together(scene, first, points, weights, condition)
 
@@ -125,7 +124,7 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
     """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
 
-    They are of equations 16-18 and dV/dt = F/m - omega x V.
+    They follow from equations 16-18 and dV/dt = F/m - omega x V.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

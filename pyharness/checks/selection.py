@@ -1,4 +1,4 @@
-"""The selection of the checks that one run of `verify` makes, with their seed and files."""
+"""The selection of checks for one run of `verify`, with their seed and files."""
 
 import shlex
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 
 @dataclass(frozen=True)
 class Selection:
-    """The checks that one run of `verify` makes, with the seed and files that they use."""
+    """The checks that one run of `verify` makes."""
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
@@ -29,15 +29,15 @@ class Selection:
     thin: bool = False  # only a few checks of every kind, for `verify --self-test`
 
     def asks(self, id: str) -> bool:
-        """Return whether the check `id`, as in ``cells/two-term/case-3/original``, is requested."""
+        """Return whether the check `id` is requested."""
         return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
-        """Return whether a check whose id begins with `id`, or is `id`, may be requested."""
+        """Return whether a check whose id equals or begins with `id` may be requested."""
         return may_hold(id, self.only)
 
     def name_draw(self, number: int, subject: str = "") -> Name:
-        """Return the name of the check of `subject` in random draw `number`, with its seed."""
+        """Return the name of the check of `subject` in random draw `number`."""
         draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
         options = f"{draws} --seed {shlex.quote(self.seed)}"
         return Name("random", subject, str(number), options=options)

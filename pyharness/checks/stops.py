@@ -1,8 +1,9 @@
-"""Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its own run.
+"""Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its run.
 
-A run stops if a quotient, the change of K (right-hand side) over that of U (state) within a step,
-exceeds the stop constant. As Fortran and twin could both test a wrong quotient, all are computed
-from the scheme, and the program is run with constants just below and above each record.
+A run stops if a quotient, the change of K (right-hand side) divided by the change of U (state)
+within a step, exceeds the stop constant. As Fortran and twin could both test a wrong quotient, all
+quotients are computed from the scheme. The program is run with constants just below and above each
+new maximum.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,7 +37,7 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """The quotients that the program compares with its stop constant, in its order."""
+    """The quotients that the program compares with its stop constant, in that order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m); bound on the difference of two computations, 1/s
@@ -44,9 +45,9 @@ class Quotients:
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of the stops with every combination of the defects of the test.
+    """Yield deferred checks of the stops, for every combination of the stop test's defects.
 
-    The value is the largest difference of quotients over its rounding bound.
+    The value is the largest ratio of a quotient's difference to its rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -111,7 +112,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: Stages, listing: Listing) -
 
 
 def _constants(quotients: Quotients) -> list[float]:
-    """Return stop constants (1/s) beside each record, apart by more than rounding."""
+    """Return stop constants (1/s) on both sides of each new maximum, beyond rounding."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

@@ -18,7 +18,7 @@ SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
-"""Return the name of a check of a trial: a `Name` whose command is the verb `stress`.
+"""Return a `Name` whose command is the verb `stress`.
 
 The arguments are those of `Name`.
 """
@@ -28,7 +28,7 @@ The arguments are those of `Name`.
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `bound` explains the limits; `attempts` takes leading parts of requested ids.
+    `bound` is a text on the limits; `attempts` takes leading parts of requested ids.
     """
 
     name: str
@@ -38,13 +38,13 @@ class Trial:
 
 
 def trial(name: str) -> Trial:
-    """Return the trial with the given name, one of `TRIALS`, from its module."""
+    """Return the trial `name`, one of `TRIALS`."""
     found: Trial = import_module(f"pyharness.checks.trials.{name.replace('-', '_')}").TRIAL
     return found
 
 
 def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) -> Iterator[Check]:
-    """Yield the checks of `stress` whose ids begin with an element of `only`."""
+    """Yield the checks of `stress` whose ids begin with an element of `only`, or all if empty."""
     suites = {
         name: lambda name=name: (trials[name] if trials else trial(name)).attempts(only)
         for name in trials or TRIALS
@@ -53,7 +53,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the worst check by ``trial/method``; those without limit or scene are ignored."""
+    """Return the worst check by ``trial/method``, among those with a limit and a scene."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

@@ -1,4 +1,4 @@
-"""The report of `stress`: for each trial a description, and a table with a row for each method."""
+"""The report of `stress`: for each trial a description, and a table by method."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -20,7 +20,7 @@ _NOTE = (
 
 
 def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
-    """Return the report of `stress`: failures, then a table and picture for each trial."""
+    """Return the report of `stress`: failures, then a table and a picture for each trial."""
     text: list[Section] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
     for each in trials:
         own = [check for check in checks if check.suite == each.name]

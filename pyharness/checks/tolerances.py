@@ -1,6 +1,6 @@
-"""Tolerances at which the checks run each method, and limits on the work of a method.
+"""Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, in right-hand sides, decides which tolerances are affordable, and bounds no error.
+A work limit, in right-hand sides, determines the affordable tolerances, and bounds no error.
 """
 
 import math
@@ -13,17 +13,16 @@ from pyharness.engine.scipy_ivp import steps_sum
 from pyharness.engine.solve import finest as finest_of
 from pyharness.model.scene import Scene
 
-# Tolerances in the cases. Methods of solve_ivp are tried only at tolerances that take less than a
-# second.
+# Tolerances in the cases. SciPy's methods run only at tolerances that take less than a second.
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
 # The smallest tolerance at which `quick` is checked.
 FEW_DIGITS = 1e-7
-# A tolerance of medium size, and the tolerances that are tried if a finer one is not possible.
+# A middling tolerance, and the tolerances to try if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
-# At their finest tolerances these methods take minutes, whereas the other methods take seconds.
+# Methods that take minutes at their finest tolerances, whereas others take seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
 # Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
@@ -33,7 +32,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return the tolerances of a method in a case of Table 1; only one if `thin`."""
+    """Return a method's tolerances in a case of Table 1; only one if `thin`."""
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
@@ -45,8 +44,8 @@ def of_case(name: str, thin: bool) -> list[float]:
 def finest(name: str, scene: Scene, time: float) -> float:
     """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
 
-    It is the smallest that `solve` accepts, or the finest of `_LADDER` that `solve_ivp` meets, or
-    1.
+    It is the smallest that `solve` accepts, else the finest of `_LADDER` that `solve_ivp` meets,
+    else 1.
     """
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
@@ -54,7 +53,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return the finest tolerance of a method and 1e-6 if coarser; of slow methods only 1e-6."""
+    """Return a method's finest tolerance, and 1e-6 if coarser; only 1e-6 for slow methods."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -64,8 +63,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    They are the finest within the work limit, and 1e-6 if affordable. None is the scene's step
-    size, for fixed steps and Gauss collocation.
+    They are the finest within the work limit, and 1e-6 if affordable. None stands for the scene's
+    step size, for methods with a fixed step and Gauss collocation.
     """
     if name in FIXED_STEP:
         return [None]
@@ -73,8 +72,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         return [METHODS["closed-form"].finest]
     least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
     if name in GAUSS:
-        # Gauss collocation compares two solutions, which can't agree to the tolerance if amplified
-        # rounding errors separate them. A coarser tolerance of `_LADDER` is then taken.
+        # Gauss collocation compares two solutions, which can't agree within the tolerance if
+        # amplified rounding errors exceed it.
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)

@@ -1,6 +1,6 @@
-"""Checks of our arithmetic of machine words, by test vectors and by runs of the programs.
+"""Checks of our arithmetic of machine words, by test vectors and runs of the programs.
 
-It reproduces the mantissa length and the rounding of a machine, as 48 bits for the CDC.
+It reproduces a machine's mantissa length and rounding, such as 48 bits for the CDC.
 """
 
 from collections.abc import Iterator
@@ -30,12 +30,12 @@ _VECTORS = Basis(
 
 
 def words(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks that our arithmetic of machine words is correct bit for bit.
+    """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    CDC instructions with expected results are test vectors. In cells, our 53 bits must agree with
-    floats, and the program compiled for each word with the twin in that word: in every cell if
-    `chosen.only` requests some, else in listings with at most one change, and in the original and
-    corrected ones.
+    Test vectors are CDC instructions with expected results. In cells, our 53 bits must agree with
+    floats, and the program compiled for each word with the twin in that word. If `chosen.only` is
+    empty, the former are compared in listings with at most one change, original and corrected, the
+    latter in the last two alone.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():

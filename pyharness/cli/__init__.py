@@ -6,18 +6,18 @@ from typing import TextIO
 
 from pyharness.model.errors import printable
 
-# Control characters that are not escaped: they separate lines, columns and pages. A printer page
-# (TAPE6) of the programs may contain a form feed.
+# Control characters that are not escaped, because they separate lines, columns and pages. TAPE6, a
+# printer page of the programs, may contain a form feed.
 _LAYOUT = "\n\t\f"
 
 
 def shown(text: str) -> str:
-    """Return a text with the control characters of third-party names escaped."""
+    """Return a text with control characters, as in third-party names, escaped."""
     return printable(text, _LAYOUT)
 
 
 def write_text(stream: TextIO, text: str) -> None:
-    """Write a text; characters that the encoding lacks are escaped."""
+    """Write a text, escaping characters that the stream's encoding lacks."""
     encoding = stream.encoding or "utf-8"
     stream.write(shown(text).encode(encoding, "backslashreplace").decode(encoding))
 

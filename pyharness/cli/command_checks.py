@@ -24,7 +24,7 @@ _HIGHEST = 40.0
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Compare a port, started by `options.port`; return 0 if all checks pass, else 1."""
+    """Check a port, started by `options.port`; return 0 if all checks pass, else 1."""
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     cells, seed = requested_cells(
         shared.names(options.cell), programs, cases, options.draws, shared.chosen_seed(options)
@@ -64,9 +64,9 @@ def requested_cells(
 ) -> tuple[list[Cell], str]:
     """Return the runs, those of Table 1 first, and the seed of random scenes.
 
-    `names` are beginnings such as ``two-term/case-3`` or ``random/7``, empty for all; `draws` is
-    the number of random scenes as text. The seed is by default the present year and week, and empty
-    without draws.
+    `names` are leading parts of names, such as ``two-term/case-3`` or ``random/7``, or empty for
+    all. `draws` is the number of random scenes as text. The seed is by default the present year and
+    week, and empty without random scenes.
     """
     count = 0 if draws is None else shared.whole(draws, "--draws")
     check_count("--draws", count, 0, CHECKS)
@@ -83,10 +83,7 @@ def requested_cells(
 
 
 def check_integrator(options: argparse.Namespace) -> int:
-    """Compare an integrator with true solutions; return 0 if all checks pass, else 1.
-
-    `options.integrator` starts it.
-    """
+    """Check an integrator, started by `options.integrator`; return 0 if all checks pass, else 1."""
     shared.refuse(options, "--integrator", (*_OF_THE_CHECKS, "port", "program", "case"))
     command = options.integrator
     due = shared.positive(options.order, "--order", 1.0)
@@ -145,7 +142,7 @@ def _integrator_self_test(
 
 
 def collect(outcomes: Iterable[Outcome], count: int) -> list[Outcome]:
-    """Return the outcomes of a self-test with `count` faults and a control; show its progress."""
+    """Return the outcomes of a self-test with `count` faults and a control, showing progress."""
     found = []
     for each in outcomes:
         found.append(each)
@@ -157,6 +154,6 @@ def tell(
     options: argparse.Namespace, found: Sequence[Outcome], title: Sequence[str], again: str,
     **extra: Any,
 ) -> int:  # fmt: skip
-    """Write the report of a self-test; return 0 if each outcome is as it should be, else 1."""
+    """Write the report of a self-test; return 0 if every outcome passes, else 1."""
     shared.show(self_test_report(title, found, again, **extra), options)
     return 0 if all(each.passed for each in found) else 1

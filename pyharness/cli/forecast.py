@@ -1,4 +1,4 @@
-"""Limits of random draws, and forecasts of their run time before the first one."""
+"""Limits on the number of random draws, and forecasts of their run time."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """Time and memory of a draw, on one core of 2026, and the most draws."""
+    """The time and memory of a draw, on one core of 2026, and the limit on draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # per draw
@@ -17,17 +17,17 @@ class Cost(NamedTuple):
     most: int  # largest allowed number of draws
 
 
-# Each draw of `verify` leads to nearly three checks, which stay in memory until the report.
+# A draw of `verify` makes nearly three checks, which stay in memory until the report.
 CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
-# On each random scene of `bench`, every solver runs with each of its settings, and the reference
-# solution is computed.
+# On each random scene of `bench`, the reference is computed, and every solver runs with all its
+# settings.
 SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def check_count(option: str, count: int, least: int, cost: Cost) -> None:
-    """Raise InputError if a number of draws is not allowed.
+    """Raise InputError for a number of draws that is not allowed.
 
-    If they will take more than a minute, print a forecast.
+    Print a forecast if they take more than a minute.
     """
     from pyharness.sweep.forecast import duration
 

@@ -1,8 +1,8 @@
-"""Ctrl-C: at any time it ends a command with one line and exit status 130.
+"""Interruption: at any time Ctrl-C ends a command with one line and exit status 130.
 
 KeyboardInterrupt can be raised between any two instructions; an import may replace it, and a
-finalizer or a callback may drop it. The signal is therefore recorded, and the exception raised
-again if dropped.
+finalizer or a callback may drop it. The signal is therefore recorded, and a dropped exception is
+raised again.
 """
 
 import atexit
@@ -29,7 +29,7 @@ LINE = "pyharness: interrupted\n"
 class _Interruption:
     """The state of interruption, and the signal handlers.
 
-    `count` is the number of interrupts; `is_reported` whether their line was printed.
+    `count` is the number of interrupts; `is_reported` is whether their line was printed.
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process with status 130, after its line, without cleanup."""
+        """End the process with status 130, after its line is printed, without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -45,7 +45,7 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, and by a timer again if it is dropped.
+        """Raise KeyboardInterrupt, and repeatedly by a timer in case it is dropped.
 
         The third interrupt ends the process.
         """
@@ -57,7 +57,7 @@ class _Interruption:
         raise KeyboardInterrupt
 
     def _again(self, *_: object) -> None:
-        # Code that has installed its own handler of SIGINT is not interrupted.
+        # Code with its own handler of SIGINT is not interrupted.
         is_ours = signal.getsignal(signal.SIGINT) == self.interrupt
         if is_ours and not self.is_reported and not _is_pending():
             raise KeyboardInterrupt
@@ -75,9 +75,9 @@ def came() -> bool:
 def leave_when_interrupted() -> bool:
     """Make Ctrl-C end the process at once; return False if SIGINT is ignored.
 
-    It is for times without cleanup: imports, and after the results are written.
+    It is for periods without cleanup: during imports, and after the results are written.
     """
-    # A shell starts a background process with SIGINT ignored; SIGINT then remains ignored.
+    # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
         return False
     signal.signal(signal.SIGINT, _STATE.leave_at_once)
@@ -94,7 +94,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
             signal.signal(signal.SIGINT, _STATE.interrupt)
         code = main()
     except BaseException as error:
-        # After an interrupt, any exception is taken as its consequence.
+        # After an interrupt, any exception counts as its consequence.
         if not came() and not isinstance(error, KeyboardInterrupt):
             raise
         escaped = True
@@ -107,7 +107,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
 
 
 def report() -> int:
-    """Print "pyharness: interrupted" once; return 130."""
+    """Print "pyharness: interrupted", at most once; return 130."""
     if not _STATE.is_reported:
         _STATE.is_reported = came()
         end_progress()
@@ -119,7 +119,8 @@ def leave(code: int) -> None:
     """Remove temporary files and end the process.
 
     Python's own exit would wait for threads, free all memory, and on Ctrl-C drop the interrupt or
-    end by the signal. After an interrupt child processes are ended, and cleanup has two seconds.
+    end by the signal. After an interrupt, child processes are ended, and cleanup may take two
+    seconds.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.
@@ -158,7 +159,7 @@ def _show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    # After an interrupt, warnings of other threads and of unfinished work are suppressed.
+    # After an interrupt, warnings come from other threads and unfinished work.
     if not came():
         _SHOW_WARNING(message, category, filename, lineno, file, line)
 

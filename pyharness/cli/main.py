@@ -1,4 +1,4 @@
-"""The entry point: find the verb, run it, report errors in one line."""
+"""The entry point: parse the verb, run it, report errors in one line."""
 
 import gc
 import os
@@ -9,8 +9,8 @@ from pyharness.cli import say
 from pyharness.cli.interruption import came, report
 from pyharness.model.errors import InputError, NotBuiltError, unknown
 
-# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs, which is imported
-# only when the verb is used.
+# The verbs in the order of the overview. Each is a module of pyharness.cli.verbs, imported when
+# used.
 _GROUPS = {
     "for everyone": {
         "compare": "compare original and corrected programs, Fortran and Python, and solve_ivp",
@@ -47,14 +47,13 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, by default this process's, and return its exit status.
 
-    0 is for expected results, 1 for an unexpected one such as a failed check, 2 for wrong usage or
-    input, 3 without the Fortran extension, 130 after an interrupt.
+    The status is 0 for expected results, 1 for an unexpected result such as a failed check, 2 for
+    wrong usage or input, 3 without the Fortran extension, and 130 after an interrupt.
     """
     # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
     gc.set_threshold(100_000)
-    # The matrices of this package are too small for a second thread, and starting a pool of threads
-    # takes a seventh of the time of `compare`. The variable has an effect only if NumPy is not
-    # imported yet.
+    # The package's matrices are too small for a second thread, and starting a thread pool takes a
+    # seventh of the time of `compare`. The variable must be set before NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if sys.stderr is None:  # closed by the caller, as in 2>&-
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
@@ -117,7 +116,7 @@ def _complete() -> int:
     except ImportError:  # installed for the shell, but not in this environment
         return 1
     line, first = os.environ["COMP_LINE"], int(os.environ["_ARGCOMPLETE"])
-    # A word of the command line is complete if a blank follows it.
+    # A word of the command line is complete only if a blank follows.
     typed = f"{line[: int(os.environ['COMP_POINT'])]}|".split()[:-1]
     verb = typed[first] if len(typed) > first else ""
     parser = ArgumentParser("pyharness", add_help=False)
@@ -142,14 +141,13 @@ def _overview() -> str:
 
 
 def _leave_stdout() -> None:
-    # Otherwise Python would flush the stream again at exit and report the error.
+    # Otherwise Python would flush the stream at exit and report the error again.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str, code: int) -> int:
     if came():
-        # Code between the interrupt and this function may have replaced the KeyboardInterrupt by
-        # another exception.
+        # Code since the interrupt may have replaced KeyboardInterrupt by another exception.
         return report()
     line = " ".join(message.split())
     say(f"pyharness: {line}\n")

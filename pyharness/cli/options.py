@@ -21,8 +21,8 @@ from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.values import parsed_float, parsed_whole
 
 FORMATS = ("table", "json", "csv", "markdown")
-# Options that several verbs share, each with its help text. An option takes a value if a
-# placeholder, as N in "--case N", follows its name.
+# Options that several verbs share, with help texts. A placeholder after the name, as N in "--case
+# N", means that the option takes a value.
 BODY = {
     "--case N": "Use the scene (body, initial state, torque and steps) of this case of Table 1 of "
     "the thesis, 1 to 7.",
@@ -70,7 +70,7 @@ _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
     """Return --format, --plot and --out with their help texts.
 
-    The first of `formats` is the default; without `plot`, what the picture shows, there is no
+    The first of `formats` is the default. `plot` says what the picture shows; if empty, there is no
     --plot.
     """
     first, *others = formats
@@ -84,7 +84,7 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return --effort, the factor on work limits, by default 1."""
+    """Return --effort, the factor on work limits; 1 by default."""
     return positive(options.effort, "--effort", 1.0)
 
 
@@ -106,15 +106,15 @@ def chosen_seed(options: argparse.Namespace) -> str | None:
 
 
 def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
-    """Raise InputError if the value of option `what` is given and not allowed."""
+    """Raise InputError if `name`, the value of option `what`, is neither None nor allowed."""
     if name is not None and name not in allowed:
         raise unknown(what, name, allowed, f"--{what}")
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, kinds or beginnings of ids, as in ``cells/two-term``.
+    """Return the names in --only, leading parts of ids, as in ``cells/two-term``.
 
-    A kind is the part before the first slash.
+    Raise InputError if the part before the first slash is not in `allowed`.
     """
     only = names(text)
     for each in only:
@@ -132,9 +132,9 @@ def chosen_scene(
 ) -> Scene:
     """Return the scene of --case or --scene, with --omega0, --step-size and --steps.
 
-    Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
-    matrix, a torque about the axes of space or one that depends on the state, or a changing
-    inertia, unless allowed.
+    Warn of impossible moments and of a normalised attitude. Unless allowed by an argument, raise
+    InputError for a full inertia matrix, a torque about the axes of space or dependent on the
+    state, or a changing inertia.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -161,7 +161,7 @@ def chosen_scene(
 
 
 def warn_of_attitude(scene: Scene) -> None:
-    """Warn if the attitude was not of norm 1, and was normalised."""
+    """Warn if the attitude was normalised."""
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
         warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
 
@@ -173,7 +173,7 @@ def _norm(length: float) -> str:
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the program of --program, or all three."""
+    """Return the program of --program, or all three by default."""
     check_known("program", options.program, PROGRAMS)
     return PROGRAMS if options.program is None else (options.program,)
 
@@ -205,7 +205,7 @@ def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> N
 
 
 def listing_text(listing: Listing) -> str:
-    """Return original, corrected or custom, with defects, readings and conjectures."""
+    """Return the listing's label, with its defects, readings and conjectures."""
     active = ", ".join(sorted(listing.defects)) or "no defects"
     more = {"readings": listing.readings, "conjectures": listing.conjectures}
     told = [f"; {what}: {', '.join(sorted(names))}" for what, names in more.items() if names]
@@ -213,7 +213,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the stop test's constant (1/s), by default that on the cards."""
+    """Return the stop test's constant (1/s), by default 500 as on the cards."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -222,7 +222,7 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if a name, as in "no_stop", has no meaning with `chosen`."""
+    """Raise InputError if an option of `names`, as in "no_stop", is set despite `chosen`."""
     for name in names:
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")
@@ -234,12 +234,12 @@ def names(text: str | None) -> list[str]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the finite numbers in a list such as 1,2; else raise InputError."""
+    """Return the numbers in a list such as 1,2; raise InputError for any other text."""
     return [number(part, option) for part in text.split(",")]
 
 
 def number(text: str, option: str) -> float:
-    """Return an option's finite number; else raise InputError."""
+    """Return an option's number; raise InputError unless it is finite."""
     try:
         value = parsed_float(text)
     except ValueError:
@@ -250,7 +250,7 @@ def number(text: str, option: str) -> float:
 
 
 def positive(text: str | None, option: str, default: float) -> float:
-    """Return an option's number above 0, or the default; else raise InputError."""
+    """Return an option's number, or the default; raise InputError unless it is above 0."""
     if text is None:
         return default
     value = number(text, option)
@@ -260,7 +260,7 @@ def positive(text: str | None, option: str, default: float) -> float:
 
 
 def whole(text: str, option: str) -> int:
-    """Return an option's whole number; else raise InputError."""
+    """Return an option's whole number; raise InputError for any other text."""
     try:
         return parsed_whole(text)
     except ValueError:
@@ -273,7 +273,7 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return the files of --also with their formats."""
+    """Return the files of --also, each with its format."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""
@@ -323,7 +323,7 @@ def show(
 ) -> None:
     """Write a report in the format of --format, and the picture of --plot.
 
-    `own` maps formats of this report alone, such as "tape5", to functions that return it.
+    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
     """
     from pyharness.views.render import render
 

@@ -1,6 +1,6 @@
 """Functions that write output folders, completely or not at all.
 
-Messages name `option`, which gave the path. The checks come before any computation.
+Messages name `option`, the source of the path. The checks precede any computation.
 """
 
 import json
@@ -19,7 +19,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_apart(picture: str, out: str) -> None:
-    """Raise InputError if --out is a file of --plot, the picture or its CSV."""
+    """Raise InputError if --out is one of the files of --plot, the picture or its CSV."""
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
@@ -28,7 +28,7 @@ def check_apart(picture: str, out: str) -> None:
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:
-    """Raise InputError if the files can't be written in the folder, which may be missing."""
+    """Raise InputError if the files can't be written in the folder, which may be new."""
     folder = Path(path)
     if not path or "\0" in path or os.path.lexists(folder):
         if not path or "\0" in path or not folder.is_dir():
@@ -43,10 +43,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return why a folder can't be made, after a colon, or an empty text.
+    """Return the reason why a folder can't be made, after a colon, or an empty text.
 
-    It is made and removed: permissions do not show that a name is too long, or that a file system
-    accepts no folder.
+    The folder is made and removed: permissions do not show that a name is too long, or that a file
+    system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -59,7 +59,7 @@ def _why_not_made(folder: Path) -> str:
 
 
 def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
-    """Write all files, by name, into a folder, or raise InputError and write none."""
+    """Write all files, by name, into a folder; on failure write none and raise InputError."""
     folder = Path(path)
     files = {str(folder / name): content for name, content in contents.items()}
     with DeferredInterrupt():
@@ -79,8 +79,8 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    It may if it is new or empty, or has only the JSON file `mark`, of a kind in `SCHEMAS`, and the
-    files in its `files`.
+    The folder may be new or empty, or contain only the JSON file `mark`, of a kind in `SCHEMAS`,
+    and the files that `mark` lists.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
@@ -102,7 +102,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 
 
 def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
-    """Return why a folder may not be replaced, or an empty text."""
+    """Return the reason why a folder may not be replaced, or an empty text."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
@@ -135,8 +135,8 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    A temporary folder is renamed, and the old one is removed after that: a failure, InputError,
-    does not change it.
+    A temporary folder is renamed before the old one is removed; a failure, InputError, leaves the
+    old one unchanged.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

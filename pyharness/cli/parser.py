@@ -16,7 +16,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter without options in the usage, which keeps an example's lines."""
+    """A help formatter that omits options from the usage and keeps an example's lines."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -30,7 +30,7 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb, which suggests the nearest known name."""
+    """The parser of one verb, whose errors suggest the nearest known name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
         self._width = _WIDEST
@@ -66,11 +66,11 @@ class Parser(argparse.ArgumentParser):
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError; argparse would also print the usage."""
+        """Raise InputError, because argparse would also print the usage."""
         raise InputError(message)
 
     def option_names(self) -> list[str]:
-        """Return the names of all options, as in ``--case``."""
+        """Return the long names of all options, as in ``--case``."""
         return [name for name in self._option_string_actions if name.startswith("--")]
 
     def read(self, verb: str, arguments: Sequence[str]) -> argparse.Namespace:
@@ -86,9 +86,9 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _joined(self, arguments: Sequence[str]) -> list[str]:
-        """Return the arguments with negative numbers joined, as in --x=-1.
+        """Return the arguments with negative numbers joined to their options, as in --x=-1.
 
-        Argparse would take them for options.
+        Argparse would parse such numbers as options.
         """
         result: list[str] = []
         for argument in arguments:

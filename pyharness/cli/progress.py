@@ -10,7 +10,7 @@ _bar: Any = None  # the progress bar on the terminal; None if there is none
 
 
 class _Terminal:
-    """Standard error without errors in writing."""
+    """A wrapper of standard error that ignores errors in writing."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(sys.stderr, name)
@@ -25,7 +25,7 @@ class _Terminal:
 
 
 def progress(done: int, total: int, what: str) -> None:
-    """Show completed and all parts, the current one, and the remaining time."""
+    """Show the completed part of the work, its current part, and the remaining time."""
     global _bar
     if not sys.stderr.isatty():
         return
@@ -33,8 +33,7 @@ def progress(done: int, total: int, what: str) -> None:
         end_progress()
         from tqdm import tqdm
 
-        # Otherwise tqdm would start a monitor thread, which is unwanted because this process may
-        # start other processes.
+        # Otherwise tqdm would start a monitor thread, but this process may start other processes.
         tqdm.monitor_interval = 0
         _bar = tqdm(total=total, leave=False, dynamic_ncols=True, file=_Terminal())
     _bar.set_description_str(shown(what), refresh=False)

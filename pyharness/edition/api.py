@@ -1,4 +1,4 @@
-"""The data of the API page: the public names with their docstrings."""
+"""The data of the API page: public names with their docstrings."""
 
 import inspect
 import re
@@ -23,7 +23,7 @@ class Entry(NamedTuple):
     """A public name on the API page.
 
     `kind` is "function", "class" or "property". `summary` is the docstring's first line, `text` its
-    further paragraphs, and `groups` its sections by title.
+    further paragraphs, and `groups` has its sections by title.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Entry(NamedTuple):
 
 
 def entries() -> list[Entry]:
-    """Return the API page's entry for each public name."""
+    """Return the entries of the API page, one for each public name."""
     return [_entry(name, getattr(pyharness, name)) for name in pyharness.__all__]
 
 
@@ -70,7 +70,7 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:
-    # Base classes of this package have a part of the methods of a class.
+    # A class inherits some of its methods from base classes of this package.
     ours = (base for base in of.__mro__ if base.__module__.startswith(pyharness.__name__))
     named: dict[str, Any] = {}
     for base in ours:

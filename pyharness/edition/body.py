@@ -1,6 +1,6 @@
 """The data of the page on which a torque-free body tumbles, by its closed form.
 
-For readers without JavaScript there are a picture, and a Python program with its output.
+Readers without JavaScript see a picture, and a Python program with its output.
 """
 
 import contextlib
@@ -28,16 +28,16 @@ found = solve(body, [1.0, 1e3, 1e6], "closed-form", attitude=True)
 print(found.omega.round(6))
 print(found.attitude.round(6))
 """
-"""The program that the page shows; it solves Case 4 of the thesis."""
+"""The program shown on the page, which solves Case 4 of the thesis."""
 
 AGREEMENT = 2e-15
 """The largest difference between the page's closed form and the Fortran method.
 
-It applies to each component of the attitude, and to omega relative to its largest component.
+It bounds each component of the attitude, and omega relative to its largest component.
 """
 
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
-"""The speeds that the page offers, in seconds of the motion per second."""
+"""The speeds that the page offers, in seconds of motion per second."""
 
 _FLIPS = 3.0  # length of the motion in the picture, in times between flips
 _POINTS = 601
@@ -66,9 +66,9 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the bodies that the page offers, and the latest time.
+    """Return the page's bodies, the first body shown, and the latest time (s).
 
-    Moments are in kg m2, omegas in rad/s; a body of the thesis has the number of its case.
+    Moments are in kg m2, omegas in rad/s; a body of the thesis has its case number.
     """
     known = facts("bodies")
     cases = [
@@ -86,7 +86,7 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return moments (kg m2) of a homogeneous box (m, kg), with as few digits as decimals."""
+    """Return the moments (kg m2) of a homogeneous box (m, kg), rounded only once."""
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
     return [float(twelfth * (sum(squares) - square)) for square in squares]
@@ -111,7 +111,7 @@ def _output(program: str) -> str:
 
 
 def _picture(scene: Scene) -> Picture:
-    """Return omega over time, polhode and herpolhode over three flips."""
+    """Return a picture of omega over time, polhode and herpolhode, over three flips."""
     from matplotlib.figure import Figure
 
     assert scene.moments is not None
@@ -157,7 +157,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega in space (rad/s) perpendicular to the momentum, shape (n, 2)."""
+    """Return omega in space (rad/s), perpendicular to the angular momentum, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page opened from a file. In the script every module is a
-function that returns its exports, after the modules that it imports. Forms of import and export
-other than the project's are errors.
+function that returns its exports, after the modules that it imports. Only the project's forms of
+import and export are supported.
 """
 
 import re
@@ -13,17 +13,17 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# An unsupported form of import or export, which remains after the supported forms are replaced.
+# An unsupported form of import or export, which remains after replacing the supported ones.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
-# A line that is only a comment. Readers of the script find the comments in the modules.
+# A comment line. Readers find the comments in the modules.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
     """Return a classic script of the module in `entry` with all its imports.
 
-    It defines no global names. Raise ValueError, with file and line, for an unsupported form, a
-    missing file or name, and circular imports.
+    The script defines no global names. Raise ValueError, with file and line, for an unsupported
+    form, a missing file or name, or circular imports.
     """
     exports: dict[Path, list[str]] = {}
     parts: list[str] = []
@@ -34,9 +34,9 @@ def bundle(entry: Path) -> str:
 def _add(
     path: Path, importing: tuple[Path, ...], exports: dict[Path, list[str]], parts: list[str]
 ) -> None:
-    """Append a module to `parts`, after those that it imports.
+    """Append a module to `parts`, after the modules that it imports.
 
-    `importing` is the chain of modules that import it; `exports` stores the exported names.
+    `importing` is the chain of modules that import it; `exports` collects the exported names.
     """
     text = path.read_text(encoding="utf-8")
     for found in _IMPORT.finditer(text):
@@ -51,7 +51,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
     names = [found["name"] for found in _EXPORT.finditer(text)]
-    # Replacements keep the number of lines, so that error messages name the right line.
+    # Replacements keep the number of lines, which error messages report.
     body = _IMPORT.sub(lambda found: _as_constant(found, path, list(exports)), text)
     body = _EXPORT.sub("", body)
     unknown = _UNKNOWN.search(body)

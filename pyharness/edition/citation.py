@@ -1,4 +1,4 @@
-"""The citation of edition and thesis, made from `codemeta.json`."""
+"""The citation of edition and thesis, from `codemeta.json`."""
 
 import json
 from functools import cache
@@ -23,7 +23,7 @@ def codemeta() -> dict[str, Any]:
 
 
 def release_date() -> str:
-    """Return the date of publication, once there is one, else the year of the copyright."""
+    """Return the date of publication or, before publication, the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
@@ -53,12 +53,12 @@ def bibtex() -> str:
 
 
 def thesis_record() -> dict[str, Any]:
-    """Return the thesis in the terms of schema.org."""
+    """Return the thesis's record in the terms of schema.org."""
     return {**codemeta()["referencePublication"], "@type": "Report"}
 
 
 def linked_data() -> dict[str, Any]:
-    """Return software and data as JSON-LD (schema.org) for search engines."""
+    """Return the software and data records as JSON-LD (schema.org), for search engines."""
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}
@@ -85,12 +85,12 @@ def linked_data() -> dict[str, Any]:
 
 
 def data_name() -> str:
-    """Return the name of the data for catalogues."""
+    """Return the name of the data, for catalogues."""
     return f"{facts('account')['edition']['name']}: data"
 
 
 def data_description() -> str:
-    """Return the description of the data for catalogues."""
+    """Return the description of the data, for catalogues."""
     thesis = codemeta()["referencePublication"]
     return (
         f"The cards of the three FORTRAN programs in the thesis {thesis['name']} "

@@ -14,7 +14,7 @@ from pyharness.history.identifiers import content_identifier, data_identifier
 from pyharness.history.text_digest import text_digest
 
 PACKAGE_MARK = "data-package.json"
-"""The file that marks a folder as a data package; it lists the files of the package."""
+"""The file that marks a folder as a data package, and lists its files."""
 CRATE = "ro-crate-metadata.json"
 MANIFEST = "manifest-sha256.txt"
 
@@ -22,8 +22,8 @@ MANIFEST = "manifest-sha256.txt"
 class Part(NamedTuple):
     """A file of the data package.
 
-    `path` is in the package, `media_type` as in ``text/csv``. `content` is empty for files that
-    describe the others.
+    `path` is relative to the package, `media_type` is as in ``text/csv``. `content` is empty for
+    files that describe the others.
     """
 
     path: str
@@ -47,7 +47,7 @@ KEPT = (
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the RO-Crate of files other than `KEPT`, for JSON.
+    """Return the RO-Crate record of files other than `KEPT`.
 
     Entities are items of one list, and refer to each other by identifier.
     """

@@ -1,7 +1,7 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate. Files have neither times nor paths of the machine, so that two runs
-write the same bytes.
+The package is an RO-Crate. Its files contain neither times nor paths of the machine, so that two
+runs write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -42,7 +42,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Return all files of the data package, content by path.
 
-    `progress` gets the number of completed parts, of all parts, and the name of the part.
+    `progress` receives the numbers of completed and of all parts, and the part's name.
     """
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
@@ -54,7 +54,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
         "version": codemeta()["version"],
         "text": text_digest(),
         "data": data_identifier(),
-        # The manifest has the checksum of this file, so that its own identifier is not known here.
+        # The manifest has this file's checksum, so that its identifier is not known here.
         "files": {**listed, MANIFEST: None},
     }
     content[PACKAGE_MARK] = _indented(mark)

@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
 The port is in modern Fortran, the twin in Python. A note is a numbered entry of the critical
-apparatus; an `entry` or `switch` is its identifier.
+apparatus; `entry` and `switch` are identifiers of entries.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,10 +19,10 @@ TITLES = {
     "four-term": "Four-term collocation",
     "runge-kutta": "Runge-Kutta",
 }
-"""The names of the three programs in headings."""
+"""The names of the programs in headings."""
 
-# Kinds of apparatus entries in order of precedence. A card with entries of several kinds has the
-# colour of the first of these kinds.
+# Kinds of apparatus entries by precedence, which determines the colour of a card with several
+# kinds.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -32,7 +32,7 @@ _ORDER = (
 class Run(NamedTuple):
     """A run of characters of a card or its scanned line.
 
-    `entry` explains why card and scan differ in them; None if they agree.
+    `entry` explains a difference of card and scan in it; None if they agree.
     """
 
     text: str
@@ -40,9 +40,9 @@ class Run(NamedTuple):
 
 
 class Note(NamedTuple):
-    """A numbered entry of the apparatus, and a program's cards that it is about.
+    """A numbered entry of the apparatus, with the cards of one program to which it applies.
 
-    Numbers are from 1, by first card; `cards` is text, as in ``860-910, 1040-1090``.
+    Numbers are from 1, ordered by first card; `cards` is text, as in ``860-910, 1040-1090``.
     """
 
     number: int
@@ -51,15 +51,15 @@ class Note(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Return the kind of the entry, for example ``defect``."""
+        """Return the kind of the entry, as in ``defect``."""
         return str(self.entry["kind"])
 
 
 class PortLine(NamedTuple):
     """A line of the Fortran port, and the defect or reading on which it depends.
 
-    `switch` is None if the line depends on none; `active` says whether the line is executed with it
-    or with its correction.
+    `switch` is None if it depends on none; `active` is whether the line is executed with the switch
+    on or off.
     """
 
     place: Place
@@ -70,8 +70,8 @@ class PortLine(NamedTuple):
 class Corrected(NamedTuple):
     """The corrected form of a card.
 
-    `text` is None if the correction deletes the card; `changes` if it deletes or replaces it.
-    `inserted` are number and text of the cards inserted after it.
+    `text` is None if the correction deletes the card; `changes` is whether it deletes or replaces
+    it. `inserted` has number and text of cards inserted after it.
     """
 
     text: str | None
@@ -81,12 +81,12 @@ class Corrected(NamedTuple):
 
 
 class CardView(NamedTuple):
-    """A card as a page shows it.
+    """A card as shown on a page.
 
     `card` is in brackets if the scan lacks it; `scan` has the scan's blanks, or is None. `notes`
-    have the most important kind first; `begins` are those whose range begins here, with this range
-    alone. `absent` and `otherwise` say why the port has no, or another, statement. `parallels` are
-    equal cards of other programs.
+    begin with the most important kind; `begins` has the notes whose range begins here, with this
+    range alone. `absent` is the reason why the port lacks the statement, `otherwise` why it
+    differs. `parallels` are equal cards of other programs.
     """
 
     number: int
@@ -104,9 +104,9 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A printed page: number from 1, cards, and place in the scan.
+    """A printed page: its number from 1, its cards, and its place in the scan.
 
-    `moved` explains another place; None for a page in its place.
+    `moved` explains an unexpected place, else it is None.
     """
 
     number: int
@@ -115,9 +115,9 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return the pages of a program in the order of their cards.
+    """Return the pages of a program, ordered by card.
 
-    A page begins with the lowest card of its page in the scan.
+    A page begins with its lowest card in the scan.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -134,14 +134,14 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's apparatus entries, numbered from 1."""
+    """Return a program's apparatus entries, numbered from 1 by first card."""
     having = [each for each in entries() if each["cards"].get(program)]
     having.sort(key=lambda each: numbers(each["cards"][program])[0])
     return [Note(n, each, each["cards"][program]) for n, each in enumerate(having, 1)]
 
 
 def card_views(program: str) -> list[CardView]:
-    """Return a view of each card, in order."""
+    """Return a view of each card of a program."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
     cards = list(found.cards.values())
@@ -165,7 +165,7 @@ def card_views(program: str) -> list[CardView]:
                     text,
                     text != card.text.rstrip(),
                     inserted,
-                    # By the names' first occurrence, each once.
+                    # Each name once, ordered by first occurrence.
                     list(dict.fromkeys(
                         name
                         for number in (card.number, *(number for number, _ in inserted))
@@ -203,14 +203,14 @@ def _card(card: Card) -> list[Run]:
     """Return a card's text as runs, in brackets if the scan lacks it."""
     if card.lost:
         statement = card.text.lstrip()
-        # The bracket takes the place of a blank, so that the statement keeps its columns.
+        # The bracket replaces a blank, so that the statement keeps its columns.
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]
 
 
 def _scan(card: Card) -> list[Run] | None:
-    """Return the scanned line as runs: number, dash, text; None if the scan lacks the card."""
+    """Return the scanned line as runs (number, dash, text), or None if the scan lacks the card."""
     if card.lost:
         return None
     number = Run(*card.printed) if card.printed else Run(str(card.number))
@@ -221,7 +221,7 @@ def _scan(card: Card) -> list[Run] | None:
 
 
 def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
-    """Return runs with the blanks of a line of the same characters."""
+    """Return runs with the blanks that `line`, of the same characters, has."""
     found, at = [], 0
     for run in runs:
         begin, missing = at, len(run.text)

@@ -1,6 +1,6 @@
 """The Markdown documents of `docs` as pages of the web site.
 
-`folder` is their folder, `name` a path in it.
+`folder` is the folder of the documents, `name` a path in it.
 """
 
 import posixpath
@@ -13,14 +13,14 @@ from pyharness.edition.notebooks import has_examples, notebook
 from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 
-# Suffixes of the pictures in the documents, and of all files that the site has beside them.
+# Suffixes of pictures, and of all files that the site copies with the documents.
 _PICTURES = (".png", ".svg")
 _BESIDE = (*_PICTURES, ".csv", ".schema.json")
-# The folder of documents that are not on the site.
+# The folder of documents for contributors, which the site omits.
 _OFF_SITE = "contributing/"
-# Folders of documents that are notebooks too, if they have Python examples.
+# Folders of documents that also become notebooks if they have Python examples.
 _NOTEBOOKS = ("gallery", "tutorials")
-# Documents to which other pages of the site link.
+# Documents that the site's other pages link.
 _LINKED = (
     "index.md",
     "article/article.md",
@@ -30,7 +30,7 @@ _LINKED = (
 
 
 def documents_folder(given: str | None = None) -> Path:
-    """Return `given` or the checkout's `docs`; raise InputError without documents.
+    """Return `given` or the checkout's `docs`; raise InputError if documents are missing.
 
     An installed package does not include them.
     """
@@ -65,7 +65,7 @@ def page_of(name: str) -> str:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return the documents' pictures and tables by path in the site."""
+    """Return the documents' pictures, tables and schemas, by path in the site."""
     return {
         f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
         for file in sorted(folder.rglob("*"))
@@ -74,7 +74,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def with_notebooks(folder: Path) -> list[Path]:
-    """Return the documents with Python examples, which are notebooks too."""
+    """Return the documents with Python examples, which also become notebooks."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
     return [path for path in files if has_examples(path.read_text(encoding="utf-8"))]
 
@@ -91,7 +91,7 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 
 
 def _link(folder: Path, name: str, target: str) -> str | None:
-    """Return the site's link for a document's link, or None if the site lacks the target."""
+    """Return a document's link as a link in the site, or None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target

@@ -1,7 +1,7 @@
 """Figures 6 to 12 of the thesis for the web site, drawn from computed curves.
 
-One more shows Figure 7 with the function to which omega of its original program converges as the
-step size goes to 0.
+Another picture shows Figure 7 with the function to which omega of its original program converges as
+the step size goes to 0.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ from pyharness.views.pictures import saved
 class Drawn(NamedTuple):
     """A figure, drawn with original or corrected programs.
 
-    `finding` has the curves, `files` the SVG and the CSV by name.
+    `finding` has the curves; `files` are the SVG and the CSV, by name.
     """
 
     finding: FigureFinding
@@ -32,7 +32,7 @@ class Drawn(NamedTuple):
 
 
 def draw_figures() -> dict[str, Drawn]:
-    """Return all figures, by the names of their files without suffix."""
+    """Return all figures, by file name without suffix."""
     return {
         each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))
         for each in findings()
@@ -40,16 +40,16 @@ def draw_figures() -> dict[str, Drawn]:
 
 
 def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Return Figure 7, original and corrected, and its limit, as SVG and CSV."""
+    """Return Figure 7, original, corrected and with its limit, as SVG and CSV."""
     original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
     return saved(together_picture(original, corrected), "figure-07-together.svg")
 
 
 class Printed(NamedTuple):
-    """A figure of the thesis, beside our drawings of it by file name without suffix.
+    """A figure of the thesis, with our drawings of it, by file name without suffix.
 
-    `says` has each sentence of the thesis about it with the anchor, empty for sections I to IV.
-    `ours` replaces a figure that is not drawn, else it is empty.
+    `says` has each sentence of the thesis on the figure with its anchor, which is empty for
+    sections I to IV. `ours` is the text for a figure that is not drawn, else empty.
     """
 
     number: int
@@ -61,12 +61,12 @@ class Printed(NamedTuple):
 
     @property
     def anchor(self) -> str:
-        """Return the anchor of a figure that is not drawn; drawings have their own."""
+        """Return the anchor of a figure that is not drawn, else an empty text."""
         return "" if self.drawn else f"figure-{self.number:02d}"
 
 
 def printed(figures: Mapping[str, Drawn]) -> list[Printed]:
-    """Return the thesis's figures in order, with those of `drawn`."""
+    """Return the thesis's figures in order, with our drawings from `figures`."""
     found = []
     for each in facts("figures")["printed"]:
         ours = {

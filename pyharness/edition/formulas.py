@@ -13,8 +13,8 @@ class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
     `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
-    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is that of the
-    apparatus about it, or empty.
+    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is its apparatus
+    entry, or empty.
     """
 
     number: str
@@ -26,14 +26,14 @@ class Formula(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Return ``Equation 34a`` or ``Equations 13-15``."""
+        """Return a title, as in ``Equation 34a, III.1`` or ``Equations 13-15, II.2``."""
         if not self.number:
             return f"Without a number, {self.where}"
         return f"Equation{'s' if '-' in self.number else ''} {self.number}, {self.where}"
 
 
 def formulas() -> dict[str, list[Formula]]:
-    """Return the displayed formulas, in order, by section."""
+    """Return the displayed formulas, by section."""
     found: dict[str, list[Formula]] = {}
     for each in _formulas():
         found.setdefault(each.where.partition(".")[0], []).append(each)

@@ -1,6 +1,6 @@
 """The data of the laboratory, the page that runs the programs in the browser.
 
-For readers without JavaScript there is one run.
+Readers without JavaScript see one run.
 """
 
 import re
@@ -23,11 +23,11 @@ from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
-"""The run that the page shows if the page's address does not specify a run."""
+"""The run shown if the page's address specifies none."""
 MOST_STEPS = 3000
-"""The largest number of steps of a run on the page, so that it is drawn without a noticeable delay.
+"""The largest number of steps of a run on the page, drawn without noticeable delay.
 
-They suffice for 3 s with steps of 0.001 s, a tenth of the programs' step size.
+It suffices for 3 s with steps of 0.001 s, a tenth of the programs' step size.
 """
 _KINDS = {
     "defect": "Faults left in",
@@ -42,8 +42,7 @@ def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
     `data` is the script's `window.laboratoryData`. `switches` has defects, readings and conjectures
-    by heading. `first` is the run of `DEFAULTS`. `titles` and `programs` are the names of cases and
-    programs.
+    by heading. `first` is the run of `DEFAULTS`. `titles` are the names of the cases.
     """
     given = data()
     kinds = [
@@ -88,10 +87,10 @@ def data() -> dict[str, Any]:
 
 
 def _deck_data() -> dict[str, Any]:
-    """Return the cards that run in a step, and how corrections alter them.
+    """Return the cards that are executed in a step, and how corrections alter them.
 
-    A pass is a part of a step that runs once with the same subscripts. Continuation cards are
-    joined; alterations for compilers are omitted.
+    A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
+    are joined; alterations for compilers are omitted.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}
@@ -111,7 +110,7 @@ def _deck_data() -> dict[str, Any]:
 
 
 def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
-    """Return numbers and texts of cards, without comments, FORMAT, DO and CONTINUE."""
+    """Return number and text of each statement, without comments, FORMAT, DO and CONTINUE."""
     found: list[tuple[int, str]] = []
     for number, card in deck(program).cards.items():
         text = card.text.rstrip()
@@ -133,10 +132,7 @@ def _described(scene: Scene) -> list[str]:
 
 
 def _first() -> dict[str, Any]:
-    """Return the run of `DEFAULTS`: its end, first and last rows, and largest error (rad/s).
-
-    Also the printed page, and the command that repeats the run.
-    """
+    """Return the run of `DEFAULTS`: ending, rows, largest error (rad/s), page and command."""
     scene = case_scene(DEFAULTS["case"])
     program = DEFAULTS["program"]
     run = run_program(scene, Listing.original(program), "python")

@@ -1,7 +1,7 @@
 """The data of the pages on claims, sentences and apparatus.
 
-A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. `judged` has those on all claims.
+A claim is a statement of the thesis that we test. A judgement has our verdicts on it, for original
+and corrected programs; `judged` has the judgements of all claims.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,12 +33,12 @@ class SentenceVerdicts(NamedTuple):
 
     @property
     def statements(self) -> str:
-        """Return the statements of the sentence's claims as one text."""
+        """Return the statements of the sentence's claims, joined."""
         return " ".join(each.claim["statement"] for each in self.judged)
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
-    """Return, by verdict, how many claims about results got it, original and corrected."""
+    """Return the numbers of claims about results, original and corrected, by verdict."""
     judged = [each for each in judged if each.claim["kind"] == "result"]
     found: dict[str, tuple[int, int]] = {}
     for each in judged:
@@ -67,8 +67,8 @@ def account() -> dict[str, Markup]:
 class ClaimStory(NamedTuple):
     """A claim on the claims page.
 
-    `story` is HTML in three sentences; `sentences` are pairs of place and anchor in the page of the
-    thesis; `laboratory` is a state that shows the claim, or empty.
+    `story` is HTML in three sentences. `sentences` are pairs of place and anchor on the page of the
+    thesis. `laboratory` is a state of the laboratory that shows the claim, or empty.
     """
 
     judgement: Judgement
@@ -97,7 +97,7 @@ def claim_stories(judged: Sequence[Judgement]) -> dict[str, list[ClaimStory]]:
 
 
 def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the data of the claims page: counts, stories and evidence, mostly as HTML."""
+    """Return the data of the claims page: tables, stories and evidence, mostly as HTML."""
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
@@ -113,7 +113,7 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
 def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
     """Return an HTML table of sentences and claims by section.
 
-    `sections` is from `thesis`. Only claims about results count as reproduced.
+    `sections` is the result of `thesis`. Only claims about results count as reproduced.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
@@ -140,12 +140,12 @@ def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
     """Return each entry of the apparatus with its report as HTML.
 
-    For an entry that can be switched, it shows the effect in every case.
+    The report of an entry with a switch includes its effect in every case.
     """
     found = []
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
-        # Leave out the cards, because the page shows them as links.
+        # The page shows the cards as links.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
         found.append((entry, Markup(html.sections(report.text[1:]))))
     return found

@@ -1,4 +1,4 @@
-"""The optional third-party libraries that write the pages."""
+"""The optional third-party libraries for writing the pages."""
 
 from pyharness.model.distribution import check_package, install_command
 

@@ -1,7 +1,7 @@
-"""The folder `machine` of the data package, for a reader with an emulated CDC computer.
+"""The folder `machine` of the data package, for readers with an emulated CDC computer.
 
-It has the jobs, the pages to expect, a script that compares a page with them, and a table of what
-each outcome would teach.
+It has the jobs, the expected pages, a script that compares a page with them, and a table of the
+conclusions from each outcome.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from pyharness.thesis.decks import SYSTEMS, card_steps, deck_text, job_text
 from pyharness.thesis.programs import WORD_NAMES
 from pyharness.views.csv import csv_text
 
-# The arithmetics of the machine, one for each of its two ways to compile a program.
+# The machine's arithmetics, one for each option of its compiler.
 _MACHINE = ("cdc48", "cdc48-rounded")
 _COLUMNS = "program case listing word steps card_steps page"
 _SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
@@ -76,7 +76,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of what each outcome of a job would teach."""
+    """Return a Markdown table of the conclusions from each outcome of a job."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
@@ -97,7 +97,10 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _stored(texts: dict[str, str], name: str, text: str) -> str:
-    """Store a page under its name, or return the name of an equal one."""
+    """Return the name under which a page is stored: its own, or an equal page's.
+
+    Pages in the machine's words are always stored under their own names.
+    """
     program = name.partition("-case-")[0]
     same = [known for known in texts if known.startswith(program) and texts[known] == text]
     if same and not name.removeprefix(program)[len("-case-N-") :].startswith("cdc48"):
@@ -107,7 +110,7 @@ def _stored(texts: dict[str, str], name: str, text: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield the jobs, with rounding for programs whose pages depend on it."""
+    """Yield the jobs; if rounding changes a program's page, also with rounding."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:

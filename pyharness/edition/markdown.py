@@ -1,6 +1,7 @@
 """Conversion of the project's Markdown to HTML.
 
-Anchors are GitHub's, formulas become MathML, and links between documents lead to pages.
+Anchors are GitHub's, formulas become MathML, and links between documents become links between
+pages.
 """
 
 import re
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Part(NamedTuple):
-    """The text under a heading, with anchor and title, for the search."""
+    """The text under a heading, for the search."""
 
     anchor: str
     title: str
@@ -25,7 +26,7 @@ class Part(NamedTuple):
 
 
 class Document(NamedTuple):
-    """A rendered document: title, HTML without it, and plain text by heading."""
+    """A rendered document: title, HTML without the title, and plain text by heading."""
 
     title: str
     html: Markup
@@ -35,14 +36,14 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Return a document, whose first line is its title, as HTML.
 
-    `link` maps a target to the site's, or returns None: the link becomes plain text, and a picture
-    raises ValueError.
+    `link` maps a target to the site's target or None. With None, a link becomes plain text, and a
+    picture raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):
         if token.type == "link_open":
             target = link(str(token.attrs["href"]))
-            # Without a target, the text of the link remains as plain text.
+            # Without a target, the text of the link remains.
             token.attrs = {} if target is None else {"href": target}
         elif token.type == "image":
             source = link(str(token.attrs["src"]))
@@ -52,7 +53,7 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     _anchor(tokens)
     title = tokens[1].content
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
-    # The empty cell in the corner of a table is not the head of a column.
+    # The empty cell in a table's corner is not a column head.
     html = html.replace("<th></th>", "<td></td>")
     return Document(_strip_markup(title), Markup(html), list(_split(tokens)))
 
@@ -63,7 +64,7 @@ def inline(text: str) -> Markup:
 
 
 def formula(tex: str, display: bool = False) -> Markup:
-    """Return LaTeX as MathML, on a line of its own if `display`."""
+    """Return LaTeX as MathML, as a separate line if `display`."""
     from latex2mathml.converter import convert
 
     return Markup(convert(tex, display="block" if display else "inline"))
@@ -83,7 +84,7 @@ def _parser() -> "MarkdownIt":
     )
     renderer: Any = parser.renderer
     rules = renderer.rules
-    # Elements that may be wider than the page can be scrolled separately, also by keyboard.
+    # Elements wider than the page scroll separately, also by keyboard.
     rules["table_open"] = lambda *_: f"{_OPEN}<table>\n"
     rules["table_close"] = lambda *_: "</table></div>\n"
     rules["math_block"] = _block

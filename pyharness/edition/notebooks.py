@@ -1,4 +1,4 @@
-"""Documents as Jupyter notebooks, with the outputs and pictures that they show."""
+"""Documents as Jupyter notebooks, with their outputs and pictures."""
 
 import base64
 import hashlib
@@ -8,7 +8,7 @@ from typing import Any
 
 from pyharness.views.json import json_text
 
-# An example with its output, a picture in the folder of the document, or other text.
+# An example with its output, or a picture in the folder of the document.
 _PART = re.compile(
     r"```python\n(?P<code>.*?)```(?:\n*```output\n(?P<output>.*?)```)?"
     r"|!\[[^]]*\]\((?P<picture>[^)/]+\.(?:svg|png))\)",
@@ -27,7 +27,7 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     """Return a document as a notebook, JSON in format 4.5.
 
     `pictures` has contents by file name. Links to documents become plain text, because a notebook
-    may be anywhere.
+    may be in any folder.
     """
     cells: list[dict[str, Any]] = []
     for kind, source, found in _split(text):
@@ -48,7 +48,7 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
 
 
 def _split(text: str) -> Iterator[tuple[str, str, "re.Match[str] | None"]]:
-    """Yield kind (prose, code or picture), text and match of each part."""
+    """Yield each part's kind (prose, code or picture), text and match."""
     start = 0
     for found in _PART.finditer(text):
         yield "prose", text[start : found.start()], None

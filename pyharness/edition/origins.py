@@ -1,14 +1,14 @@
-"""Links, relative to the site's root, to the disagreements of the decks."""
+"""Links to disagreements of the decks, relative to the site's root."""
 
 from pyharness.edition.markdown import slug
 from pyharness.history.origins import Disagreement, disagreements
 
 PAGE = "listing/collation.html"
-"""The path of the page in the web site."""
+"""The path of the page of disagreements."""
 
 
 def origins_of(entry: str) -> list[tuple[str, str]]:
-    """Return title and link of each disagreement about an apparatus entry."""
+    """Return title and link of each disagreement related to an apparatus entry."""
     return [_linked(each) for each in disagreements() if entry in each.entries]
 
 
@@ -23,7 +23,7 @@ def anchor_of(disagreement: Disagreement) -> str:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return the formulas and the place in the thesis of a disagreement."""
+    """Return the equations and the place in the thesis of a disagreement."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(

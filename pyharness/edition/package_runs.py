@@ -1,6 +1,6 @@
 """The runs of the programs in the data package.
 
-The article's Tables B and C follow from them and the reference solutions beside them.
+They and the reference solutions are the data of the article's Tables B and C.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.views.csv import csv_text
 
 FAULTS_CASE = 5
-"""The case in which the effects of single faults are shown; the cards give its initial omega."""
+"""The case for the effects of single faults; the cards give its initial omega."""
 
 _ENDS = "case program listing steps ended stop_step stop_variable"
 _ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"
@@ -56,7 +56,7 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the listings by program and name, those with one fault in apparatus order."""
+    """Return the listings by program and name; those with one fault are in apparatus order."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)
@@ -74,7 +74,6 @@ def _run(case: int, listing: Listing) -> Trajectory:
 
 
 def _ends() -> Iterator[list[Any]]:
-    """Yield for each run its completed steps, and how it ended."""
     for case in case_numbers():
         for (program, name), listing in _listings().items():
             run = _run(case, listing)
@@ -83,7 +82,6 @@ def _ends() -> Iterator[list[Any]]:
 
 
 def _rows(case: int) -> Iterator[list[Any]]:
-    """Yield the rows of a case's reference and runs."""
     truth = case_truth(case)
     yield from _of_curve("reference", "", truth)
     for (program, name), listing in _listings().items():
@@ -92,7 +90,6 @@ def _rows(case: int) -> Iterator[list[Any]]:
 
 
 def _of_curve(program: str, listing: str, curve: Any) -> Iterator[list[Any]]:
-    """Yield a row for each step of a trajectory or reference."""
     states = zip(curve.time.tolist(), curve.omega.tolist(), curve.velocity.tolist(), strict=True)
     for step, (time, omega, velocity) in enumerate(states, 1):
         yield [program, listing, step, time, *omega, *velocity]

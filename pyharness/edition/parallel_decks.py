@@ -17,17 +17,17 @@ from pyharness.thesis.cards import Card, deck, numbers
 
 # Parts of a statement: a relation such as .GT., a power, a name, a number, or any other character.
 _PART = re.compile(r"\.[A-Z]+\.|\*\*|[A-Z][A-Z0-9]*|\d+\.?\d*|\.\d+|\S")
-# Cards with a smaller share of equal parts are not aligned.
+# Cards with a smaller ratio of equal parts are not aligned.
 _ALIKE = 0.5
 
 
 _LABEL = "statement number"
 KINDS = (_LABEL, "name", "number", "operator", "punctuation")
-"""The kinds of differences between two statements, in the order in which a row names them."""
+"""The kinds of differences between two statements, in the order of display."""
 
 
 class _Part(NamedTuple):
-    """A part of a card: its column from 0, text and kind."""
+    """A part of a card; columns are from 0."""
 
     column: int
     text: str
@@ -35,16 +35,16 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row; a marked run has a kind of difference as `entry`."""
+    """A card in an aligned row; the `entry` of a marked run is a kind of difference."""
 
     card: Card
     runs: list[Run]
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards of decks, None where missing, and kinds of their differences.
+    """Corresponding cards by program, None where missing, and the kinds of their differences.
 
-    These are ``statement number``, ``name``, ``number``, ``operator`` and ``punctuation``.
+    The kinds are elements of `KINDS`.
     """
 
     cells: dict[str, Cell | None]
@@ -57,14 +57,14 @@ class AlignedRow(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation, its row of the collation, and the aligned cards."""
+    """An operation: its row of the collation, and the aligned cards."""
 
     row: deck_collation.Row
     aligned: list[AlignedRow]
 
 
 def operations() -> list[Operation]:
-    """Return all operations on cards, in the order of the table, without comments."""
+    """Return all operations on cards, without comments."""
     return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
 
 
@@ -79,7 +79,7 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
     """Return aligned rows with a further deck's cards inserted.
 
-    It is an order-preserving alignment with the largest sum of similarities.
+    The alignment keeps the order and has the largest sum of similarities.
     """
 
     def likeness(row: dict[str, Card], card: Card) -> float:
@@ -134,7 +134,7 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
 
 
 def _split_card(card: Card) -> list[_Part]:
-    """Return statement number and parts, without continuation marks."""
+    """Return a card's statement number and parts, without continuation marks."""
     found = [] if card.continues else _PART.finditer(card.text[:5])
     labels = [_Part(each.start(), each[0], _LABEL) for each in found]
     return labels + [

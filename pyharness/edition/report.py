@@ -1,4 +1,4 @@
-"""The reports of the verb `edition`.
+"""The reports of `edition`.
 
 `content` maps paths of written files to their content.
 """
@@ -14,24 +14,24 @@ from pyharness.history.text_digest import text_digest
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, digits, words
 
-# The file that marks a folder as written by the verb `edition`; it lists the files of the site.
+# The file that marks a folder as written by `edition`, and lists the site's files.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def listed(content: Mapping[str, bytes]) -> dict[str, Any]:
-    """Return the site's JSON: `build` has versions and compiler, `files` sizes in bytes."""
+    """Return the site's record: `build` has versions and compiler, `files` sizes in bytes."""
     return {"build": build_record(), "files": {name: len(each) for name, each in content.items()}}
 
 
 def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return number and size (kB) of the site's files by suffix."""
+    """Return the report on the site's files, with number and size (kB) by suffix."""
     text: list[Section] = [[_sizes(content)], [f"Open {folder}/index.html in a browser."]]
     return Report("edition", text, lambda: {"folder": folder, **listed(content)})
 
 
 def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return number and size (kB) of the package's files, and the package's identifier."""
+    """Return the report on the package's files, with its identifiers."""
     identifiers = {
         "package": directory_identifier(content), "data": data_identifier(), "text": text_digest(),
     }  # fmt: skip

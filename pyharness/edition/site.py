@@ -1,7 +1,7 @@
 """The pages of the web site.
 
-A page is a template with data and reports. It can be opened from a server or a file, under any
-path, without JavaScript, and loads nothing from other sites. Each result is computed once.
+A page is a template with data and reports. It works from a server or a file, under any path,
+without JavaScript, and loads nothing from other sites. Each result is computed once.
 """
 
 import json
@@ -47,8 +47,7 @@ from pyharness.views.json import json_text
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# The menu: the title of each section, and title and path of its pages. The entry of a section links
-# to its first page.
+# The menu: title and path of each section's pages. A section's entry links its first page.
 MENU = {
     "Story": (("Story", "index.html"),),
     "Programs": (
@@ -81,7 +80,7 @@ MENU = {
 
 
 class Found(NamedTuple):
-    """A place in a page, for the search; `kind` as in ``claim``."""
+    """A search entry for a place in a page; `kind` is as in ``claim``."""
 
     href: str
     title: str
@@ -90,10 +89,9 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page before it is rendered.
+    """A page before rendering.
 
-    `found` has the search entries for it. `menu` is the menu's path to highlight, by default
-    `path`.
+    `found` has its search entries.
     """
 
     path: str
@@ -107,7 +105,7 @@ class Page(NamedTuple):
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return all files of the site, content by path.
 
-    `progress` is as in `data_package`; `docs` is by default the checkout's.
+    `progress` is as in `data_package`; `docs` is by default the checkout's folder.
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
@@ -241,8 +239,7 @@ def _listed() -> set[str]:
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
     section = next(name for name, of in MENU.items() if here in [path for _, path in of])
-    # The relative path from the page to the top of the site. With relative links, the site works
-    # under any path.
+    # The relative path from the page to the site's root, so that the site works under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": here, "section": section,
@@ -279,7 +276,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return JavaScript that assigns `value`; pages without a server can't load JSON."""
+    """Return JavaScript that assigns `value`, because pages opened from files can't load JSON."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 

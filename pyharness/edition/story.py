@@ -1,7 +1,7 @@
 """The data of the story, the home page: charts and numbers of its six scenes.
 
-They are from runs of the twins; in the browser the script runs the programs again when a visitor
-changes something.
+They are from runs of the twins. In the browser, a script repeats the runs when a visitor changes a
+value.
 """
 
 import math
@@ -22,18 +22,18 @@ from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
-# The programs under the letters of the first scene, which does not tell their names at once.
+# The letters of the first scene, which hides the names of the programs at first.
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
 BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
-# The plot area of every chart in the units of its picture: left, top, right, bottom.
+# The plot area of every chart in its units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
 
 
 class Curve(NamedTuple):
-    """A curve in a chart's box; `name` selects colour and dashes."""
+    """A curve as SVG points; `name` selects colour and dashes."""
 
     name: str
     points: str
@@ -69,7 +69,7 @@ def data() -> dict[str, Any]:
 
 @cache
 def context() -> dict[str, Any]:
-    """Return the story's charts and numbers: as printed and corrected, 100 steps of 0.01 s."""
+    """Return the story's charts and numbers, from original and corrected runs of 100 steps."""
     stopped = _run(2, "runge-kutta")
     endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
@@ -136,13 +136,13 @@ def _run(
     without: tuple[str, ...] = (),
     may_stop: bool = True,
 ) -> Trajectory:
-    """Return a twin's run as printed, less some defects, or as corrected."""
+    """Return a twin's run, corrected or as printed without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
 
 def _distance(run: Trajectory, goal: Array) -> float:
-    """Return the largest distance (rad/s) of omega1 from a goal."""
+    """Return the largest distance (rad/s) of omega1 from `goal`."""
     return float(np.abs(run.omega - goal[: run.steps])[:, 0].max())
 
 
@@ -156,14 +156,14 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return how many times larger each corrected collocation error is."""
+    """Return each corrected collocation error over the corrected Runge-Kutta error."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> tuple[float, float]:
-    """Return a range of a case's true omega1, with a margin."""
+    """Return a range for a case's true omega1 (rad/s), with a margin."""
     values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
@@ -177,7 +177,7 @@ def _chart_of_case(
     y: tuple[float, float],
     in_steps: bool = False,
 ) -> Chart:
-    """Return the true omega1 over time or steps, with runs by program."""
+    """Return a chart of the true omega1 over time or steps, with runs by program."""
     scene = case_scene(case)
     times = [0.0, *scene.times()]
     x = list(range(len(times))) if in_steps else times
@@ -245,7 +245,7 @@ def _across(chart: Chart, x: float) -> float:
 
 
 def _up(chart: Chart, y: float) -> float:
-    """Return a value's height in the picture; far outside is just outside."""
+    """Return the height of a value in the picture, limited to near the plot area."""
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])
@@ -253,7 +253,7 @@ def _up(chart: Chart, y: float) -> float:
 
 
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
-    """Return a curve as an SVG polyline, as chart.js does."""
+    """Return a curve as SVG points, as chart.js does."""
     points = (
         f"{_written(_across(chart, a))},{_written(_up(chart, b))}"
         for a, b in zip(x, y, strict=True)

@@ -1,1 +1,1 @@
-"""The study of the thesis: its program listings, its figures (pictures) and its claims."""
+"""The study of the thesis: its program listings, figures and claims."""

@@ -1,4 +1,4 @@
-"""The effects of the defects of the programs on the errors of a run against the reference."""
+"""The effects of the programs' defects on the errors against the reference."""
 
 import math
 from collections.abc import Iterator
@@ -21,9 +21,9 @@ from pyharness.truth.reference import Reference, reference
 
 @dataclass(frozen=True)
 class Effect:
-    """The outcome of one listing on one scene: its largest errors, and how the run ended.
+    """The outcome of one listing on one scene.
 
-    Errors of `omega` (rad/s) and `velocity` (m/s) are over the completed `steps`.
+    Errors of `omega` (rad/s) and `velocity` (m/s) are the largest over the completed `steps`.
     """
 
     listing: Listing
@@ -36,7 +36,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The effect of one apparatus entry in one program and case, shown by four listings."""
+    """The effect of one apparatus entry in one program and case, from four listings."""
 
     program: str
     case: int
@@ -47,7 +47,7 @@ class CaseEffects:
 
 
 def entries(kind: str | None = None) -> list[dict[str, Any]]:
-    """Return the apparatus entries of one kind, or all; raise InputError without any."""
+    """Return the apparatus entries of one kind, or all; raise InputError for an unknown kind."""
     everything: list[dict[str, Any]] = facts("apparatus")["entry"]
     kinds = sorted({entry["kind"] for entry in everything})
     if kind is not None and kind not in kinds:
@@ -64,7 +64,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Run a listing on a scene, and return its errors against `truth` and how the run ended."""
+    """Return the errors of a listing's run against `truth`, and its ending."""
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
@@ -73,16 +73,16 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 @cache
 def case_truth(case: int) -> Reference:
-    """Return the reference solution of a case at its steps, with translational velocity; cached."""
+    """Return the reference solution of a case at its steps, with translational velocity."""
     scene = case_scene(case)
     return reference(scene, scene.times(), velocity=True)
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effect of the apparatus entry `name` in each of its programs, case by case.
+    """Yield the effect of the apparatus entry `name`, by program and case.
 
-    For a reading or a conjecture, `original` and `corrected_alone` are the original with and
-    without it, the others the corrected program.
+    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
+    and without it; `kept_alone` and `corrected` are the corrected listing with and without it.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -108,7 +108,7 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return the outcomes of a program with every subset of its defects, largest error first.
+    """Return a program's outcomes with every subset of its defects, largest error first.
 
     Readings and applicable conjectures vary too. A reading has no effect if a defect of its
     statement is corrected.
@@ -121,12 +121,12 @@ def lattice(
 
 
 def switched(scene: Scene, program: str) -> tuple[str, ...]:
-    """Return the defects and, for a varying torque, the conjectures of a program."""
+    """Return a program's defects and, under a varying torque, its conjectures."""
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
 def _size(found: Effect) -> tuple[float, float]:
-    # An overflow counts as worse than any finite error.
+    # An overflow is worse than any finite error.
     worst = math.inf if found.ended == "overflow" else found.omega
-    # With three digits, errors that differ by rounding alone are equal in the sort order.
+    # Rounded to three digits, so that rounding errors do not affect the order.
     return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")

@@ -1,4 +1,4 @@
-"""The reports of `defects` and `compare --ablate`: entries of the apparatus and their effects."""
+"""The reports of `defects` and `compare --ablate`: apparatus entries and their effects."""
 
 import string
 import textwrap
@@ -55,7 +55,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of one entry with the fields `names`, and of its effect if any is given."""
+    """Return the report of one entry with the fields `names`, and of any effects."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -84,7 +84,7 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend, and for each program a table of the errors of its four listings by case."""
+    """Return a legend, and a table for each program: errors of the four listings by case."""
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
@@ -107,7 +107,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report of every subset, written as letters, of each program's defects."""
+    """Return the report of each program's defect subsets, which are written as letters."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

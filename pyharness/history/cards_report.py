@@ -1,4 +1,4 @@
-"""The reports of `cards`: each card with its lines in the scan, Fortran port and Python twin."""
+"""The reports of `cards`: each card with its lines in scan, Fortran port and twin."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -23,7 +23,7 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Return the report of `cards`: each with its scan line, Fortran, twin and entries."""
+    """Return the report of `cards`, each with its scan line, Fortran, twin and entries."""
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
@@ -39,7 +39,7 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null if it agrees, and empty if it lacks the card.
+    `scan` is null if the scan agrees, and empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -62,7 +62,7 @@ def scan_report(
 ) -> Report:
     """Return the report on whether our text of the programs explains every line of a scan.
 
-    `undeclared` are disagreements of cards and apparatus.
+    `faults` are unexplained lines, `undeclared` disagreements of cards and apparatus.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -92,7 +92,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return a report that counts the apparatus entries and the cards they name, by kind."""
+    """Return the numbers of apparatus entries, and of the cards that they name, by kind."""
     entries = facts("apparatus")["entry"]
     rows = []
     for kind in dict.fromkeys(each["kind"] for each in entries):

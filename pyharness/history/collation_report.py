@@ -1,4 +1,4 @@
-"""The report of `cards --collate`: the three decks compared with each other and with the thesis."""
+"""The report of `cards --collate`: comparison of the decks with each other and the thesis."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ _COLUMNS = (
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report of the rows: for each operation, whether the texts agree."""
+    """Return the report of the agreement of decks and thesis, operation by operation."""
     told = faults([*found])
     rows = [
         [

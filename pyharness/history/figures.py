@@ -1,6 +1,6 @@
-"""Figures 6 to 12 of the thesis: the curves of omega and the reference, as pictures and a report.
+"""Figures 6 to 12 of the thesis: curves of omega and the reference, as pictures and a report.
 
-A set has the curves of the original, another those of the corrected programs.
+One set has the curves of the original programs, another those of the corrected programs.
 """
 
 import textwrap
@@ -28,7 +28,7 @@ SETS = {"original": Listing.original, "corrected": Listing.corrected}
 _CAPTIONS = {"original": "caption", "corrected": "corrected_caption"}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# Curves differ also without colour: in dash, width, marker, and position of the markers.
+# Dash, width, marker and marker position distinguish the curves without colour.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -47,7 +47,7 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """A figure of the thesis that is drawn again: its case and the programs whose curves it shows.
+    """The plan of a redrawn figure of the thesis: its case and programs.
 
     `source` supports the choice of programs; `caption` is ours.
     """
@@ -62,13 +62,13 @@ class FigurePlan:
 
     @property
     def stem(self) -> str:
-        """Return the name of the figure's files without their endings, as in `figure-10a`."""
+        """Return the name of the figure's files without endings, as in `figure-10a`."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the figure's files: two pictures, and the plotted numbers as CSV."""
+        """Return the names of the figure's files: two pictures, and the numbers as CSV."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
@@ -79,14 +79,14 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The trajectory of one listing, which a figure shows as a curve of omega over time."""
+    """The run of one listing, drawn as a curve of omega over time."""
 
     listing: Listing
     trajectory: Trajectory
 
     @property
     def ending(self) -> str:
-        """Return at which step and why the program ended early, or an empty text."""
+        """Return the step and reason of an early end, or an empty text."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -94,13 +94,13 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the curve's label in a legend: the program, and where and why it ended early."""
+        """Return the curve's label in a legend: the program, and any early end."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure with everything that is drawn: the scene, the reference solution and the curves."""
+    """A figure's data: the scene, the reference solution and the curves."""
 
     plan: FigurePlan
     scene: Scene
@@ -110,7 +110,7 @@ class FigureFinding:
 
 
 def plans() -> list[FigurePlan]:
-    """Return the plans of all figures to be drawn, first the figures of the original programs."""
+    """Return the plans of all figures, first those of the original programs."""
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
@@ -122,7 +122,7 @@ def plans() -> list[FigurePlan]:
 
 
 def findings() -> Iterator[FigureFinding]:
-    """Compute the figures in the order of `plans`; nothing is drawn."""
+    """Yield the data of the figures in the order of `plans`, without drawing."""
     truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
@@ -145,7 +145,7 @@ def _limit(
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Return the report on the files that were drawn, with a line for each figure in `findings`."""
+    """Return the report on the drawn files, with a line for each figure."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
@@ -175,7 +175,7 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 
 
 def curve_numbers(finding: FigureFinding) -> Table:
-    """Return a table of the plotted numbers of a figure: omega (rad/s) by curve and time (s)."""
+    """Return a figure's plotted numbers: omega (rad/s) by curve and time (s)."""
     truth, start = finding.reference, np.array(finding.scene.omega)
     known = [("reference", truth.omega)]
     if finding.limit is not None:
@@ -199,7 +199,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Draw a figure: each omega of the programs over time, in front of the reference solution."""
+    """Return a picture of each omega over time, in front of the reference solution."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -232,10 +232,10 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
 
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
-    """Draw omega1 of a figure of the original programs and of a corrected figure in one picture.
+    """Return omega1 of an original and of a corrected figure in one picture.
 
-    The limit in `first` shows how a run that ended early would have continued; of `second` all
-    curves cover the same line, and the last is drawn.
+    The limit in `first` shows how a run that ended early would have continued. The curves of
+    `second` coincide, so that only the last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -279,7 +279,7 @@ def _draw(
     time, omega = _from_zero(run.time), _from_zero(run.omega, start)
     style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
     height = top - bottom
-    # Clip the curve far outside the frame, because renderers fail on very large coordinates.
+    # Renderers fail on very large coordinates.
     shown = np.clip(omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
     axes.plot(time, shown, label=curve.label, zorder=3, **style | _MARKERS | other)
     if curve.ending and len(run.time):
@@ -289,11 +289,11 @@ def _draw(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the plot of one omega component.
 
-    A curve farther from the reference's range than the largest |omega| may leave it.
+    A curve farther from the reference's range than the largest |omega| may leave the plot.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
-    # A curve that is farther from the reference than the largest omega counts as diverging.
+    # Such a curve counts as diverging.
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest

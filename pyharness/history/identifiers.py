@@ -1,7 +1,7 @@
 """Software Heritage identifiers (SWHIDs) of files, folders and cards, computed offline.
 
-A SWHID (ISO/IEC 18670) is a SHA-1 hash of the content, that of git's blob or tree. Anyone who has
-the content can compute it again, and the archive finds a copy by it.
+A SWHID (ISO/IEC 18670) is git's SHA-1 hash of the content, as a blob or tree. Anyone can recompute
+it from the content, and the archive finds a copy by it.
 """
 
 from collections.abc import Collection, Mapping
@@ -15,11 +15,11 @@ from pyharness.thesis.cards import Card
 from pyharness.thesis.port_lines import PORT, port_file
 
 DATA = "pyharness/data"
-"""The folder of the edition's data in the source repository."""
+"""The path of the edition's data in the source repository."""
 
 
 def content_identifier(content: bytes) -> str:
-    """Return the SWHID of a file, which begins with ``swh:1:cnt:``."""
+    """Return the SWHID of a file, ``swh:1:cnt:...``."""
     return f"swh:1:cnt:{_hash('blob', content).hex()}"
 
 
@@ -29,13 +29,13 @@ def directory_identifier(files: Mapping[str, bytes], executable: Collection[str]
 
 
 def identifier_of_lines(identifier: str, first: int, last: int | None = None) -> str:
-    """Return the SWHID of a file, qualified by a line or a range of lines, counted from 1."""
+    """Return the SWHID of a file, qualified by a line or a range of lines, from 1."""
     return f"{identifier};lines={first}" + ("" if last is None else f"-{last}")
 
 
 @cache
 def source_files() -> dict[str, bytes]:
-    """Return the files of the edition's data and of the Fortran port, by path in the repository.
+    """Return the files of the edition's data and of the Fortran port, by repository path.
 
     An installed package has some of them in other places.
     """
@@ -51,7 +51,7 @@ def source_files() -> dict[str, bytes]:
 
 
 def data_identifier() -> str:
-    """Return the SWHID of the folder `DATA`, as in the source repository."""
+    """Return the SWHID of the folder `DATA` in the source repository."""
     data = Path(DATA)
     return directory_identifier(
         {
@@ -63,21 +63,21 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return the SWHID of a card: that of ``cards/<program>.toml``, qualified by its line."""
+    """Return the SWHID of a card: its deck's file, qualified by its line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return identifier_of_lines(content_identifier(content), card_lines(content)[card.number])
 
 
 @cache
 def card_lines(content: bytes) -> dict[int, int]:
-    """Return the line, counted from 1, of each card in the file of a deck, by card number."""
+    """Return each card's line, from 1, in the file of a deck, by card number."""
     lines = enumerate(content.decode().splitlines(), 1)
     keys = ((line.partition(" = ")[0], number) for number, line in lines)
     return {int(key): number for key, number in keys if key.isdigit()}
 
 
 def _hash(kind: str, content: bytes) -> bytes:
-    # The identifiers are defined by SHA-1; nothing here depends on its resistance to attacks.
+    # The standard prescribes SHA-1; its resistance to attacks does not matter here.
     return sha1(f"{kind} {len(content)}\0".encode() + content, usedforsecurity=False).digest()
 
 

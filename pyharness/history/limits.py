@@ -2,7 +2,7 @@
 
 An original program may converge to the solution of Euler's equations, to another function of time,
 or to no function (docs/article/article.md). Each limit is computed independently of the programs,
-which are compared with it while the step is halved. `effort` multiplies the work limit of some ten
+and compared with their runs as the step is halved. `effort` multiplies the work limit of some ten
 seconds.
 """
 
@@ -46,7 +46,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """The distances (rad/s) of a run from limit and reference, infinite after an overflow."""
+    """A run's largest distances (rad/s) from limit and reference, infinite after an overflow."""
 
     step_size: float
     from_limit: float
@@ -55,10 +55,10 @@ class Halving:
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of an original program as the step size goes to zero, and the order of convergence.
+    """The limit of an original program as the step size goes to zero, and the convergence.
 
-    `order` is from the last two halvings; None if one is rounding or overflows, without a limit, or
-    if the limit is unbounded at `blow_up` (s).
+    `order` is from the last two halvings. It is None if one is only rounding or overflows, without
+    a limit, or if the limit is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -69,7 +69,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a phrase on the convergence to the limit, as in `order 1.00 toward the limit`."""
+        """Return a phrase on the convergence, as in `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -79,9 +79,9 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Measure how an original program, without its stop test, converges to its limit.
+    """Return the convergence of an original program, without stop test, to its limit.
 
-    Under a varying torque only the Runge-Kutta program has one, which is integrated. Raise
+    Under a varying torque only the Runge-Kutta program has a limit, which is integrated. Raise
     InputError above the work limit.
     """
     times = scene.times()
@@ -102,7 +102,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
     scale = float(np.abs(truth.omega).max(initial=0.0))
-    # Bound on the rounding error of all steps, for numbers as large as omega.
+    # Bound on the rounding errors of all steps, for numbers of the size of omega.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise
     return Limit(
@@ -162,9 +162,9 @@ def _extrapolated(scene: Scene) -> Rate:
 
 
 def _slow_slopes(scene: Scene) -> Rate:
-    """Return the right-hand side of the Runge-Kutta program's limit equations, for varying torque.
+    """Return the right-hand side of the Runge-Kutta program's limit, under varying torque.
 
-    Let p be what U(1) holds, at which the first slopes of a step are taken. Each step of size h
+    Let p be what U(1) holds, at which the first slopes of a step are evaluated. Each step of size h
     adds h/2 F(p) to p, and h F(p) to the printed omega, where F is the right-hand side of Euler's
     equations. The state is p, then the printed omega.
     """
@@ -182,7 +182,7 @@ def _solved(
 ) -> tuple[Array, float | None]:
     """Return the solution at `times` (s), NaN after a blow-up, and the blow-up time (s) or None.
 
-    It is when a component reaches a million times `scale` (rad/s).
+    At the blow-up a component reaches a million times `scale` (rad/s).
     """
     from scipy.integrate import solve_ivp
 
@@ -213,12 +213,12 @@ def _solved(
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # without any time, y is an empty list
         rows[: len(result.t)] = result.y.T
-    # The solver ends at the bound, or just before it if no step is small enough.
+    # The solver ends at the bound, or just before it if its step becomes too small.
     return rows, latest if result.status else None
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects whose correction alone changes nothing beyond rounding."""
+    """Return, by program, the defects whose correction alone changes omega by rounding at most."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))
@@ -240,7 +240,7 @@ def _same(first: Array, second: Array) -> bool:
 def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
-    """Return the report of `pyharness limits`: the programs' distances from their limits."""
+    """Return the report of `limits`: the programs' distances from their limits."""
     text: list[Section] = [heading(scene)]
     data = []
     for each in found:

@@ -1,6 +1,6 @@
-"""A page printed by any machine, compared with the pages that our programs print.
+"""Comparison of a page from any machine with our programs' pages.
 
-The digits show in which of our arithmetics a program ran.
+The digits show the arithmetic in which a program ran.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ _LARGEST = 1 << 24  # largest size of a page's file, in bytes
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return a page's lines of numbers alone; raise InputError if none has at least six."""
+    """Return a page's lines of numbers; raise InputError if no line has at least six."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
@@ -49,11 +49,11 @@ def fits(
     cases: Sequence[int],
     progress: Progress = no_progress,
 ) -> list[Fit]:
-    """Compare a page from another machine with those of our pages that have the same form.
+    """Compare a page from another machine with our pages of the same form.
 
-    The form is the moments and torques in the heading and the number of columns. Our runs have the
-    steps of the text of the thesis, or of the cards for a longer page. The nearest is first. Raise
-    InputError if none of our pages has the form.
+    The form is the moments and torques in the heading and the number of columns. Our runs have as
+    many steps as in the text of the thesis or, for a longer page, on the cards. The nearest page is
+    first. Raise InputError if no page has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -80,7 +80,7 @@ def fits(
 
 
 def listings_of(program: str) -> dict[str, Listing]:
-    """Return a program's original, its corrected and the original with each other reading."""
+    """Return a program's listings: original, corrected, and original with each other reading."""
     readings = names_of("reading", program)
     return {
         "original": Listing.original(program),
@@ -91,7 +91,7 @@ def listings_of(program: str) -> dict[str, Listing]:
 
 @cache
 def our_page(listing: Listing, case: int, steps: int, word: str) -> str:
-    """Return the page that a listing prints in a case, in the arithmetic `word`; cached."""
+    """Return the page that a listing prints in a case, in the arithmetic `word`."""
     scene = replace(case_scene(case), steps=steps)
     return page(scene, listing.program, run_program(scene, listing, "python", word=word))
 
@@ -101,7 +101,7 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 
 
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
-    """Return the report on which program, listing and arithmetic print the page in file `path`."""
+    """Return the report on the program, listing and arithmetic of the page in file `path`."""
     best = found[0]
     rows = [
         [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]

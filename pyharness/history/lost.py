@@ -1,10 +1,11 @@
 """The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
 
-The thesis does not print its programs for subdomain, Galerkin and least squares, which by IV.2 gave
-no meaningful results in Cases 1 and 2, where the solution is known. Each entry of `data/lost.toml`
-is a conjecture: a mistake that such a program could have had. The method is that of IV.2: a trial
-function of two terms, the products written out as polynomials, one solution for a constant
-right-hand side, and one correction. It fails if its error exceeds a tenth of the largest omega.
+The thesis does not print its programs for subdomain, Galerkin and least squares. According to IV.2
+they gave no meaningful results in Cases 1 and 2, where the solution is known. Each entry of
+`data/lost.toml` is a conjecture: a mistake that such a program may have had. The method is from
+IV.2: a trial function of two terms, the products written out as polynomials, one solution for a
+constant right-hand side, and one correction. It fails if its error exceeds a tenth of the largest
+omega.
 """
 
 from collections.abc import Sequence
@@ -26,14 +27,14 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.reference import reference
 
 WEIGHTINGS = ("subdomain", "galerkin", "least-squares")
-# The cases with a known solution, with which IV.2 could compare a program.
+# The cases with a known solution.
 CASES = (1, 2)
 TERMS = 2
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """The result of one method, programmed with one mistake, on Cases 1 and 2.
+    """The result of one method with one mistake on Cases 1 and 2.
 
     `shares` has the error over the largest omega by case, `failed` the cases above the limit.
     """
@@ -54,17 +55,17 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return how many methods fail with this mistake in both cases."""
+        """Return the number of methods that fail with this mistake in both cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return how many methods fail with this mistake in at least one case."""
+        """Return the number of methods that fail with this mistake in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Run each method with each mistake, and rank the mistakes by failures in both cases."""
+    """Return the mistakes with the results of each method, by failures in both cases."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -89,10 +90,10 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Integrate a scene of constant torque by a method that is programmed with one mistake.
+    """Return omega by a method with one mistake, under constant torque.
 
-    Return omega (rad/s), shape (steps, 3); NaN from an overflow on. The scene's numbers determine
-    the arithmetic.
+    Its shape is (steps, 3), in rad/s, with NaN from an overflow on. The type of the scene's numbers
+    determines the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -102,7 +103,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     weighted_over: float | None = None  # interval length (s) for which the matrix was computed
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
-            # The residual is weighted over (0, length); omega is evaluated at h with any mistake.
+            # The residual is weighted over (0, length); omega is always evaluated at h.
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
             if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)
@@ -124,7 +125,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2, columns of polynomials in t."""
+    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2, polynomials in t by column."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -134,7 +135,7 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals over (0, length) (s) of 1 and 2 t, a row for each weight."""
+    """Return the weighted integrals over (0, length) (s) of 1 and 2 t, one row per weight."""
     columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
     return np.array(columns).T
 
@@ -147,13 +148,12 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     if mistake == "transposed":
         matrix = matrix.T
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites its matrix with the factors; the second call takes these as the matrix.
+        # LEQT1F overwrites its matrix with the factors, which the second call uses as the matrix.
         matrix = _factors(matrix)
     if mistake == "unscaled-solver":
         (a, b), (c, d) = matrix
         x, y = right.T
-        # The array is the left operand, so that NumPy applies the number's own arithmetic to each
-        # element.
+        # With the array as left operand, NumPy applies the number's arithmetic to each element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
@@ -167,7 +167,7 @@ def _power(exponent: int) -> Array:
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals over (0, length) of a polynomial times each of the two weights."""
-    # Plain numbers, because NumPy's polynomials of machine words take several times as long.
+    # NumPy's polynomials of machine words take several times as long.
     coefficients = residual.tolist()
     found = []
     for k in range(TERMS):
@@ -181,7 +181,7 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
         integral = [0.0] * (power + 1)
         integral += [factor * x / (i + power + 1) for i, x in enumerate(coefficients)]
         value = _value(integral, high)
-        # Every integral from 0 is 0 there.
+        # Every integral is 0 at 0.
         found.append(value if low == 0.0 else value - _value(integral, low))
     return found
 
@@ -200,7 +200,7 @@ def _factors(matrix: Array) -> Array:
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step reduces the error of a method without mistake."""
+    """Return the factor by which halving the step reduces a method's error, without mistake."""
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 

@@ -1,6 +1,6 @@
-"""Disagreements of the decks and the thesis, and what they suggest about the origin of faults.
+"""Disagreements of the decks and the thesis, and their evidence on the origin of faults.
 
-The table `data/disagreements.toml` keeps what the sources say apart from what we infer.
+The table `data/disagreements.toml` separates the sources' statements from our inferences.
 """
 
 from collections import Counter
@@ -15,16 +15,16 @@ from pyharness.thesis.cards import deck, numbers, tight
 from pyharness.thesis.deck_collation import Row, rows
 
 CERTAINTIES = tuple(CERTAINTY)
-"""The degrees of certainty of an inference, which are those of the apparatus."""
+"""The degrees of certainty of an inference, as in the apparatus."""
 
 
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    `steps` are those of `data/cards/collation.toml`, `equations` formulas of the thesis, `where`
-    and `says` its place and words, `cards` texts by program and number. `known` is what the sources
-    say, `suggests` and `origin` what we infer; `unnoticed`, why the test cases do not show the
-    fault.
+    `steps` are from `data/cards/collation.toml`, `equations` are formulas of the thesis, `where`
+    and `says` a place in it and its words, `cards` are texts by program and number. `known` is from
+    the sources; `suggests` and `origin` are our inferences. `unnoticed` is the reason why the test
+    cases do not show the fault.
     """
 
     id: str
@@ -44,33 +44,36 @@ class Disagreement(NamedTuple):
 
 
 def disagreements() -> list[Disagreement]:
-    """Return all disagreements in the order of the table `data/disagreements.toml`."""
+    """Return all disagreements in the table's order."""
     return [_disagreement(each) for each in facts("disagreements")["disagreement"]]
 
 
 def origins() -> dict[str, str]:
-    """Return the description of each kind of origin, by its name."""
+    """Return the descriptions of the kinds of origin, by name."""
     return dict(facts("disagreements")["origin"])
 
 
 def unexplained_defects() -> dict[str, str]:
-    """Return, by identifier, why no disagreement explains certain defects of the apparatus."""
+    """Return the reasons why no disagreement explains some defects, by identifier."""
     return dict(facts("disagreements")["unexplained"])
 
 
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements that two decks share, by programs, with uniform names."""
+    """Return the number of statements shared by each pair of programs.
+
+    If `scanned_names`, names are as in the scan; else they are uniform.
+    """
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 
 
 def statement_count(program: str) -> int:
-    """Return the number of cards of a program that are not comments."""
+    """Return the number of a program's cards, without comments."""
     return len(_statements(program))
 
 
 def mistakes() -> list[str]:
-    """Return one sentence for each mistake in the table of disagreements."""
+    """Return a sentence for each mistake in the table of disagreements."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

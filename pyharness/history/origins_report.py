@@ -1,4 +1,4 @@
-"""The report of `cards --origins`: disagreements, and the origins of faults that they suggest."""
+"""The report of `cards --origins`: disagreements and supposed origins of faults."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ _COLUMNS = (
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
-    """Return the report of the disagreements, their supposed origins, and mistakes in the table."""
+    """Return the report of disagreements, their origins, and mistakes in the table."""
     rows = [
         [
             each.id, "".join(_SHORT[program] for program in each.cards) or "-",

@@ -14,18 +14,18 @@ from itertools import zip_longest
 from pathlib import Path
 
 PAGES = "pages.csv"
-"""The table of the pages that the script compares, in its own folder."""
+"""The table of the pages to compare, in the script's folder."""
 
-# A number as FORMAT writes it: asterisks if it does not fit, R or I (CDC) if it is not finite.
+# A number as FORMAT writes it: asterisks if too long, R or I (CDC) if not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
 _LEAST = 6  # every row of results has at least six numbers, and no line of the heading has
 SHOWN = 5
-"""How many differences are shown if no page is equal."""
+"""The number of differences to show if no page is equal."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A printed number, counted by row and place from 1, that differs between two pages."""
+    """A printed number that differs between two pages; row and place are from 1."""
 
     row: int
     place: int
@@ -35,10 +35,10 @@ class Difference:
 
 @dataclass(frozen=True)
 class Fit:
-    """The comparison of a page from another machine with a page that our programs print.
+    """The comparison of a page from another machine with one of our pages.
 
     `listing` is ``original``, ``corrected`` or ``original with`` a reading; `word` is the
-    arithmetic; `fields` are compared numbers.
+    arithmetic; `fields` is the number of compared numbers.
     """
 
     program: str
@@ -50,28 +50,28 @@ class Fit:
 
     @property
     def is_whole(self) -> bool:
-        """Return whether the two pages print every number alike."""
+        """Return whether all numbers of the pages are equal."""
         return not self.differences
 
     @property
     def name(self) -> str:
-        """Return text that names our page, as in `two-term, case 2, original, in binary64`."""
+        """Return the name of our page, as in `two-term, case 2, original, in binary64`."""
         return f"{self.program}, case {self.case}, {self.listing}, in {self.word}"
 
 
 def printed_numbers(text: str) -> list[list[str]]:
-    """Return the lines of `text` that contain only numbers, each as a list of its numbers."""
+    """Return the lines of `text` that contain only numbers, each as a list of numbers."""
     lines = [line.split() for line in text.splitlines()]
     return [line for line in lines if line and all(map(_FIELD.fullmatch, line))]
 
 
 def has_rows(lines: Iterable[Sequence[str]]) -> bool:
-    """Return whether some lines of numbers include a row of results, with at least six numbers."""
+    """Return whether a line has at least six numbers, as a row of results has."""
     return any(len(line) >= _LEAST for line in lines)
 
 
 def split_page(lines: Sequence[list[str]]) -> tuple[list[list[str]], list[list[str]]]:
-    """Return the lines of numbers in the heading (moments and torques), and the rows of results."""
+    """Return the heading's lines of numbers (moments and torques), and the rows of results."""
     begin = next((n for n, line in enumerate(lines) if len(line) >= _LEAST), len(lines))
     return [*lines[:begin]], [*lines[begin:]]
 
@@ -79,7 +79,7 @@ def split_page(lines: Sequence[list[str]]) -> tuple[list[list[str]], list[list[s
 def rows_of_form(
     lines: Sequence[Sequence[str]], head: Sequence[Sequence[str]], width: int
 ) -> list[Sequence[str]]:
-    """Return the rows with `width` numbers, or nothing if the page lacks the heading `head`."""
+    """Return the rows with `width` numbers; empty if the page lacks the heading `head`."""
     wanted, size = [list(line) for line in head], len(head)
     starts = range(len(lines))
     if not any([list(line) for line in lines[at : at + size]] == wanted for at in starts):
@@ -88,14 +88,14 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return how many steps our run needs: those of the text, or of the cards for a longer page."""
+    """Return the steps for our run: those of the text, or of the cards for a longer page."""
     return card_steps if rows > steps else steps
 
 
 def compare_rows(
     theirs: Sequence[Sequence[str]], ours: Sequence[Sequence[str]]
 ) -> tuple[int, tuple[Difference, ...]]:
-    """Return how many numbers are compared, and those that differ; a missing one is a dash."""
+    """Return the count of compared numbers, and the differences; a missing number is a dash."""
     none: Sequence[str] = ()
     places = [
         (row, place, x, y)
@@ -106,7 +106,7 @@ def compare_rows(
 
 
 def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
-    """Compare a page with those in `folder` of the same form, the nearest first."""
+    """Return the comparisons of a page with pages of the same form in `folder`, nearest first."""
     found = []
     with open(folder / PAGES, newline="", encoding="ascii") as file:
         for each in csv.DictReader(file):
@@ -124,14 +124,14 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return the lines that name our pages equal to that in the file `path`, else the nearest."""
+    """Return lines that name our pages equal to the page in file `path`, else the nearest."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with the pages in `folder`, print the result, return a status."""
+    """Compare the page in a file with those in `folder`, print the result, return the status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

@@ -10,14 +10,14 @@ CHANGES = {
     "changed": "altered entries",
     "removed": "removed entries",
 }
-"""The fields of a revision that name entries of the apparatus, each with its heading."""
+"""The fields of a revision that name apparatus entries, with headings."""
 
 
 class Revision(NamedTuple):
     """A change of the edition's text, the cards and the apparatus.
 
-    `digest` is that of the text after it, empty if the cards were not yet data. `cards` has, by
-    program, numbers as ``750-770, 800``.
+    `digest` identifies the text after the change, and is empty if the cards were not yet data.
+    `cards` has numbers by program, as in ``750-770, 800``.
     """
 
     date: str
@@ -30,7 +30,7 @@ class Revision(NamedTuple):
 
 
 def revisions() -> tuple[Revision, ...]:
-    """Return the revisions of the edition's text, newest first."""
+    """Return the revisions, newest first."""
     return tuple(_revision(row) for row in facts("revisions")["revision"])
 
 

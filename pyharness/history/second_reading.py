@@ -1,8 +1,8 @@
-"""An estimate of the transcription errors that remain, by capture and recapture.
+"""An estimate of the remaining transcription errors, by capture and recapture.
 
-The first reading of the scan is our text of the cards, the second a random sample that was read
-again (`data/cards/second-reading.toml`). Misreadings that both or only one corrects give an
-estimate of those that neither does.
+The first reading of the scan is our text of the cards; the second is a random sample that was read
+again (`data/cards/second-reading.toml`). The numbers of misreadings that both or only one reading
+corrects give an estimate of the uncorrected ones.
 """
 
 import random
@@ -26,7 +26,7 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample without blanks; the first reading has names that we made uniform."""
+    """A card of the sample, with texts without blanks; `first` has the scan's names."""
 
     card: Card
     scan: str
@@ -50,7 +50,7 @@ class Recapture(NamedTuple):
 
     @property
     def uncorrected(self) -> int:
-        """Return the upper limit of the number of misreadings that our text does not correct."""
+        """Return the upper limit of the number of misreadings left in our text."""
         return self.upper - self.first
 
 
@@ -63,7 +63,7 @@ def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of the size of a population.
 
     With independent samples, the number in both is hypergeometric. Neither of its tails from `both`
-    on is below 0.025. `both` must be positive, else there is no upper limit.
+    on is below 0.025. Raise ValueError if `both` is 0, when there is no upper limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -86,7 +86,7 @@ def _probability(size: int, first: int, second: int, begin: int, end: int) -> fl
 
 
 def sample() -> list[Card]:
-    """Return the cards that the second reading must contain, in the order of the decks."""
+    """Return the cards required in the second reading, ordered as in the decks."""
     given = facts("cards/second-reading")
     size = sum(len(given[program]) for program in PROGRAMS)
     drawn = set(random.Random(given["seed"]).sample([*witness_lines()], size))
@@ -94,7 +94,7 @@ def sample() -> list[Card]:
 
 
 def read_cards() -> Iterator[ReadCard]:
-    """Yield each card of the second reading with the scan and the first reading."""
+    """Yield each card of the second reading with its texts."""
     given = facts("cards/second-reading")
     for program in PROGRAMS:
         for number, text in given[program].items():
@@ -106,9 +106,9 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return the text of a reading at each place of a scan's line that differs, by index.
+    """Return the text of a reading at each differing place of a scan's line, by index.
 
-    Inserted characters belong to the one before, or to -1.
+    Inserted characters belong to the previous place, or to -1.
     """
     found: dict[int, str] = {}
     matcher = SequenceMatcher(None, scan, reading, autojunk=False)
@@ -116,7 +116,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
         if what == "insert":
             found[begin - 1] = reading[first:last]
         elif what != "equal":
-            # The last place has the characters that are more than those of the scan.
+            # The last place has any additional characters.
             for place in range(begin, end):
                 at = first + place - begin
                 found[place] = reading[at : last if place == end - 1 else min(at + 1, last)]
@@ -126,7 +126,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> list[Recapture]:
     """Return the estimates with places and with whole cards as units.
 
-    A machine misreads a letter in the same way several times; whole cards avoid this dependence.
+    Whole cards avoid the dependence of a machine's repeated misreading of a letter.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
@@ -145,7 +145,7 @@ def disagreeing() -> list[ReadCard]:
 
 
 def second_reading_report() -> Report:
-    """Return the report that compares the two readings, with the estimated misreadings."""
+    """Return the report on the two readings and the estimated misreadings."""
     found, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

@@ -1,9 +1,10 @@
 """The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
-Cards are in order. A `pb` element marks the beginning of a page, with its position `n` in the scan;
-an `app` element a difference: `lem` is our reading, `rdg` the scan's. An `fw` element is a heading
-added by an editor, a `surplus` text that belongs to no card. To restore the scan, take the pages in
-the order of `n`, each `rdg` instead of its `lem`, and the lines of cards, `fw` and `surplus`.
+Cards are in order. A `pb` element marks the beginning of a page, with its position `n` in the scan.
+An `app` element is a difference: `lem` is our reading, `rdg` the scan's. An `fw` element is a
+heading added by an editor, a `surplus` text that belongs to no card. To restore the scan, take the
+pages in the order of `n`, each `rdg` instead of its `lem`, and the lines of cards, `fw` and
+`surplus`.
 """
 
 from collections.abc import Iterator
@@ -34,12 +35,12 @@ _HEAD = (
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
     'schematypens="http://relaxng.org/ns/structure/1.0"?>\n'
 )
-# The fields of an apparatus entry that the document shows.
+# The fields of an apparatus entry in the document.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
 
 class _Page(NamedTuple):
-    """A page of the scan; `moved` is the note on why it is elsewhere, if it is."""
+    """A page of the scan; `moved` explains an unexpected place, else it is None."""
 
     number: int
     lines: list[Any]
@@ -51,7 +52,7 @@ class _Page(NamedTuple):
 
 
 def tei_document() -> bytes:
-    """Return the cards of the programs and the apparatus as a TEI document, in UTF-8."""
+    """Return the cards and the apparatus as a TEI document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(XML + "lang", "en")
     add_header(root)
@@ -62,7 +63,7 @@ def tei_document() -> bytes:
     _apparatus(named(back, "div", type="apparatus"))
     _places(named(back, "div", type="places"))
     _bibliography(named(back, "div", type="bibliography"))
-    # Indentation adds blanks, which are significant in a card: the cards are filled in after it.
+    # Indentation adds blanks, which are significant in cards; these are therefore filled in later.
     xml.indent(root)
     for block, card in blocks:
         _fill(block, card)
@@ -81,7 +82,7 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
         for item in page.lines:
             if isinstance(item, str):
                 for number in numbers(item):
-                    # A lost card is on no page; it precedes the next card that is on a page.
+                    # A lost card, which is on no page, precedes the next card on a page.
                     while lost and lost[0] < number:
                         card = cards[lost.pop(0)]
                         yield _block(div, card), card

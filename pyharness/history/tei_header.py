@@ -1,4 +1,4 @@
-"""The header of the TEI document, and the elements that all its parts use."""
+"""The header of the TEI document, and functions for elements in all its parts."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -13,7 +13,7 @@ TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
 XML = "{http://www.w3.org/XML/1998/namespace}"
 EDITORS = "editors"
-"""The XML identifier of those who are responsible for the edition."""
+"""The XML identifier of the edition's editors."""
 
 KINDS = {
     "defect": "a fault of the author, kept in the text",
@@ -27,7 +27,7 @@ KINDS = {
     "missing text": "cards or pages that the scan or the report does not have",
     "dialect": "what only the FORTRAN of the machine explains",
 }
-"""The kinds of entries of the critical apparatus, and what each kind contains."""
+"""The kinds of apparatus entries, with their contents."""
 
 CERTAINTY = {
     "certain": "high",
@@ -35,11 +35,11 @@ CERTAINTY = {
     "conjecture": "low",
     "undecidable": "unknown",
 }
-"""The degrees of certainty in the apparatus, and the values of `cert` in TEI."""
+"""The degrees of certainty in the apparatus, with the values of `cert` in TEI."""
 
 
 def add_header(root: xml.Element) -> None:
-    """Append the header of the document to its root."""
+    """Append the header to the document's root."""
     edition, scan = facts("edition"), facts("cards/scan")
     header = xml.SubElement(root, "teiHeader")
     file = xml.SubElement(header, "fileDesc")
@@ -70,9 +70,9 @@ def add_header(root: xml.Element) -> None:
 
 
 def sources(entry: dict[str, Any]) -> str:
-    """Return the pointers to the parts of the scan from which an apparatus entry is known.
+    """Return the pointers to the parts of the scan that support an apparatus entry.
 
-    The text is a part if the entry rests on it or on results, or names no card.
+    The text is included if the entry is based on it or on results, or names no card.
     """
     parts = ["appendix"] if entry["cards"] else []
     if not parts or {"T", "R"} & set(entry["grounds"]):
@@ -81,7 +81,7 @@ def sources(entry: dict[str, Any]) -> str:
 
 
 def named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> xml.Element:
-    """Append an element with identifier and further attributes to a parent, and return it."""
+    """Return an element appended to a parent, with an identifier and attributes."""
     attributes = {} if id is None else {XML + "id": id}
     return xml.SubElement(parent, tag, {**attributes, **more})
 
@@ -89,7 +89,7 @@ def named(parent: xml.Element, tag: str, id: str | None = None, **more: str) -> 
 def with_text(
     parent: xml.Element, tag: str, text: str, id: str | None = None, **more: str
 ) -> xml.Element:
-    """Append an element that contains a text to a parent, and return it."""
+    """Return an element appended to a parent, with a text."""
     element = named(parent, tag, id, **more)
     element.text = text
     return element
@@ -173,7 +173,7 @@ def _revisions(described: xml.Element) -> None:
 
 
 def _targets(revision: Revision) -> Iterator[str]:
-    """Yield pointers to what a revision added or changed, if it is still in the document."""
+    """Yield pointers to a revision's added or changed elements that still exist."""
     present = {entry["id"] for entry in facts("apparatus")["entry"]}
     yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)
     for program, cards in revision.cards.items():

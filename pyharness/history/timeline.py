@@ -1,4 +1,4 @@
-"""The dates of the thesis in `data/timeline.toml`; each is supported by its source."""
+"""The dates of the thesis in `data/timeline.toml`, with their sources."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ CERTAINTIES = {
     "probable": "the source reports the event, and its date follows from another entry",
     "unknown": "no source dates the event",
 }
-"""The degrees of certainty of a date, each with its meaning."""
+"""The degrees of certainty of a date, with their meanings."""
 _MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
     *("July", "August", "September", "October", "November", "December"),
@@ -19,8 +19,8 @@ _MONTHS = (
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, empty if no source dates it; `why` says how an
-    uncertain date was found.
+    `first` and `last` are months, as in ``1979-01``, or empty if no source dates it; `why` explains
+    an uncertain date.
     """
 
     id: str
@@ -46,7 +46,7 @@ class Event(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """A question about the history of the thesis, and what its text lacks to answer it."""
+    """A question about the history of the thesis, and what its text lacks for an answer."""
 
     question: str
     answer: str

@@ -1,7 +1,7 @@
-"""The effect of the word length: runs in emulated arithmetics of p bits, compared with binary64.
+"""The effect of word length: runs in emulated arithmetics of p bits, against binary64.
 
 An arithmetic is a number p of significand bits and a rounding rule. A run's printed page is
-compared with that in binary64, and its omega with the reference solution.
+compared with the page in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +21,7 @@ from pyharness.thesis.word import RULES, Word
 from pyharness.truth.reference import reference
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
-# With 113 bits, rounding is negligible: the error is the truncation error of the method alone.
+# With 113 bits, rounding is negligible, so that the error is the method's truncation error.
 DOUBLE, WIDEST = Word(53), Word(113)
 
 
@@ -30,9 +30,9 @@ class WordRun:
     """A run of a program in one arithmetic, compared with binary64.
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
-    rounded operations of the CDC 6600. `stop` says why and where the run ended early, as in ``V2 at
-    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is in rad/s;
-    `singular` counts rows with IER = 129.
+    rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
+    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is the largest
+    error of omega (rad/s); `singular` counts rows with IER = 129.
     """
 
     case: int
@@ -56,7 +56,7 @@ class WordCell:
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
-        """Return the run with p bits and a rounding rule, if there is one."""
+        """Return the run with p bits and a rounding rule, or None."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
@@ -75,7 +75,7 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
-    """Run the programs on the cases in every arithmetic, in binary64 and with 113 bits."""
+    """Yield the runs of the programs on the cases, in binary64, with 113 bits, and others."""
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
         (case, listing)
@@ -95,7 +95,7 @@ def cells(
 
 
 class _Judge:
-    """The comparison of a program's runs with its run in binary64 and the reference."""
+    """The comparison of a program's runs with binary64 and the reference."""
 
     def __init__(self, scene: Scene, listing: Listing) -> None:
         self.scene, self.listing = scene, listing

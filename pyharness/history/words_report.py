@@ -1,4 +1,4 @@
-"""The report of the verb `words`: the effect of word length and of the CDC's arithmetic on runs."""
+"""The report of `words`: the effect of word length and of the CDC's arithmetic."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
@@ -12,7 +12,7 @@ from pyharness.thesis.word import RULES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# An error above this multiple of the error with 113 bits counts as due to rounding.
+# Multiple of the error with 113 bits above which an error counts as rounding.
 ROUNDS = 2.0
 _FIELDS = " ".join(field.name for field in fields(WordRun))
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
@@ -26,7 +26,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 def words_report(cells: Sequence[WordCell]) -> Report:
-    """Return the report of `pyharness words`; all cells have the same numbers of bits."""
+    """Return the report of `words`; all cells must have the same numbers of bits."""
     runs = [run for cell in cells for run in cell.runs]
     data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
     tables: list[Section] = [
@@ -139,7 +139,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Draw the largest error of omega (rad/s) against p; a dashed line has 113 bits."""
+    """Return a picture of omega's largest error (rad/s) against p; a dashed line for 113 bits."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

@@ -1,1 +1,1 @@
-"""Comparison of programs, methods and prepared solvers with each other and the true solution."""
+"""Comparison of programs, methods and prepared solvers with each other and with the reference."""

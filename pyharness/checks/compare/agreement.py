@@ -1,7 +1,4 @@
-"""Errors of a trajectory against the reference, and differences between Fortran and Python.
-
-The Fortran programs and their Python ports, the twins, should agree bit for bit.
-"""
+"""Errors of a trajectory against the reference, and differences between Fortran and Python."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,7 +14,7 @@ from pyharness.truth.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """The errors of a trajectory against the reference, and its drifts without torque."""
+    """The errors of a trajectory against the reference, and its drifts of conserved quantities."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component of the translational velocity (m/s)
@@ -38,9 +35,10 @@ class Accuracy:
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against `truth`, up to the end of the shorter.
+    """Return the errors of a trajectory against `truth`, up to the end of the shorter one.
 
-    They are infinite without rows. Without torque, energy and momentum have drifts.
+    Errors are infinite without rows. Drifts of energy and momentum are computed only without
+    torque.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -89,7 +87,7 @@ def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
 
 
 def distance(first: Trajectory, second: Trajectory) -> float:
-    """Return the largest distance of two trajectories, in units in the last place.
+    """Return the largest difference of two trajectories, in units in the last place.
 
     It is infinite if the numbers of rows differ.
     """
@@ -103,7 +101,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of the results that differ: steps, evaluations, ending, stop, else rows."""
+    """Return the names of the different results: counts and ending or, if those agree, rows."""
     counts = (
         ("steps", first.steps, second.steps),
         ("evaluations", first.evaluations, second.evaluations),
@@ -135,9 +133,9 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest distance between elements of two arrays: floats from one to the other.
+    """Return the largest number of floats from an element of `x` to the same element of `y`.
 
-    That of two NaNs is 0, of a NaN and a number infinite.
+    Two NaNs have the distance 0, a NaN and a number an infinite distance.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
@@ -148,6 +146,6 @@ def ulps(x: Array, y: Array) -> float:
 
 
 def _ordinal(x: Array) -> NDArray[np.uint64]:
-    """Return the rank of each float among all, -0 just before +0."""
+    """Return the rank of each float among all floats; -0 is just below +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

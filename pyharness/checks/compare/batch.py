@@ -1,4 +1,4 @@
-"""Batches of scenes, which differ by arrays of quantities."""
+"""Batches of scenes that differ in arrays of quantities."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -31,11 +31,12 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 
 @dataclass(frozen=True)
 class Solver:
-    """The method, or the program of the thesis, that solves a batch; the other of the two is None.
+    """The method, or the program of the thesis, that solves a batch; the other is None.
 
-    `t_end` (s) is by default step size times steps. For programs alone, `listing` selects the
-    mistakes that remain (``original``, ``corrected``), `reading` the interpretations of doubtful
-    statements, `lipschitz` the limit (1/s) of the test, and `may_stop` whether it stops.
+    `t_end` (s) is by default the step size times the number of steps. For programs alone, `listing`
+    selects the active defects (``original``, ``corrected``), `reading` the interpretation of
+    doubtful cards, `lipschitz` the limit (1/s) of the stop test, and `may_stop` whether this test
+    ends a run.
     """
 
     method: str | None = "auto"
@@ -50,14 +51,14 @@ class Solver:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Many scenes that one method or program solves, and their results, computed when first read.
+    """Many scenes that one method or program solves; results are computed when first read.
 
     Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
     and `stop_variable`, and call `rows` and `by_method`.
 
-    `scene` has what all scenes have in common, and `arrays` what differs, a row each, by argument
-    of `solve_many` and `run_many`; always `omega0`. `listing` is None for a method, `t_end` (s) has
-    shape (n,), and `attitude` is for methods only.
+    `scene` has the quantities that all scenes share. `arrays` has the others, with a row for each
+    scene, by argument of `solve_many` and `run_many`; `omega0` is always present. `listing` is None
+    for a method. `t_end` (s) has shape (n,). `attitude` is for methods only.
     """
 
     scene: Scene
@@ -79,7 +80,7 @@ class Batch:
 
     @property
     def bodies(self) -> Array:
-        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) for one body."""
+        """Return the principal moments (kg m2), shape (n, 3), or (1, 3) if shared."""
         return self.arrays.get("moments", np.array([self.scene.moments]))
 
     @property
@@ -89,34 +90,34 @@ class Batch:
 
     @cached_property
     def omega(self) -> Array:
-        """Return omega at `t_end`, shape (n, 3), rad/s, or NaN."""
+        """Return omega at `t_end` (rad/s), shape (n, 3); NaN where there is no result."""
         return self._program.omega[:, -1] if self.is_program else self._ends.omega
 
     @property
     def status(self) -> NDArray[np.int8]:
-        """Return how each solution ended, by `pyharness.model.codes.Statuses`, shape (n,)."""
+        """Return the codes of the endings, from `pyharness.model.codes.Statuses`, shape (n,)."""
         return (self._program if self.is_program else self._ends).status
 
     @property
     def n_rows(self) -> NDArray[np.int32]:
-        """Return the number of steps that a program completed, shape (n,)."""
+        """Return the numbers of steps that a program completed, shape (n,)."""
         return self._program.n_rows
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the positions, from 1, in STOP_VARIABLES for which runs stopped, or 0, (n,)."""
+        """Return each stopping variable's position in STOP_VARIABLES, from 1, or 0; shape (n,)."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
-        """Return the last steps, from 1, of nearly equal parts of a run."""
+        """Return the last step, from 1, of each of `samples` nearly equal parts of a run."""
         steps = self.scene.steps
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
         """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
 
-        A method integrates to each time anew, so that errors do not add up; a program is read at
-        `sample_steps`.
+        A method starts anew for each time, so that errors do not accumulate; for a program the
+        times are those of `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -127,7 +128,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        Quaternions, scalar first, from the body to the axes of the body at time 0.
+        They are quaternions, scalar first, from the body to its axes at time 0.
         """
         ends = []
         for each in self._samples(samples):
@@ -141,24 +142,24 @@ class Batch:
 
     @property
     def first_attitudes(self) -> Array:
-        """Return the attitudes at time 0, shape (n, 4) or (1, 4)."""
+        """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
         first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
         found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
         return found
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
-        """Return omega (rad/s) at `part` * `t_end` by another method, shape (n, 3)."""
+        """Return omega (rad/s) at `part` times `t_end` by another method, shape (n, 3)."""
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return a batch without results that starts from `omega0` (rad/s)."""
+        """Return a batch without results, with the initial `omega0` (rad/s)."""
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
-        """Return the results of the program at the steps `at`, ascending.
+        """Return a program's results at the steps `at`, ascending.
 
         Scenes are run one by one, without the codes IER, if `torque_rate` differs or the program
-        refuses one; only that is then REFUSED.
+        refuses a scene. Only the refused scene has the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -168,9 +169,9 @@ class Batch:
         return self._run_each(at)
 
     def scene_of(self, i: int) -> Scene:
-        """Return scene `i` (from 0), without attitude unless the torque needs it.
+        """Return scene `i` (from 0), with an attitude only if the torque needs it.
 
-        Raise InputError if its numbers are not allowed.
+        Raise InputError for invalid numbers.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         scene = self.scene
@@ -207,12 +208,13 @@ class Batch:
         tolerance = requested_tolerance(method, self.solver.tolerance)
         more = {}
         if self.attitude and not self.scene.torque.needs_attitude:
-            # One attitude suits all scenes: `first_attitudes` turns the result.
+            # One attitude suits all scenes, because `attitudes` multiplies the result by
+            # `first_attitudes`.
             more["attitude0"] = IDENTITY
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s), one by one if no compiled kernel takes all."""
+        """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
         by_state = isinstance(self.scene.torque, StateTorque)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)

@@ -1,7 +1,7 @@
 """Candidates, a common interface of methods, prepared solvers and programs.
 
-A prepared solver, made by `prepare`, solves one scene by one method, for many initial conditions. A
-tolerance is relative to the largest component of omega; `effort` multiplies the work limit.
+A prepared solver, made by `prepare`, solves one scene by one method, for many initial states.
+Tolerances are relative to the largest component of omega; `effort` multiplies the work limit.
 """
 
 import math
@@ -29,7 +29,7 @@ _SAME = 1e-9  # relative difference up to which two times are equal; the step si
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The result of a candidate at one time."""
+    """The state that a candidate computes at one time."""
 
     omega: Array  # shape (3,), rad/s; NaN if the candidate did not reach the time
     ended: str = "complete"  # how the run ended: "complete", or why there is no full result
@@ -39,12 +39,12 @@ class End:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether a prepared solver can't solve the scene, or exceeded its work limit."""
+        """Return whether a prepared solver can't solve the scene or exceeded its work limit."""
         return self.ended in ("refused", "gave up")
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the time; its error may exceed the tolerance."""
+        """Return whether the candidate reached the time, even with an error above the tolerance."""
         return self.ended in WITH_ALL_ROWS
 
 
@@ -58,7 +58,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method with its tolerance, a prepared solver, or a program, as one common interface."""
+    """A method with its tolerance, a prepared solver, or a program."""
 
     name: str
     # Takes a scene and a time (s). Raises InputError if the candidate can't solve the scene, or has
@@ -75,7 +75,7 @@ class Candidate:
 
 
 def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candidate:
-    """Return a candidate that runs a method by `solve`; rows have the attitude if the scene has."""
+    """Return a candidate that calls `solve`; its rows have the attitude if the scene has one."""
 
     def rows(scene: Scene, times: Sequence[float] | None = None) -> Trajectory:
         times = scene.times() if times is None else times
@@ -89,10 +89,10 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate that runs a solver made by `prepare` for the method `name`.
+    """Return a candidate that calls a solver made by `prepare` for the method `name`.
 
-    If `primed`, it is first called with another omega, which must have no effect. A fixed step, and
-    Gauss collocation without a tolerance, use the scene's step.
+    If `primed`, the solver is first called with another omega, which must have no effect. Methods
+    with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
     """
 
     def ready(scene: Scene, time: float) -> Ready:
@@ -105,7 +105,7 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate as `prepared_candidate` does, for omega and attitude."""
+    """Return a candidate like that of `prepared_candidate`, for omega and attitude."""
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
@@ -159,17 +159,17 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate that runs a compiled program without stop test and velocity."""
+    """Return a candidate that runs a compiled program without stop test or velocity."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 
 def copied_result(values: Iterable[float]) -> Array:
-    """Return a copy of a compiled function's result, whose memory its next call reuses."""
+    """Return a copy of a compiled function's result, because its next call overwrites it."""
     return np.array([float(x) for x in values])
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` with omega NaN; `why` says how the run ended."""
+    """Return an `End` with omega NaN and the ending `why`."""
     return End(np.full(3, math.nan), why)
 
 
@@ -184,7 +184,7 @@ def _answered(solver: Solver, omega: Array) -> End:
         counted = solver.steps * METHODS[method].evaluations
     elif method.startswith("gauss-"):
         counted = solver.steps
-    # A Taylor series expands the right-hand side and does not evaluate it.
+    # A Taylor series has no evaluations, because it expands the right-hand side.
     return End(
         copied_result(omega), solver.status, solver.steps, None if method == "taylor" else counted
     )

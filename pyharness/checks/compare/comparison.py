@@ -1,7 +1,7 @@
-"""Comparisons of the original and corrected programs, and of other methods, on one scene.
+"""Comparisons of programs, original and corrected, and of SciPy's methods, on one scene.
 
-Fortran and its Python port, the twin, differ by units in the last place. Errors against the
-reference (rad/s) have no meaning below its own.
+The difference between Fortran and its twin is in units in the last place. Errors against the
+reference (rad/s) have no meaning below the reference's error.
 """
 
 import itertools
@@ -53,7 +53,7 @@ _TIMING_SECONDS = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one listing, and their differences from reference and twin."""
+    """The results of one listing, and their differences from the reference and the twin."""
 
     listing: Listing
     trajectory: Trajectory
@@ -67,13 +67,13 @@ class ProgramFinding:
 
     @property
     def who(self) -> str:
-        """Return the program's name and its version's label, for example ``two-term original``."""
+        """Return the program's name and its listing's label, as in ``two-term original``."""
         return f"{self.listing.program} {self.listing.label}"
 
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method; if it failed, `failure` says why and there are none."""
+    """The results of one method, or the reason of its failure."""
 
     method: str
     tolerance: float
@@ -102,7 +102,7 @@ class Comparison:
     programs : tuple of ProgramFinding
         The results of the programs, one for each listing.
     methods : tuple of MethodFinding
-        The results of the methods: those of `solve_ivp`, or those that were requested.
+        The results of the methods: SciPy's, or those requested.
     growth : float or None
         The error amplification, if it is known: the largest norm of the state-transition matrix of
         omega from any earlier time to the last.
@@ -123,12 +123,12 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the decimal digits that amplified rounding leaves in binary64, if known."""
+        """Return the decimal digits that amplified rounding leaves in binary64, or None."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
     def tolerance(self) -> float:
-        """Return the smallest relative tolerance with which a method was run."""
+        """Return the smallest relative tolerance of the methods."""
         return min(each.tolerance for each in self.methods)
 
     @property
@@ -138,10 +138,11 @@ class Comparison:
 
     @property
     def unexpected(self) -> tuple[str, ...]:
-        """Return a sentence for each unexpected result; the tuple is empty if there is none.
+        """Return a sentence for each unexpected result.
 
-        It is unexpected that Fortran and twin differ, or a corrected program misses its order; of
-        methods alone, that an error exceeds the limit by its tolerance, or that rows are missing.
+        With programs, a result is unexpected if Fortran and twin differ, or a corrected program
+        misses its order. Without programs, it is unexpected if a method's error exceeds the limit
+        that follows from the tolerance, or rows are missing.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         for each in self.programs:
@@ -213,10 +214,10 @@ def compare_programs(
         The tolerance of each method of `solve_ivp`, relative to the largest component of omega; by
         default that of `solve`.
     effort : float
-        Factor on the work limit of each program, of each method and of the reference.
+        Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too, from the scene's or from parallel axes of body and
-        space. A program's is integrated from its rows of omega by a method of order 4.
+        Whether attitudes are compared too. The initial attitude is the scene's, by default the axes
+        of space. A program's attitude is integrated from its rows of omega by a method of order 4.
     word : str
         The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
         compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
@@ -291,10 +292,10 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return the listings to compare: for each program the original and the corrected listing.
+    """Return the listings to compare, in order: original, selected and corrected, for each program.
 
-    Between them is the selection that `fix` and `keep` make from `base`, which alone is the only
-    one. Raise InputError for a name that none of `programs` has.
+    The selection applies `fix` and `keep` to `base`; if `base` alone is specified, it is the only
+    listing. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
@@ -327,7 +328,7 @@ def listings_for(
 def method_finding(
     scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
 ) -> MethodFinding:
-    """Return the results of a method at the scene's steps, or its InputError's message."""
+    """Return the results of a method at the scene's steps, or the message of its InputError."""
     start = time.perf_counter()
     try:
         trajectory = method_candidate(name, tolerance, effort).rows(scene)

@@ -1,4 +1,4 @@
-"""Comparisons of methods on one scene with each other and with the reference, without programs."""
+"""Comparison of methods with each other and with the reference, on one scene without programs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -33,17 +33,17 @@ def compare_methods(
     Parameters
     ----------
     scene : Scene
-        The scene; times are the ends of its steps. The torque may depend on omega or attitude if it
+        The scene; times are the ends of its steps. A torque may depend on omega or attitude if it
         can be recorded.
     methods : sequence of str
         Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
     tolerance : float, optional
         The tolerance of each method, relative to the largest component of omega; by default that of
-        `solve`. A method with a fixed step takes none.
+        `solve`. Methods with a fixed step ignore it.
     effort : float
-        Factor on the work limit of each method and of the reference.
+        Factor on the work limits of the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too, as they are if the torque depends on the attitude.
+        Whether attitudes are compared too; always if the torque depends on the attitude.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Measured orders of convergence: powers of the step size with which the error decreases."""
+"""Measured orders of convergence: powers of the step size to which the error is proportional."""
 
 import itertools
 import math
@@ -19,7 +19,7 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import Program
 from pyharness.truth.reference import Reference
 
-# A measured order may be below the expected one by at most this.
+# Largest amount by which a measured order may be below the expected one.
 ORDER_SLACK = 0.5
 # The order is measured when two conditions hold. Halving the step changes the result by less than
 # `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
@@ -36,7 +36,7 @@ _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
 # Assumed number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
-# A matrix with a larger condition number may be found singular.
+# LEQT1F may report a matrix with a larger condition number as singular.
 _CONDITION = 1e15
 
 State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
@@ -44,7 +44,7 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 
 @dataclass(frozen=True)
 class Order:
-    """A method's order of convergence, measured by halving the step, or why it is unknown."""
+    """A method's order of convergence, measured by halving the step, or why it is undecided."""
 
     due: int  # the expected order, known from theory
     # `as due`: the expected order was observed. `rounding`: before the order could be observed, the
@@ -65,7 +65,7 @@ class Order:
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
-        """Return the measured order as text, or why it is unknown."""
+        """Return the measured order as text, or why it is undecided."""
         if self.value is not None:
             return f"order {self.value:.2f}"
         return {
@@ -77,10 +77,7 @@ class Order:
 
 
 class _SingularError(Exception):
-    """The signal that a run failed at a step size for which its matrix may be singular.
-
-    A program without LEQT1F's solution is another method, whose order is not measured.
-    """
+    """Signal that a run failed at a step size for which its matrix may be singular."""
 
 
 def measured_order(
@@ -88,8 +85,8 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a compiled program converges to `truth`.
 
-    The state is `sensitive` if the error may be amplified rounding, `misses` only if a textbook
-    method of the same order converges.
+    The state is `sensitive` if the error may be amplified rounding. A program without convergence
+    has the state `misses` only if a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -121,12 +118,12 @@ def order_of(
     pairs: int = 2,
     most_steps: int | None = None,
 ) -> Order:
-    """Measure the order of a numerical solution by halving the step size until it is small.
+    """Measure the order of a numerical solution by halving the step size.
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
-    The measurement ends when the order is at least `due` - 0.5 in `pairs` consecutive halvings,
-    smaller in as many, or when the error is only rounding. A run has at most `most_steps` steps; by
-    default 2**18, or those of eight halvings if these are more.
+    The measurement ends when `pairs` consecutive halvings have an order of at least `due` - 0.5, or
+    as many a smaller one, or when the error is only rounding. A run has at most `most_steps` steps;
+    by default 2**18, or those of eight halvings if these are more.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -205,7 +202,7 @@ def _fastest(scene: Scene, omega: Array) -> float:
 
 
 def _is_grown_rounding(scene: Scene, found: Order) -> bool:
-    """Return whether the error may be amplified rounding, also if no bound can be computed."""
+    """Return whether the error may be amplified rounding; True if its bound can't be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
     try:
@@ -216,7 +213,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether LEQT1F may find a program's matrix singular: condition 1e15 or overflow."""
+    """Return whether the matrix of a collocation program has a condition of 1e15 or overflows."""
     from pyharness.checks.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

@@ -1,4 +1,4 @@
-"""The picture of a comparison: for each program, omega over time, and its errors below."""
+"""The picture of a comparison: omega over time, and its errors below."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,14 +14,14 @@ from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# The lines can be distinguished without colour, by their dashes and widths.
+# Dashes and widths distinguish the lines without colour.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
     "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# A trajectory of a single row is drawn as a marker, because a line would not show it. The markers
+# A line does not show a trajectory of a single row, so that it is drawn as a marker. The markers
 # can be distinguished even at the same point.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
@@ -52,9 +52,10 @@ def _curves(comparison: Comparison) -> list[_Curve]:
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
-    """Return the picture of a comparison, with a column for each program or method.
+    """Return a picture with one column per program or method.
 
-    Panels show the components of omega (rad/s), their error, and that of any attitude (rad).
+    Its panels show the components of omega (rad/s), their error, and the error of any attitude
+    (rad).
     """
     from matplotlib.figure import Figure
 
@@ -62,7 +63,6 @@ def comparison_picture(comparison: Comparison) -> Picture:
     names = list(dict.fromkeys(each.name for each in curves))
     figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
     truth = comparison.reference
-    # The error of the attitude, if it was requested, is drawn below the error of omega.
     bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
     shape = 3 + len(bounds), len(names)
     axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)

@@ -1,4 +1,4 @@
-"""The report of the verb `compare`: the tables, verdict, picture and data of a comparison."""
+"""The report of `compare`: tables, verdict, picture and data."""
 
 from typing import Any
 
@@ -41,7 +41,7 @@ _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison of programs and methods with the reference solution."""
+    """Return the report of a comparison."""
     in_floats = comparison.word == BINARY64
     scene, truth = heading(comparison.scene), comparison.reference
     bound = comparison.bound
@@ -90,7 +90,7 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return sentences that say whether the results are as expected, sensitive or not judged."""
+    """Return sentences that say whether results are expected, sensitive or not judged."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))

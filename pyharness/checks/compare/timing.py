@@ -1,4 +1,4 @@
-"""Timing of calls in interleaved batches, so that other load on the machine affects all equally."""
+"""Timing of calls in interleaved batches, so that other load affects all equally."""
 
 import contextlib
 import gc
@@ -27,9 +27,9 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), over several rounds.
 
-    In each round a function is called for about `length` seconds. A first call does not count, but
-    if it is longer than `slow` (s), there are at most three rounds, and one above five times that.
-    `statistic` combines the rounds.
+    In each round a function is called for about `length` seconds. The first call only limits the
+    rounds: to three if it takes `slow` seconds or more, to one from five times `slow`. `statistic`
+    combines the rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -43,7 +43,7 @@ def seconds(
                 say(f"round {number} of {rounds}")
                 for (run, clock), times, most in zip(timed, seen, due, strict=True):
                     if number <= most:
-                        # Use the latest time, because the first call may have been slow.
+                        # The first call may have been slow.
                         calls = max(1, round(length / max(times[-1], 1e-9)))
                         times.append(batch_seconds(run, calls, clock))
     finally:
@@ -53,7 +53,7 @@ def seconds(
 
 
 def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> float:
-    """Return the time of one call (s), averaged over `calls`, before which one is not timed."""
+    """Return the time of one call (s), averaged over `calls`, after a warm-up if `calls` > 1."""
     if calls > 1:
         run()
     begin = clock()
@@ -66,7 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError in a ``with`` block of Python code that takes longer than `limit` (s).
 
-    Only the main thread, which receives signals, may use it.
+    It works in the main thread only, which receives signals.
     """
 
     def end(*_: object) -> None:

@@ -1,1 +1,1 @@
-"""Checks of an integrator of rigid bodies, which another program provides."""
+"""Checks of an integrator of rigid bodies in another program."""

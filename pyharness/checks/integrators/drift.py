@@ -1,6 +1,7 @@
-"""The drift of conserved quantities in a long motion without torque, and its limit.
+"""The drift of conserved quantities in a long torque-free motion, and its limit.
 
-Energy and |L| are relative; the direction of the angular momentum L in space is an angle (rad).
+Drifts of energy and |L| are relative; the drift of the direction of the angular momentum L in space
+is an angle (rad).
 """
 
 import math
@@ -34,7 +35,7 @@ CHANGE = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drift of conserved quantities from time 0; `change` is the largest between rows."""
+    """The drifts from time 0, shape (n,), and the largest `change` between two rows."""
 
     times: Array
     energy: Array
@@ -43,16 +44,16 @@ class Drift:
     change: float
 
     def named(self) -> dict[str, Array]:
-        """Return the quantities by name, the direction if it is known."""
+        """Return the drifts by name."""
         found = {"energy": self.energy, "momentum": self.momentum}
         return found if self.direction is None else {**found, "direction": self.direction}
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of the long motion, and the limit of the change in a row.
+    """Return level and times (s) of the long motion, and the limit of the change between rows.
 
-    It is the first level whose limits allow enough rows, else the last. The limit is None if the
-    errors are too large for one.
+    The level is the first whose limits allow enough rows, else the last. The limit is None if the
+    errors are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)
@@ -61,7 +62,7 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     number = next((n for n, limit in enumerate(limits) if _TOTAL / limit >= _FEWEST), -1)
     most = max(_FEWEST, _ROWS if control == "tolerance" or number < 0 else _ROWS >> number)
     if number < 0 and limits[-1] > 0.5 * limits[0]:
-        # The errors do not fall: small steps are a waste.
+        # The errors do not decrease with the step size, so that small steps would be useless.
         return levels[0], _BETWEEN * np.arange(1.0, _FEWEST + 1.0), None
     limit = limits[number]
     rows = max(_LEAST, int(min(most, _TOTAL / limit)))
@@ -80,7 +81,7 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
             there = _in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
             direction = _angle(there[1:], there[:1])
             changes.append(_angle(there[1:], there[:-1]))
-        # The change from a row that is 0 or not finite is no number.
+        # The change from a row that is 0 or not finite is NaN, which is ignored.
         change = np.fmax.reduce(np.concatenate(changes), initial=0.0)
         drifts = [each[1:] / each[0] - 1.0 for each in (energy, momentum)]
     return Drift(times, drifts[0], drifts[1], direction, float(change))
@@ -98,7 +99,7 @@ def _angle(first: Array, second: Array) -> Array:
 
 
 def growth_power(times: Array, drift: Array) -> float | None:
-    """Return p if the largest drift up to a time grows with its power p; None if it is rounding."""
+    """Return the power of time with which the largest drift grows; None if it is rounding."""
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
     if not math.isfinite(late) or early <= 0.0:

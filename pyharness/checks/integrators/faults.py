@@ -1,7 +1,7 @@
-"""Known faults of integrators: the motions that a faulty integrator computes.
+"""Known faults of integrators, each with the motion that a faulty integrator computes.
 
-If an integrator converges to one of them, the fault is named. Each is our solution of another scene
-or in other conventions.
+A fault is recognised if an integrator converges to its motion: our solution of another scene or in
+other conventions.
 """
 
 import math
@@ -32,10 +32,10 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of an integrator: its name, what is wrong in a sentence, and its motion.
+    """A fault of an integrator: its name, a sentence on it, and its motion.
 
-    `motion` takes scene, times (s) and step size (s), and returns None without effect. With
-    `of_step`, the states approach the true ones as the step falls.
+    `motion` takes a scene, times (s) and a step size (s), and returns None if the fault has no
+    effect. With `of_step`, its states approach the true ones as the step decreases.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Fault:
 
 
 def true_motion(scene: Scene, times: Array) -> State:
-    """Return the states of a scene at times in ascending order (s)."""
+    """Return the states at ascending times (s); raise ArithmeticError if one is missing."""
     run = solve(scene, times.tolist(), tolerance=_TOLERANCE, attitude=True)
     if run.attitude is None or len(run.omega) < len(times):
         raise ArithmeticError("the motion does not reach the last time")
@@ -74,7 +74,7 @@ def _law(scene: Scene, t: Any) -> list[Any]:
 
 
 def _with_gyroscopic(x: float, y: float, z: float) -> Callable[[Scene, Array, float], State]:
-    """Return the motion with x, y and z times the components of the term -omega x (I omega)."""
+    """Return the motion whose gyroscopic term -omega x (I omega) is multiplied by x, y and z."""
 
     def motion(scene: Scene, times: Array, step: float) -> State:
         moments = scene.moments
@@ -143,7 +143,7 @@ def _of_state(change: Callable[[State, Scene], State]) -> Callable[[Scene, Array
 
 
 def space_omega(state: State, scene: Scene) -> State:
-    """Return states with omega about the axes of space in place of those of the body."""
+    """Return states with omega about the axes of space instead of the body."""
     q = state.attitude.T
     zeros = np.zeros(len(state.omega))
     turned = product(product(q, (zeros, *state.omega.T)), _conjugate(q))
@@ -169,10 +169,10 @@ def as_output(name: str, attitude: Array, scene: Scene) -> Array:
 
 
 def _space_rates(scene: Scene, times: Array, step: float) -> State:
-    """Return the motion with q' = (0, omega) q/2 in place of q' = q (0, omega)/2.
+    """Return the motion with q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
-    The conjugate p of q satisfies p' = p (0, -omega)/2; -omega, the equations with the opposite
-    gyroscopic term and torque.
+    It is computed for the conjugate p of q and for -omega: p' = p (0, -omega)/2, and -omega
+    satisfies Euler's equations with opposite gyroscopic term and torque.
     """
     moments = scene.moments
     assert moments is not None
@@ -194,7 +194,7 @@ def _space_rates(scene: Scene, times: Array, step: float) -> State:
 
 
 def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
-    """Return the motion with q' = q (0, omega): that of a body with twice the omega."""
+    """Return the motion with q' = q (0, omega), from a body with twice the omega."""
     moments = scene.moments
     assert moments is not None
 
@@ -210,7 +210,7 @@ def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
 
 
 def _thesis_program(scene: Scene, times: Array, step: float) -> State:
-    """Return 2 y(t/2) - y(0), quaternions normed; y is true under a torque of double speed."""
+    """Return 2 y(t/2) - y(0), normalised; y is the motion if torques vary twice as fast."""
     law = scene.law
     x, y, z = law.rate
     fast = replace(
@@ -293,16 +293,16 @@ FAULTS = (
     Fault("attitude-rate", "the quaternion rotates at twice the rate, without the factor 1/2",
           _doubled_rates),
 )  # fmt: skip
-"""The known faults; those of the omega are first."""
+"""The known faults; faults of omega are first."""
 
 OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
-"""The faults of the attitude alone, whose motion follows from any state by `as_output`."""
+"""The faults of the attitude alone, which `as_output` applies to any states."""
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:
     """Yield each fault that has an effect in the scene, with its states at `times` (s).
 
-    They are NaN if the motion does not reach the last time.
+    The states are NaN if the motion does not reach the last time.
     """
     for fault in FAULTS:
         with np.errstate(all="ignore"):

@@ -1,6 +1,6 @@
 """Checks of an integrator of rigid bodies in any language, against the true solution.
 
-Its errors are measured with smaller and smaller steps or tolerances in random scenes; if it
+Errors are measured in random scenes with decreasing steps or tolerances. If the integrator
 converges to another motion, the fault is named (docs/how-to/integrators.md).
 """
 
@@ -61,7 +61,7 @@ _FINITE = Basis(
 
 @dataclass(eq=False)
 class Verdict:
-    """All results of the checks of an integrator, in the order of the checks."""
+    """The results of all checks of an integrator."""
 
     command: str
     checks: list[Check] = field(default_factory=list)
@@ -81,9 +81,9 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    ``again(name)`` returns the command that repeats the checks in a scene, ``told`` gets the number
-    of finished problems and the next name. `due` is the least order, `patience` the longest wait
-    (s). An invalid answer ends the checks. Raise InputError if the command is empty.
+    ``again(name)`` returns the command that repeats the checks in a scene; ``told`` receives the
+    number of finished problems and the next name. `due` is the required order, `patience` the
+    longest wait (s). An invalid answer ends the checks. Raise InputError if the command is empty.
     """
     found = Verdict(command)
     where = "start"
@@ -110,7 +110,7 @@ def judge_integrator(
     found.findings = recognised(found.judged)
     for each in found.findings:
         name = Name("integrator", "fault", each.name)
-        # A low order is a fault only if another one was requested, and is judged by its own checks.
+        # A low order is a fault only if a higher one was requested; the checks of the order decide.
         check = name.judged(each.name in FIRST_ORDER, each.says)
         found.checks.append(replace(check, again=again("")))
     if found.judged and (unexplained := _unexplained(found)):
@@ -122,7 +122,7 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow; a low order, that a higher one is missing.
+    A fault also explains an overflow, and a low order explains that a higher one is missing.
     """
     faults = [each for each in found.findings if each.name not in FIRST_ORDER]
     named = {each.name for each in faults}
@@ -153,7 +153,7 @@ Ask = Callable[[bytes, int], Motion]
 def judge_problem(
     ask: Ask, problem: Problem, due: float, found: Verdict, again: Callable[[str], str]
 ) -> None:
-    """Add to `found` the checks in one problem; raise PortError if an answer is not valid."""
+    """Append to `found` the checks in one problem; raise PortError for an invalid answer."""
     rows = len(problem.times)
     answers = []
     for level in range(LEVELS):
@@ -230,10 +230,7 @@ def _same(one: Array, other: Array) -> Any:
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
-    """Return how far the body is from its initial state after it went forth and back.
-
-    Without torque, the opposite omega is the opposite time.
-    """
+    """Return checks that the torque-free body returns after omega, and so time, is reversed."""
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:
@@ -263,7 +260,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
 
 
 def _judge_long(ask: Ask, found: Verdict, again: Callable[[str], str]) -> None:
-    """Add the checks of a long motion without torque: finite numbers, and conserved quantities."""
+    """Append the checks of a long torque-free motion: finite numbers and conserved quantities."""
     free = next((each for each in found.judged if each.problem.scene.torque.is_zero), None)
     if free is None:
         return
@@ -295,7 +292,7 @@ def _judge_long(ask: Ask, found: Verdict, again: Callable[[str], str]) -> None:
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:
-    """Return the command that repeats the checks of an integrator in one problem or in all."""
+    """Return the command that repeats an integrator's checks, in one problem or in all."""
     verb = f"python -m pyharness verify --integrator {shlex.quote(command)}"
     where = f" --cell {name}" if name else ""
     return f"{verb} --seed {shlex.quote(seed)} --draws {draws}{where}"

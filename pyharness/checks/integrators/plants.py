@@ -1,4 +1,4 @@
-"""Planted faults in requests to an integrator and in its answers, and the self-test with them."""
+"""Planted faults in requests to an integrator and in its answers, and their self-test."""
 
 import itertools
 import json
@@ -26,7 +26,7 @@ _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fau
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault that is planted in an integrator; its name is that by which it must be recognised."""
+    """A fault planted in an integrator, and the name by which it must be recognised."""
 
     name: str
     request: Callable[[dict[str, Any]], None] | None = None
@@ -73,7 +73,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis by a step's size, in rad."""
+    """Rotate the initial angular momentum about a body axis by h rad, h the step size in s."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)
@@ -160,11 +160,11 @@ PLANTS = (
     IntegratorPlant("first-order-attitude", needs_step=True,
                     advance=lambda q, a, b, h: product(q, _turn(a, h))),
 )  # fmt: skip
-"""The planted faults: first those in requests, then those in answers."""
+"""The planted faults."""
 
 
 def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
-    """Return a function that asks an integrator with a planted fault, in one scene."""
+    """Return a function that requests states in a scene from an integrator with a planted fault."""
 
     def asked_with_fault(line: bytes, rows: int) -> Motion:
         asked = json.loads(line)
@@ -200,7 +200,7 @@ def _advanced(
 def self_test(
     command: str, chosen: Sequence[Problem], due: float = 1.0, patience: float = PATIENCE
 ) -> Iterator[Outcome]:
-    """Yield the faults that are recognised, first without a planted fault, then with each of them.
+    """Yield the outcomes without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
     """
@@ -228,7 +228,6 @@ def self_test(
 
 
 def _recognise(verdict: Verdict) -> tuple[list[str], int]:
-    """Return the names of the recognised faults, and the number of failed checks."""
     failed = sum(not check.passed for check in verdict.checks)
     return [each.name for each in recognised(verdict.judged)], failed
 

@@ -1,6 +1,6 @@
-"""The random scenes in which an integrator is judged, and its errors in them.
+"""Random scenes in which an integrator is judged, and its errors in them.
 
-A level, from 0 to `LEVELS` - 1, is a step size (s) and a tolerance.
+A level, from 0 to `LEVELS` - 1, determines a step size (s) and a tolerance.
 """
 
 import math
@@ -21,7 +21,7 @@ from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 
 LEVELS = 8
-"""The number of step sizes or tolerances with which a scene is requested."""
+"""The number of step sizes or tolerances in each scene."""
 DRAWS = 2
 """The default number of random scenes of each kind."""
 PARTS = ("omega", "attitude")
@@ -32,25 +32,25 @@ _ORDER_ONE = 1.5  # a measured order below this counts as 1
 _SEVERAL = 4  # steps that must show the order 1
 _LATE = 3  # tolerances before the last that must show the order too
 _LEAST = 1e-300  # in place of an error of 0
-# An error above this many roundings, times the square root of the number of steps, is that of the
-# formula.
+# An error above this many roundings, times the square root of the number of steps, is due to the
+# method.
 _ROUNDINGS = 240.0
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A random scene in which an integrator is judged; its name is as in ``wave-1``."""
+    """A random scene in which an integrator is judged, named as in ``wave-1``."""
 
     scene: Scene
 
     @property
     def name(self) -> str:
-        """Return the name of the scene: its kind of torque, and its number."""
+        """Return the kind of torque and the number."""
         return self.scene.name
 
     @property
     def kind(self) -> str:
-        """Return the kind of the torque, one of `scenes.moderate`."""
+        """Return the kind of the torque, one of `scenes.moderate.KINDS`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
@@ -66,7 +66,7 @@ class Problem:
 
     @cached_property
     def bound(self) -> ErrorBound:
-        """Return the bound of the error of the true states."""
+        """Return the error bound of `truth`, relative to the largest omega."""
         bound = bound_of(self.scene, self.truth, any_torque=True)
         return bound.over(float(np.abs(self.truth.omega).max()))
 
@@ -76,7 +76,7 @@ class Problem:
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
-        """Return the states of a member of `faulty` at the step size of a level."""
+        """Return the states of a fault in `faulty` at the step size of a level."""
         if fault.of_step:
             found = fault.motion(self.scene, self.times, self.step_size(level))
             assert found is not None
@@ -93,11 +93,11 @@ class Problem:
 
     @property
     def most_steps(self) -> float:
-        """Return the number of the smallest steps until the last time."""
+        """Return the number of steps of the smallest size until the last time."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that roundings of this relative size may cause."""
+        """Return the largest error that roundings of the relative size `rounding` may cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int) -> bytes:
@@ -106,13 +106,13 @@ class Problem:
         return request(self.scene, times, self.step_size(level), tolerance)
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega (relative) and attitude (rad, if any), maybe infinite."""
+        """Return the errors of omega (relative) and attitude (rad, or None), maybe infinite."""
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
 
 def errors_between(state: State, motion: Motion) -> tuple[float, float | None]:
-    """Return the errors of an answer against the states, as `Problem.errors` does."""
+    """Return the errors of `motion` against `state`, as in `Problem.errors`."""
     with np.errstate(all="ignore"):
         omega = float(np.abs(motion.omega - state.omega).max() / np.abs(state.omega).max())
         angle = None
@@ -128,9 +128,10 @@ def finite_or_infinite(x: float) -> float:
 
 @dataclass(frozen=True)
 class Convergence:
-    """The errors of omega or attitude (`part`) in one problem, from the largest setting down.
+    """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    They fall with the power `order` of step size (s) or tolerance; None if they are rounding.
+    They are proportional to the power `order` of step size (s) or tolerance; None if they are
+    rounding.
     """
 
     part: str
@@ -140,7 +141,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is 1 over several steps, as far as measured."""
+        """Return whether the order is about 1, also over several steps."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -149,16 +150,16 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the errors fall at least with the order 1, up to its accuracy."""
+        """Return whether the errors decrease with order 1 at least, up to its slack."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property
     def is_higher(self) -> bool:
-        """Return whether the order is above 1, or the errors are only rounding errors."""
+        """Return whether the order is above 1, or the errors are rounding."""
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return the error at a level that the next level and the order predict."""
+        """Return the error at a level, extrapolated by the order from the next level."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -166,16 +167,17 @@ class Convergence:
 def convergence(
     part: str, settings: Sequence[float], errors: Sequence[float], floor: float, overall: bool
 ) -> Convergence:
-    """Return the measured order of convergence of some errors above `floor`.
+    """Return the measured order of convergence of errors above `floor`.
 
-    With `overall` it is the order from first to last, or over the last four if smaller, as for
-    tolerances, with which errors fall irregularly; else that of the last pair.
+    It is the order of the last pair. With `overall`, for tolerances, whose errors decrease
+    irregularly, it is the smaller of the orders from the first and from the fourth last to the
+    last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
     if seen:
         last = seen[-1]
-        # An error that ceases to fall shows in the last tolerances alone.
+        # The last tolerances alone show an error that ceases to decrease.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
         powers = [
             _power(errors[first] / errors[last], settings[first] / settings[last])
@@ -187,7 +189,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return p if a ratio of errors is the power p of a ratio of settings."""
+    """Return p for which the ratio `errors` is the ratio `settings` to the power p."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -195,7 +197,7 @@ def _power(errors: float, settings: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """The results of an integrator in one problem: all answers, and the measured orders."""
+    """An integrator's answers in one problem, and its measured orders."""
 
     problem: Problem
     answers: tuple[Motion, ...]
@@ -203,14 +205,14 @@ class Judged:
 
     @property
     def finest(self) -> Motion:
-        """Return the answer with the smallest step size or tolerance."""
+        """Return the answer at the finest setting."""
         return self.answers[-1]
 
     @cached_property
     def lost(self) -> int:
         """Return the number of rows that are not finite and should be.
 
-        A large step may overflow if the next predicts an error of 1.
+        A level may overflow if the order predicts for it an error of 1 or more from the next level.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -222,19 +224,19 @@ class Judged:
         return rows
 
     def error(self, level: int) -> float:
-        """Return the larger error of omega (relative) and attitude (rad), with a floor."""
+        """Return the larger error of omega (relative) and attitude (rad), with a lower limit."""
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
         least = problem.tolerance(level) if by_tolerance else problem.floor(finest.rounding)
         return max(least, *(each.errors[level] for each in self.convergences))
 
     def order_of(self, part: str) -> Convergence | None:
-        """Return the measured order of omega or of the attitude, if it was computed."""
+        """Return the measured order of omega or of the attitude, if any."""
         return next((each for each in self.convergences if each.part == part), None)
 
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
-    """Return `draws` random scenes of each kind, or those of `names` (``wave-1`` or a kind)."""
+    """Return `draws` random scenes of each kind, or those in `names` (``wave-1`` or a kind)."""
     drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in KINDS]
     return [
         Problem(scene)

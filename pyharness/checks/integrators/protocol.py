@@ -17,18 +17,18 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import Array
 
 CONTROLS = ("step_size", "tolerance")
-"""The field of a request that determines the accuracy of an integrator."""
+"""The fields of a request that may determine an integrator's accuracy."""
 ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
-"""The relative rounding error of a number, for each arithmetic that an answer may name."""
+"""The relative rounding error of each arithmetic that an answer may name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The answer of an integrator to a request: the states at the requested times.
+    """An integrator's answer: the states at the requested times, or its refusal.
 
-    `omega` is about the body axes (rad/s), shape (n, 3); `attitude` from body to space, scalar
-    first, normed, (n, 4); `norm` the largest difference of a norm from 1. The field `control` of
-    the request sets the accuracy; `rounding` is relative.
+    `omega` is about the body axes (rad/s), shape (n, 3). `attitude` is from body to space, scalar
+    first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before. The
+    field `control` of the request sets the accuracy; `rounding` is relative.
     """
 
     omega: Array
@@ -40,7 +40,7 @@ class Motion:
 
     @property
     def lost(self) -> int:
-        """Return the number of rows in which a number is not finite."""
+        """Return the number of rows that are not finite."""
         parts = [self.omega] if self.attitude is None else [self.omega, self.attitude]
         return int((~np.isfinite(np.hstack(parts)).all(axis=1)).sum())
 
@@ -48,7 +48,7 @@ class Motion:
 def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: float) -> bytes:
     """Return the line of JSON that requests the states of a scene at `times` (s).
 
-    They are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
+    Times are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
     """
     record = scene_record(scene)
     asked = {

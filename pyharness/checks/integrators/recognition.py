@@ -1,4 +1,4 @@
-"""The recognition of known faults of an integrator, by its errors and its orders of convergence."""
+"""Recognition of an integrator's known faults, by its errors and orders of convergence."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,8 +12,8 @@ from pyharness.checks.integrators.drift import drift_of
 from pyharness.checks.integrators.faults import OUTPUTS, Fault, State, as_output
 from pyharness.checks.integrators.problem import Judged, convergence, errors_between
 
-# A motion is that of a known fault if it explains all but this part of the error, and if the rest
-# falls at least with this power of the step size or tolerance.
+# A motion has a known fault if the fault explains all but this part of the error, and if the rest
+# decreases at least with this power of the step size or tolerance.
 _UNEXPLAINED = 0.1
 _FALLS = 1.0 - ORDER_SLACK
 _OF_MOTIONS = 1e-10  # errors of the motions of faults
@@ -29,14 +29,14 @@ FIRST_ORDER = {
     "torque-held": "the order is 1 under a torque that varies with time, and higher otherwise: "
     "the torque of a step is that at one end of the step, or at another wrong time",
 }
-"""The faults that measured orders show, each with a sentence that says what is wrong."""
+"""The faults that measured orders show, with a sentence on each."""
 UNKNOWN = "unknown"
-"""The name of any other fault."""
+"""The name of any unknown fault."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A known fault that was recognised, a sentence about it, and the problems that show it."""
+    """A recognised fault, a sentence on it, and the problems that show it."""
 
     name: str
     says: str
@@ -44,7 +44,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the known faults that explain the errors, else what the orders show."""
+    """Return the known faults that explain the errors, else those that the orders show."""
     names: dict[str, tuple[str, list[str]]] = {}
 
     def add(name: str, says: str, problem: str) -> None:
@@ -70,12 +70,12 @@ def _explained(judged: Judged) -> list[tuple[str, str]]:
     converges = all(each.converges for each in true)
     if converges and judged.finest.control == "tolerance":
         return []
-    # The motion of any other fault does not approach the true one.
+    # The motion of any other fault does not converge to the true one.
     known = [(f, state) for f, state in judged.problem.faulty if f.of_step or not converges]
     both = _best(judged, known, range(len(true)))
     if both is not None:
         return [(both.name, both.says)]
-    # One fault of omega, and one of the attitude that is given out.
+    # One fault of omega, and one of the returned attitude.
     first = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if first is None:
         return []
@@ -112,7 +112,7 @@ def _best(
 def _approaches(
     judged: Judged, fault: Fault, states: Callable[[int], State], parts: Sequence[int]
 ) -> bool:
-    """Return whether the answers approach the states of a fault as the steps become smaller."""
+    """Return whether the answers converge to the states of a fault."""
     pairs = enumerate(judged.answers)
     errors = [errors_between(states(level), motion) for level, motion in pairs]
     floor = max(judged.problem.floor(judged.finest.rounding), _OF_MOTIONS)

@@ -129,7 +129,7 @@ def _findings(found: Verdict) -> Section:
 
 
 def integrator_picture(found: Verdict) -> Picture:
-    """Return the picture of errors over step size (s) or tolerance, and drifts over time (s)."""
+    """Return a picture of errors over step size (s) or tolerance, and drifts over time (s)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), dpi=110, layout="constrained")

@@ -1,6 +1,6 @@
-"""Faults of a chosen size, which show that a check can fail: in which function, and what changes.
+"""Faults of a chosen size: in which function, and what changes.
 
-A fault is planted in the running process and removed when its context ends.
+A fault is planted in the running process, and removed when its context ends.
 """
 
 import itertools
@@ -21,18 +21,18 @@ COMPILED = "pyharness.thesis.compiled.run"
 PROGRAM = "pyharness.thesis.programs.Program.run"  # in either language
 
 Fault = Callable[[float], AbstractContextManager[Any]]
-"""A function that takes the size of a fault, and returns a context in which the fault is present.
+"""A function from the size of a fault to a context in which the fault is present.
 
 A fault of size 0 changes no result.
 """
 
 Change = Callable[[Any, float], Any]
-"""A function that takes a right result and the size of a fault, and returns the wrong result."""
+"""A function from a right result and the size of a fault to the wrong result."""
 
 Faulty = Callable[..., Any]
-"""A function that takes the size of a fault, the right function, and the arguments of a call.
+"""A function that replaces a right function.
 
-It returns the result of the call in place of the right function.
+Its arguments are the size of the fault, the right function, and the arguments of a call.
 """
 
 
@@ -48,7 +48,7 @@ def instead(target: str, faulty: Faulty) -> Fault:
 
 
 def in_method(name: str, faulty: Faulty) -> Fault:
-    """Return a fault that replaces the function `solve` of the method `name` by `faulty`."""
+    """Return a fault that replaces the function `solve` of the method `name`."""
     known = METHODS[name]
     return lambda size: patch.dict(
         METHODS, {name: replace(known, solve=partial(faulty, size, known.solve))}
@@ -61,7 +61,7 @@ def changing(change: Change) -> Faulty:
 
 
 def change_result(target: str, change: Change, call: int | None = None) -> Fault:
-    """Return a fault that changes the result of `target`, in its call number `call` or in all."""
+    """Return a fault that changes the result of `target`, in call number `call` or in all calls."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         calls = itertools.count(1)
@@ -86,7 +86,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) ->
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of the attribute `name` of a result, if it is there."""
+    """Return a change of the attribute `name` of a result, if it is not None."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
@@ -101,7 +101,7 @@ def plus(found: Any, size: float) -> Any:
 
 
 def off(found: Any, size: float) -> Any:
-    """Return omega, or a result with it, increased by `size` times the largest component."""
+    """Return omega, or a result with it, each component enlarged by `size` times the largest."""
     if not isinstance(found, np.ndarray):
         return replace(found, omega=off(found.omega, size))
     return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
@@ -123,5 +123,5 @@ def third_off(found: Array, size: float) -> Array:
 
 
 def swapped(found: Array, size: float) -> Array:
-    """Return vectors whose first two components are exchanged, if the size is not 0."""
+    """Return vectors with the first two components exchanged, if the size is not 0."""
     return found[:, [1, 0, 2]] if size else found

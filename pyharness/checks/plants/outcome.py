@@ -1,4 +1,4 @@
-"""Outcomes of self-tests: faults are planted one at a time, and `verify` must notice each."""
+"""Outcomes of self-tests, in which `verify` must detect each planted fault."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """Whether a planted fault was noticed, by how many checks, and by which."""
+    """Whether the checks detected a planted fault, and how many failed."""
 
     name: str
     fault: str
@@ -25,19 +25,19 @@ class Outcome:
 
     @property
     def check(self) -> Check:
-        """Return the outcome as a check; its value is how many checks failed."""
+        """Return the outcome as a check, whose value is the number of failed checks."""
         return Name("self-test", self.name).judged(self.passed, self.note, float(self.failed))
 
 
 def control(failed: int, note: str) -> Outcome:
-    """Return the outcome without any fault, which passes if nothing failed."""
+    """Return the outcome of the control, without a fault."""
     return Outcome(CONTROL, "no fault: nothing may fail", failed == 0, failed, note)
 
 
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test, which the command `again` repeats, with `extra` fields."""
+    """Return the report of a self-test, with the JSON fields `extra`; `again` repeats it."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

@@ -1,4 +1,4 @@
-"""Python twins with one fault: copies of their source in which one piece of code is changed."""
+"""Python twins with one fault: copies of the sources with one replacement."""
 
 import importlib
 import itertools
@@ -23,7 +23,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 
 
 class TwinFault(NamedTuple):
-    """A fault in the Python version (the twin) of programs: a row of `data/plants.toml`."""
+    """A fault in a twin, the Python port of a program: a row of `data/plants.toml`."""
 
     file: str
     right: str
@@ -41,7 +41,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program whose twin is a faulty copy; if `both`, in place of the Fortran program too."""
+    """A program with a faulty twin, which replaces the Fortran program too if `both`."""
 
     module: ModuleType
     both: bool = True
@@ -57,7 +57,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return the fault named `name` in a program's twin, a context that yields the program."""
+    """Return a fault in a program's twin; its context yields the program."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

@@ -1,7 +1,6 @@
-"""Planted faults: one fault at a time, planted to test which check detects it.
+"""Planted faults, each of which tests which checks detect it.
 
-The compiled programs are altered at their entry point, and the Python twins in a copy of their
-source.
+Compiled programs are altered at their entry point, Python twins in a copy of their source.
 """
 
 import itertools
@@ -44,10 +43,7 @@ from pyharness.thesis.programs import Program
 
 @dataclass(frozen=True)
 class Plant:
-    """A fault that is planted to test the checks, and the kinds of checks that can detect it.
-
-    A fault of size 0 changes nothing; `size` is that of the self-test.
-    """
+    """A planted fault, its size in the self-test, and the kinds of checks that can detect it."""
 
     name: str
     fault: str
@@ -57,7 +53,7 @@ class Plant:
 
 
 def _stale() -> Change:
-    """Return a change that replaces a trajectory by the last one with as many rows, if any."""
+    """Return a change that replaces a trajectory by the previous one with as many rows."""
     before: dict[int, Trajectory] = {}
 
     def change(run: Trajectory, size: float) -> Trajectory:
@@ -68,13 +64,13 @@ def _stale() -> Change:
     return change
 
 
-# Results of the kernel of a prepared solver: omega, status, number of steps, and an array with the
+# Results of a prepared solver's kernel: omega, status, number of steps, and an array with the
 # estimated error and the error amplification.
 _Answer = tuple[Array, int, int, Array]
 
 
 def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
-    """Return a fault of prepared solvers: results become ``change(packed, result, size)``."""
+    """Return a fault that changes prepared solvers' results to ``change(packed, result, size)``."""
 
     def planted(size: float) -> AbstractContextManager[Any]:
         entry = extension.extension().solve_packed
@@ -87,7 +83,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which every second call of prepared solvers has the result before."""
+    """Return a context in which every second call of prepared solvers repeats the last result."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -109,7 +105,7 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
-    """Return results with too large an omega for fixed-step methods and Gauss collocation."""
+    """Return too large an omega for fixed-step methods and Gauss collocation."""
     omega, status, steps, found = answer
     wrong = omega * (1.0 + size)
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
@@ -122,7 +118,7 @@ def _shorter(scene: Scene, size: float) -> Scene:
 def _shorter_compiled(
     size: float, run: Callable[..., Trajectory], scene: Scene, *rest: Any
 ) -> Trajectory:
-    """Call a compiled program with a smaller step size, but return the times of its own."""
+    """Return a compiled run with a smaller step size, but the times of the original steps."""
     found, labels = run(_shorter(scene, size), *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
@@ -153,7 +149,7 @@ def _shifted(
     size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
     *rest: float,
 ) -> Trajectory:  # fmt: skip
-    """Call `solve` for times that are too late; only the true solution shows the fault."""
+    """Return results for later times, labelled with `times`; only the true solution shows it."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -175,7 +171,7 @@ def _wrong_card(size: float) -> AbstractContextManager[Any]:
 
 
 def _digit_altered(known: Problem, size: float) -> Problem:
-    """Return a published problem whose first omega, if any, is off by `size` times its accuracy."""
+    """Return a problem whose first published omega is off by `size` times its accuracy."""
     value = known.values[0]
     figure = next((each for each in value.omega if each is not None), None)
     if figure is None:

@@ -1,4 +1,4 @@
-"""Planted faults in the answers of a port and in the requests to it."""
+"""Planted faults in a port's answers and in the requests to it."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from pyharness.checks.port_protocol import VARIABLES
 from pyharness.model.listing import Listing
 
 Rows = list[list[float]]
-# A change of the parsed answer. It returns None if the fault has no meaning for this answer.
+# A change of the parsed answer; None if the fault can't occur in it.
 AnswerFault = Callable[[dict[str, Any]], dict[str, Any] | None]
 # A change of the request, as if the port ignored a field of it.
 RequestFault = Callable[[dict[str, Any]], None]
@@ -17,7 +17,7 @@ RequestFault = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class PortPlant:
-    """A fault that is planted in a port's answer, or in the request that the port gets."""
+    """A fault planted in a port's answer, or in the request to it."""
 
     name: str
     fault: str
@@ -266,4 +266,4 @@ PLANTS = (
     PortPlant("initial-torque", "the initial torque is ignored",
               request=_in_scene("initial_torque", change=lambda torque: None)),
 )  # fmt: skip
-"""The planted faults: first those in the answers of a port, then those in the requests."""
+"""The planted faults."""

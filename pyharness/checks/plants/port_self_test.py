@@ -1,4 +1,4 @@
-"""The self-test of `verify --port`: faults are planted in a port, and must be noticed."""
+"""The self-test of `verify --port`, which must detect faults planted in a port."""
 
 import copy
 import json
@@ -17,7 +17,7 @@ _MOST_CELLS = 24  # cells in which the faults are planted
 
 
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
-    """Yield what the check of a port notices, first without any fault, then with each fault.
+    """Yield the outcomes without a fault, then with each fault.
 
     Without valid answers, only a failed control is yielded.
     """
@@ -30,7 +30,7 @@ def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _chosen(cells: Sequence[Cell]) -> list[Cell]:
-    """Return at most `_MOST_CELLS` runs, with every program, if possible every case and ending."""
+    """Return at most `_MOST_CELLS` runs, a sample of all programs, listings and cases."""
     order = random.Random("self-test").sample(range(len(cells)), len(cells))
     found: dict[tuple[object, ...], int] = {}
     for n in order:
@@ -83,7 +83,7 @@ def _faulty(
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with floats in place of numbers that are texts."""
+    """Return a valid answer as a dictionary, with texts converted to floats."""
     answer: dict[str, Any] = json.loads(line)
     answer["rows"] = [[_float(x) for x in row] for row in answer["rows"]]
     if answer["stop"] is not None:
@@ -106,5 +106,5 @@ def _written(answer: dict[str, Any]) -> bytes:
 
 
 def _same(faulty: dict[str, Any], answer: dict[str, Any]) -> bool:
-    # As text, because NaN differs from itself, and because zeros have a sign.
+    # Compared as text, because NaN differs from itself, and zeros have a sign.
     return json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True)

@@ -1,4 +1,4 @@
-"""Self-test of `verify`: a fault at a time is planted in programs, methods and references."""
+"""Self-test of `verify`, with faults planted in programs, methods and references."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ _DRAWS = 12
 
 
 def self_test(seed: str, record: Path) -> Iterator[Outcome]:
-    """Yield which checks fail, first without any fault, and then with each planted fault."""
+    """Yield the outcomes without a fault, then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     failed, example = _failed(chosen)
     yield control(failed.total(), _note(failed, example))
@@ -25,7 +25,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return which of the chosen checks fail with a planted fault; the record is not enough."""
+    """Return whether checks other than of the golden record detect a planted fault."""
     with plant.planted(plant.size):
         failed, example = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
@@ -33,7 +33,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the number of failed checks of each kind, and one of them, if possible not golden."""
+    """Return the number of failed checks by kind, and one id, if possible not of the record."""
     names = [check.id for check in verify(chosen) if not check.passed]
     kinds = Counter(name.partition("/")[0] for name in names)
     return kinds, min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

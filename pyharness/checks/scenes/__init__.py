@@ -1,1 +1,1 @@
-"""Scenes for tests of methods: random scenes, extreme scenes, and transformations of a scene."""
+"""Scenes for tests of methods: random scenes, extreme scenes, and transformations."""

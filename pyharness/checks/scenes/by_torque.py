@@ -1,7 +1,7 @@
-"""Random scenes for a given kind of torque; no method was tuned on these scenes.
+"""Random scenes for each kind of torque, on which no method was tuned.
 
-Torques and frequencies are in proportion to the initial angular velocity, so that slow and fast
-bodies are affected in the same way.
+Torques and frequencies are proportional to the initial angular velocity, so that they affect slow
+and fast bodies alike.
 """
 
 import math
@@ -30,9 +30,9 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
 
 
 def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
-    """Return a random scene, and the time (s) in which its body makes roughly 1 to 300 revolutions.
+    """Return a random scene, and the time (s) of roughly 1 to 300 revolutions.
 
-    The texts are keys of `LAWS`, `SPEEDS` and `BODIES`.
+    `law`, `speed` and `body` are elements of `LAWS`, `SPEEDS` and `BODIES`.
     """
     mass = _log(source, 1.0, 50.0)
     moments = [mass * each for each in BODIES[body](source)]
@@ -48,8 +48,8 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
 
     found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
     if law in ("constant torque", "ramp"):
-        # Until the end the torque alone would add `gain` times the initial |omega|. The horizon
-        # is such that the mean |omega| leads to the desired number of revolutions.
+        # By the end the torque alone would add `gain` times the initial |omega|. The mean |omega|
+        # determines the time of the desired number of revolutions.
         gain = _log(source, 0.1, 30.0)
         constant = law == "constant torque"
         horizon /= 1.0 + gain / (2.0 if constant else 3.0)

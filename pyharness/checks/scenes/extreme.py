@@ -1,4 +1,4 @@
-"""Extreme scenes, each with a name and an end time, in five named groups that are called suites.
+"""Extreme scenes with end times, in five named groups, the suites.
 
 Only one scene has a torque: Case 6 of the thesis.
 """
@@ -15,7 +15,7 @@ from pyharness.model.scene_file import case_scene
 
 
 class Circumstance(NamedTuple):
-    """One named extreme scene, and the time (s) until which methods are tested on it."""
+    """A named extreme scene, and the end time (s)."""
 
     name: str
     scene: Scene
@@ -23,7 +23,7 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound of the relative rate of change (1/s) of omega without torque."""
+    """Return a bound (1/s) of the rate of change of torque-free omega, over `largest` (rad/s)."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
@@ -38,9 +38,9 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Moments of a body for motions near the separatrix. A = C = 1/2 are exact in binary64. Therefore a
-# motion whose perturbations about axes 1 and 3 are equal is on the separatrix, where the body flips
-# only once.
+# Moments of a body for motions near the separatrix. A = C = 1/2 are exact in binary64, so that
+# equal perturbations about axes 1 and 3 give a motion on the separatrix, where the body flips only
+# once.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
 _FLIPS = 5
@@ -48,7 +48,7 @@ _FLIPS = 5
 
 def quarter(disturbance: float) -> float:
     """Return a quarter of the period (s) from omega = (`disturbance`, 1, 0) rad/s."""
-    # The quarter period, which is the complete elliptic integral K(k) over the frequency, by the
+    # The quarter period is the complete elliptic integral K(k) over the frequency, computed by the
     # arithmetic-geometric mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
@@ -57,10 +57,11 @@ def quarter(disturbance: float) -> float:
 
 
 def _separatrix() -> Iterator[Circumstance]:
-    """Yield scenes that begin with a perturbed rotation about the axis of the middle moment.
+    """Yield perturbed rotations about the axis of the middle moment.
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
-    end times are before the first, and in the first and fifth. Other scenes are on the separatrix.
+    end times are before the first flip, and in the first and the fifth. Other scenes are on the
+    separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
@@ -125,7 +126,7 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield scenes of needles, coins, plates, impossible bodies in several orders, and Case 6."""
+    """Yield needles, coins, plates, impossible bodies, with axes in several orders, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)
@@ -187,4 +188,4 @@ EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {
     "scales": _scales,
     "attitude": _attitude,
 }
-"""The functions that yield the extreme scenes, by the name of the suite, for example scales."""
+"""The functions that yield the extreme scenes, by suite."""

@@ -1,4 +1,4 @@
-"""Random scenes of several named kinds, such as near-symmetric: a function draws each kind."""
+"""Random scenes of named kinds, such as near-symmetric."""
 
 import math
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from pyharness.model.torque_law import TorqueLaw, Wave
 
 
 def _body(source: Random) -> list[float]:
-    """Return random principal moments (kg m2) that a body can have, in ascending order."""
+    """Return random possible moments (kg m2) in ascending order."""
     low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
     return [low, middle, source.uniform(middle, low + middle)]
 
@@ -40,7 +40,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return a rotation of `spin` about axis 2 plus a perturbation up to `faint` (rad/s)."""
+    """Return omega (rad/s) of `spin` about axis 2, plus a perturbation of at most `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -74,7 +74,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with two to six waves, 1e-6 to 630 rad/s, some in pairs."""
+    """Return a random scene with two to six waves of 1e-6 to 630 rad/s, some as sine and cosine."""
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -125,12 +125,12 @@ def _long(source: Random) -> Scene:
 
 
 def _no_body(source: Random) -> Scene:
-    """Return a random scene with coefficients A, B, C of no possible body."""
+    """Return a random scene with coefficients A, B, C that no body has."""
     return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
 
 
 def _extreme(source: Random) -> Scene:
-    """Return a random scene with numbers from nearly all of binary64; most overflow."""
+    """Return a random scene with numbers from nearly all of binary64; most such runs overflow."""
 
     def any_size() -> float:
         if source.random() < 0.1:
@@ -175,17 +175,17 @@ NASTY: dict[str, Callable[[Random], Scene]] = {
     "coefficients": _no_body,
     "extreme": _extreme,
 }
-"""The functions that return random scenes which are difficult for numerical methods, by kind."""
+"""The functions that return scenes difficult for numerical methods, by kind."""
 
 KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 """The functions that return random scenes, by kind."""
 
 
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
-    """Return a random torque law, in which no component of a term exceeds `size` (N m, N m/s).
+    """Return a random torque law whose components do not exceed `size` (N m, N m/s).
 
-    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are lowest
-    and highest (rad/s).
+    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are the
+    lowest and the highest (rad/s).
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
@@ -205,7 +205,7 @@ def _scene(
     coefficients: Triple | None = None,
     torque: bool = True,
 ) -> Scene:
-    """Return a scene with random torque and steps; give `moments` (kg m2) or `coefficients`."""
+    """Return a scene with random torque and steps, from `moments` (kg m2) or `coefficients`."""
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
 
     def wave(most: float) -> list[Wave]:

@@ -1,4 +1,4 @@
-"""Random scenes of moderate size, in which the integrator of any other program can be judged."""
+"""Random scenes of moderate size, for judging integrators of other programs."""
 
 from random import Random
 
@@ -6,15 +6,14 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 KINDS = ("free", "constant", "wave")
-"""The kinds of scenes: without torque, under a constant torque, and under waves and a
-linear torque."""
+"""The kinds of scenes: torque-free, constant torque, and waves with a linear torque."""
 
 
 def draw_moderate(seed: str, kind: str, number: int) -> Scene:
-    """Return scene `number` of a seed, with the torque of a kind, a member of `KINDS`.
+    """Return scene `number` of a seed, with a torque of `kind`, an element of `KINDS`.
 
     The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
-    steps of 6 s in all. Torques are some tenths of a moment times 1/s2.
+    steps, 6 s in all. Torques are some tenths of a moment times 1/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Copies of a scene in each of which one number is perturbed."""
+"""Copies of a scene with one perturbed number each."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,7 +11,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
-    """Yield a copy of the scene for each of its numbers other than 0, times 1 + `part`."""
+    """Yield copies of the scene, each with one nonzero number multiplied by 1 + `part`."""
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):
             yield _with(scene, name, triple)

@@ -1,4 +1,4 @@
-"""Random scenes, listings and parameters for checks, reproducible from a seed and a number."""
+"""Random scenes, listings and parameters, reproducible from a seed and a number."""
 
 import datetime
 from dataclasses import dataclass, replace
@@ -11,15 +11,14 @@ from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene import Scene
 
 COARSEST = 1e-3
-# Defects that were added to the project later. They are drawn last, so that the draws of a seed
-# did not change.
+# Defects added later are drawn last, so that the draws of a seed do not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """The random inputs of one check: a scene, a program, and parameters of their runs."""
+    """The random inputs of one check: a scene, a program, and parameters of the runs."""
 
     scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
     listing: Listing  # of any program, with random defects and readings
@@ -31,23 +30,23 @@ class Draw:
 
     @property
     def time(self) -> float:
-        """The end time (s) of a method's integration; negative if it is backward in time."""
+        """Return the end time (s) of a method's run; negative if backward."""
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the relative tolerance, from 1e-3 to a method's `finest` by `digits`."""
+        """Return the relative tolerance, by `digits` between 1e-3 and a method's `finest`."""
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day`, by default today, as in 2026-W47; a seed of random checks."""
+    """Return the week of `day`, by default today, as in 2026-W47, for use as a seed."""
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the random inputs of check `number`, the same in every version of Python."""
-    # Each draw has its own random generator, so that it can be repeated without the other draws.
+    """Return the random inputs of check `number`, equal in all versions of Python."""
+    # A generator for each draw, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)
     if number % 2 == 1:
@@ -73,10 +72,10 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def text_generator(seed: str) -> np.random.Generator:
-    """Return the random generator of NumPy that a text determines."""
+    """Return NumPy's random generator with a text as seed."""
     return np.random.default_rng([ord(letter) for letter in seed])
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the scene of a kind, a key of `scenes.kinds.KINDS`, that `seed` determines."""
+    """Return the scene of a kind, a key of `scenes.kinds.KINDS`, for a seed."""
     return replace(KINDS[kind](Random(seed)), name=name)

@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-They are sums of recorded functions or ready terms, in proportion to the gyroscopic torque, so that
-slow and fast bodies are affected in the same way. Times may be negative.
+Torques are sums of recorded functions or ready terms. They are proportional to the gyroscopic
+torque, so that they affect slow and fast bodies alike. End times may be negative.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
-# A torque over the size of the moments, for symbols or numbers: (t, omega, attitude).
+# A torque over the size of the moments, as a function of t, omega and attitude, for symbols or
+# numbers.
 Term = Callable[[Any, Any, Any], Any]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
@@ -46,7 +47,7 @@ TIMED = ("table", "pulses")  # ready terms that depend on time alone
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
-    """Return a random scene under one to three terms of `names`, and a time (s)."""
+    """Return a random scene under one to three terms of `names`, and its end time (s)."""
     chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
     moments = [size * x for x in _moments(source)]
@@ -73,7 +74,7 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
-    """Return a random scene under one or two ready terms of `names`, and a time (s)."""
+    """Return a random scene under one or two ready terms of `names`, and its end time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
     moments = [size * x for x in _moments(source)]
@@ -92,7 +93,7 @@ def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, f
 
 
 def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
-    """Return a ready term with random arguments, about the size of the gyroscopic torque."""
+    """Return a ready term with random arguments, similar in size to the gyroscopic torque."""
     part = max(moments) * speed * source.uniform(0.05, 1.0)
     vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
     several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
@@ -136,7 +137,7 @@ def _moments(source: Random) -> list[float]:
 
 
 def term(source: Random, name: str, size: float, speed: float) -> Term:
-    """Return a random torque of one kind that is about `size` (kg m2) times `speed` squared."""
+    """Return a random torque of the kind `name`, of about `size` (kg m2) times `speed` squared."""
     scale = size * speed * source.uniform(0.05, 1.0)
     a, b, c = (source.uniform(-1.0, 1.0) for _ in range(3))
     vector = np.array([source.uniform(-1.0, 1.0) for _ in range(3)])
@@ -177,17 +178,17 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
 
 
 def orbit(t: Any, rate: float) -> Any:
-    """Return the direction to a satellite in a circular orbit about the third axis of space."""
+    """Return the direction, about the axes of space, to a satellite in a circular orbit."""
     return np.array([np.cos(rate * t), np.sin(rate * t), 0.0 * t])
 
 
 def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
-    """Return a torque like that of the gravity gradient, r x I r with the direction r."""
+    """Return a torque r x I r like the gravity gradient, with r the direction to the satellite."""
     r = to_body(q, orbit(t, rate))
     return np.cross(r, inertia * r)
 
 
 def to_body(q: Any, vector: Any) -> Any:
-    """Return components about the body axes of a vector given about the axes of space."""
+    """Return the body-axis components of a vector about the axes of space."""
     w, v = q[0], q[1:]
     return (w * w - v @ v) * vector + 2.0 * (v @ vector) * v - 2.0 * w * np.cross(v, vector)

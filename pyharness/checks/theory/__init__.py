@@ -1,1 +1,1 @@
-"""Error bounds and stability limits, derived before any program runs."""
+"""Error bounds and stability limits, derived without running a program."""

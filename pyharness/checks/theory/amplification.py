@@ -1,9 +1,9 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
-multiplies x by a matrix of polynomials in z, h times an eigenvalue of J, derived in exact
-fractions; hJ may replace z. It has m rows for the m vectors that a program propagates: two in the
-original Runge-Kutta program, the result and U(1), at which the first stage is evaluated.
+A perturbation x of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
+multiplies x by a matrix of polynomials in z, h times an eigenvalue of J, in exact fractions; hJ may
+replace z. The matrix has m rows for the m vectors that a program propagates. In the original
+Runge-Kutta program these are two, the result and U(1), at which the first stage is evaluated.
 """
 
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ from pyharness.model.listing import Listing
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# If the stability boundary is nearer to z = 0 than this distance, it is regarded as being at z = 0.
+# A stability boundary nearer to z = 0 than this counts as being at z = 0.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
-    """The matrix by which one step multiplies a perturbation, of polynomials in z."""
+    """The matrix of polynomials in z by which one step multiplies a perturbation."""
 
-    # fractions, shape (m, m, 5): for element (i, j) the coefficients of 1, z ... z**4. The last row
-    # belongs to the result of the step, the other rows to vectors such as U(1).
+    # fractions, shape (m, m, 5): the coefficients of 1, z, ..., z**4 of each element. The last row
+    # is for the result of the step, the other rows for vectors such as U(1).
     coefficients: Fractions
 
     @property
@@ -39,19 +39,19 @@ class Amplification:
         return len(self.coefficients)
 
     def evaluate(self, z: Complex) -> Complex:
-        """Return the matrix for each element of `z`, shape (..., m, m)."""
+        """Return the matrix at each element of `z`, shape (..., m, m)."""
         powers = np.stack([z**k for k in range(_HIGHEST)], axis=-1)
         return np.asarray(np.einsum("...k,ijk->...ij", powers, self.coefficients.astype(float)))
 
     def radius(self, z: Complex) -> NDArray[np.float64]:
-        """Return the spectral radius for each element of `z`."""
+        """Return the spectral radius at each element of `z`."""
         return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
         """Return the matrix without row and column of the step's result, if possible.
 
-        It is if no other vector depends on the previous result, and its factor in the new result,
-        the eigenvalue that is lost, does not depend on z.
+        This is possible if no other vector depends on the previous result, and if the factor of the
+        previous result in the new one, the omitted eigenvalue, does not depend on z.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -59,7 +59,7 @@ class Amplification:
         return self
 
     def exact_matrix(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix, of order m n, of a step of n equations x' = J x, from hJ."""
+        """Return the exact matrix, of order m n, for n equations x' = J x, from hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -74,11 +74,11 @@ class Amplification:
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the amplification matrix of step number `step` of a program.
+    """Return the amplification matrix of step `step` of a program.
 
     `step`, from 1, matters only with the defect `dt-accumulates`, which moves the collocation
-    points. In collocation the first estimate is a straight line, along which the one correction
-    evaluates the right-hand side.
+    points. A collocation program evaluates the right-hand side along a straight line, its first
+    estimate, and corrects once.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -89,10 +89,10 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the integral of s**2 / h**3 over a step by a collocation program; exact is 1/3.
+    """Return a collocation program's integral of s**2 / h**3 over a step; exact is 1/3.
 
-    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), Q its quadratic part; the
-    integral is the weight of Q(F) in the result. `step` is from 1.
+    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), where Q is its quadratic
+    part. The integral is the weight of Q(F) in the result. `step` is from 1.
     """
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
@@ -100,7 +100,7 @@ def weight_of_squares(listing: Listing, step: int) -> Fraction:
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return collocation points and weights in step sizes; `dt-accumulates` moves them."""
+    """Return collocation points and weights, in step sizes."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)
@@ -109,7 +109,7 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 def _runge_kutta(listing: Listing) -> Amplification:
     """Return the matrix of the Runge-Kutta program (cards 770-1200).
 
-    The stages depend on U(1) and on the base of the step, the result of the previous step.
+    Stages depend on U(1) and on the base of the step, the previous result.
     """
     first, base = _one(2, 0), _one(2, 1)
     half = Fraction(1, 2)
@@ -130,7 +130,7 @@ def _runge_kutta(listing: Listing) -> Amplification:
     matrix = np.array([kept, result], dtype=object)
     if listing.has("base-not-restored"):
         return Amplification(matrix)
-    # U(1) and the base are the same vector, so that their columns are added.
+    # U(1) and the base are the same vector, whose columns are added.
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
 
 
@@ -159,9 +159,9 @@ def _polynomial_text(coefficients: Fractions) -> str:
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     """Return the distance of the stability boundary from z = 0, and a slope.
 
-    `direction` is -1 for the negative real axis or 1j for the imaginary axis. The slope is that of
-    the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow at a distance
-    of 1/16.
+    `direction` is -1 for the negative real axis or 1j for the imaginary axis. The slope is the
+    derivative of the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow
+    at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:

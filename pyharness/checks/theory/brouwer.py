@@ -1,8 +1,8 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
-Brouwer 1937, Astronomical Journal 46: with random rounding errors those of energy and momentum grow
-like the root of the number of steps, and that of the phase like its power 3/2; with biased ones
-like the powers 1 and 2.
+Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
+the power 1/2 of the number of steps, and the phase error with the power 3/2; with biased rounding
+the powers are 1 and 2.
 """
 
 import math
@@ -41,7 +41,7 @@ POWER = Basis(
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds of rounding and truncation error of a step, relative to the largest abs(omega)."""
+    """Bounds of the rounding and truncation errors of a step, over the largest abs(omega)."""
 
     step: float  # step size, s
     rounding: float  # bound of the rounding error, whose sign is random
@@ -52,7 +52,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """Samples of one torque-free motion, and quantities for error bounds."""
+    """Samples of one torque-free motion, and factors for error bounds."""
 
     # samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
     # (rad/s2), and the Jacobian of this derivative with respect to omega (1/s)
@@ -70,15 +70,15 @@ class Orbit:
         """Return the bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # The result is rounded once more. Each of A, B, C has two rounding errors. At any time they
-        # change the conserved quantities by at most four rounding errors of the energy.
+        # The result is rounded once more. A, B and C have two rounding errors each, which change
+        # the conserved quantities by at most four rounding errors of the energy at any time.
         found = {
             name: (walk + (0.0 if noise.conserves else drift) + ROUNDING) * self.gains[name]
             + 4.0 * ROUNDING
             for name in ("energy", "momentum")
         }
-        # An error made in step k of n shifts the frequency for the n - k steps that follow. The sum
-        # over k of the squares of n - k is near n**3 / 3.
+        # An error in step k of n shifts the frequency for n - k steps. The sum of (n - k)**2 is
+        # near n**3 / 3.
         shear = self.gains["frequency"] * noise.step
         late = walk * steps / math.sqrt(3.0)
         if not noise.conserves:
@@ -90,8 +90,8 @@ class Orbit:
 def orbit(scene: Scene) -> Orbit:
     """Return samples of omega over two periods, and the factors of error bounds.
 
-    The scene has moments and no torque. The factors multiply an error of omega in energy, momentum,
-    frequency (2 pi over the period of omega) and phase.
+    The scene has moments and no torque. The factors are from an error of omega to the errors of
+    energy, momentum, frequency (2 pi over the period of omega) and phase.
     """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
@@ -106,8 +106,8 @@ def orbit(scene: Scene) -> Orbit:
         weight = moments**power
         total = (weight * states**2).sum(axis=1)
         part = (weight * np.abs(states)).sum(axis=1) * largest / total
-        # A relative error of omega counts twice in the energy, which is quadratic in omega, and
-        # once in the momentum, which is the root of a quadratic form.
+        # A relative error of omega counts twice in the energy, a quadratic form, and once in the
+        # momentum, the root of one.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
     along = jacobians(scene, states)
@@ -145,12 +145,12 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Return error bounds of a step h (s) of Gauss collocation with s = `stages` stages.
 
     The sum at each node has s + 3 roundings of the right-hand sides and one of omega, multiplied by
-    the inverse of 1 - h A J: A is the tableau's matrix, J the Jacobian. Gauss collocation conserves
-    quadratic invariants for any step size. The truncation error is the integral of the
+    the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian. Gauss collocation
+    conserves quadratic invariants for any step size. The truncation error is the integral of the
     state-transition matrix times the residual, which is zero at the nodes, the zeros of an
-    orthogonal polynomial; only power s of time in the other factor contributes. By Leibniz's rule
-    its coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j
-    of omega.
+    orthogonal polynomial. Therefore only power s of time in the other factor contributes. By
+    Leibniz's rule its coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor
+    term 2s + 1 - j of omega.
     """
     from pyharness.checks.theory.tableau import tableau
 
@@ -176,7 +176,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms of a step (s) from n states, in rad/s, shape (n, 3) each."""
+    """Return the Taylor terms of a step (s) from n states (rad/s), shape (n, 3) each."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -190,11 +190,10 @@ def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
 def errors(
     scene: Scene, body: Orbit, time: float, omega: Array, rounded: bool = True
 ) -> dict[str, float]:
-    """Return the relative errors of energy and momentum and the phase error (rad), signed.
+    """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion, which `body` contains. If `rounded`, the exact solution is computed with A, B, C
-    rounded to binary64, as a method uses them.
+    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, like a method.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -216,21 +215,18 @@ def errors(
 
 
 def root_mean_square(found: Array) -> Array:
-    """Return the root mean square over rows (initial conditions); NaN is ignored."""
+    """Return the root mean square over rows (initial conditions), ignoring NaN."""
     return np.asarray(np.sqrt(np.nanmean(np.asarray(found) ** 2, axis=0)))
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the power of the steps (columns) with which errors grow, by a logarithmic fit."""
+    """Return the fitted power of the number of steps (columns) with which errors grow."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
 
 def _frequency(a: Array, omega: Array) -> float:
-    """Return 2 pi over the period of omega without torque (rad/s).
-
-    The frequency is computed by the arithmetic-geometric mean.
-    """
+    """Return 2 pi over the period of torque-free omega (rad/s)."""
     (odd,) = (i for i in range(3) if a[i] * a[i - 1] < 0.0 and a[i] * a[i - 2] < 0.0)
     squares = [abs(a[i - 1] * a[i - 2]) * omega[i] * omega[i] for i in range(3)]
     small, large = sorted((squares[odd - 1], squares[odd - 2]))
@@ -241,7 +237,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of abs(derivatives) of `_frequency` by omega, by central differences."""
+    """Return the sum of abs(derivatives) of `_frequency` by omega, from central differences."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -1,7 +1,7 @@
-"""The collocation matrices (eq. 36), and the accuracy with which LEQT1F solves their systems.
+"""The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
-Every float is a fraction; exact solutions are computed in fractions. `program` is "two-term" or
-"four-term".
+Every float is a fraction, so that exact solutions are computed in fractions. `program` is
+"two-term" or "four-term".
 """
 
 import math
@@ -36,7 +36,7 @@ HIGHAM = Basis(
     "Higham 2002, theorem 9.4, in exact fractions; the factors, and that no operation underflows "
     "or overflows, are checked (`theory/collocation_matrices.py`)",
 )
-"""Basis of the bounds of which `Solved` has the ratios `residual`, `forward` and `increment`."""
+"""Basis of the bounds in the ratios `residual`, `forward` and `increment` of `Solved`."""
 PIVOTS = Basis(
     "derived",
     "choice of pivots by LEQT1F, and the step size at which its matrix is singular",
@@ -85,17 +85,14 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s), with the rounding errors of a program's formulas."""
+    """Return the collocation points (s), rounded as by a program's formulas."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
 def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides, shape (6, count).
-
-    They are constant, proportional to the index, 1 and -1 in turn, and three random ones.
-    """
+    """Return six right-hand sides, three regular and three random, shape (6, count)."""
     rough = np.random.default_rng(count).normal(size=(3, count))
     places = range(count)
     return np.array(
@@ -104,7 +101,7 @@ def _right_hand_sides(count: int) -> Array:
 
 
 def solved(program: str, step: float) -> Solved:
-    """Return LEQT1F's accuracy for the collocation matrix at one step size (s)."""
+    """Return LEQT1F's accuracy for the collocation matrix of one step size (s)."""
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
@@ -124,11 +121,11 @@ def solved(program: str, step: float) -> Solved:
         return Solved(ier, differing, condition, scaled_condition)
     lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
     upper = fractions(np.triu(factors))
-    # Find, for each row of L U, the row of the matrix that it equals except for rounding.
+    # Each row of L U equals a row of the matrix except for rounding.
     order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
     sizes = abs(lower) @ abs(upper)
     growth = float(norm(sizes / columns) / norm(scaled))
-    # The bounds need the rows of `sizes` in the order of the matrix.
+    # The bounds take `sizes` in the matrix's order of rows.
     sizes = sizes[np.argsort(order)]
 
     def errors(solutions: Array) -> list[float]:
@@ -150,7 +147,7 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step (s) small enough for rows with the largest element 1, and the matrix."""
+    """Return a step (s) so small that 1 is the largest element of each row, and the matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
@@ -158,11 +155,12 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
 def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
-    Both are in units of 2**-53 times step size times rate. The first is for a rate equal at all
-    points, so that only c1 is not zero; the second, times the relative deviation, for deviations
-    from it. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002, theorem 9.4),
-    with n points, the powers of the step size, the factors L and U of the matrix and the solution
-    X. The bounds do not depend on the step size as long as 1 is the largest element of each row.
+    Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
+    points, so that only c1 is not zero. The second, times the relative deviation, is for deviations
+    from equal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002,
+    theorem 9.4), with n points, the powers of the step size, the factors L and U of the matrix and
+    the solution X. They do not depend on the step size as long as 1 is the largest element of each
+    row.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -178,11 +176,11 @@ def solver_roundings(program: str) -> tuple[float, float]:
 
 
 def singular_below(program: str, bits: int = 53) -> float:
-    """Return the step size (s) at and below which LEQT1F must declare the matrix singular.
+    """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    It does if the computed sum N + p equals N, for a scaled pivot p and N rows: if p is at most
-    half a unit in the last place of N, a power of 2 with the unit N 2**(1 - bits). A tie is rounded
-    to even N. The last scaled pivot, proportional to step**(N-1), decides.
+    It reports one if the computed sum N + p equals N, for a scaled pivot p and N rows: if p is at
+    most half a unit in the last place of N, a power of 2 with the unit N 2**(1 - bits). A tie is
+    rounded to even N. The last scaled pivot, proportional to step**(N-1), decides.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -193,7 +191,7 @@ def singular_below(program: str, bits: int = 53) -> float:
 
 
 def declared_singular_below(program: str) -> float:
-    """Return the largest step (s) that the compiled LEQT1F declares singular, by bisection."""
+    """Return the largest step (s) for which the compiled LEQT1F reports a singular matrix."""
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
@@ -223,8 +221,8 @@ def _errors(
     """Return the ratios of three errors of a solution X to their bounds, and a relative error.
 
     The ratios are for the residual, the elements of X, and the increment of an unknown over the
-    step. The last is the error of the increment over `step` (s) times the largest element of
-    `side`. `solver` is the exact inverse, `sizes` abs(L) abs(U) in the matrix's order of rows.
+    step. The last value is the error of the increment, over `step` (s) times the largest element of
+    `side`. `solver` is the exact inverse, `sizes` is abs(L) abs(U) in the matrix's order of rows.
     """
     count = len(matrix)
     x, b = fractions(found), fractions(side)
@@ -235,8 +233,8 @@ def _errors(
     for c in found:
         total, power = total + c * power, power * float(step)
     powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
-    # There are up to three roundings in a power of the step size, one in its product with the
-    # coefficient c, and n in the sum.
+    # At most three roundings in a power of the step size, one in its product with the coefficient
+    # c, and n in the sum.
     bound = powers @ (reach + gamma(count + 4) * abs(x))
     missed = abs(Fraction(total) - powers @ truth)
     return (
@@ -256,8 +254,8 @@ def _theorem_holds(
 ) -> bool:
     """Return whether the hypotheses of Higham's theorem 9.4 hold.
 
-    `lower` and `upper` must be LU factors of the rows in `order`, except for the errors of theorem
-    9.3, and no operation on `operands` may underflow or overflow.
+    `lower` and `upper` must be LU factors of the rows in `order`, within the errors of theorem 9.3,
+    and no operation on `operands` may underflow or overflow.
     """
     sizes = np.abs(np.concatenate([np.ravel(each) for each in operands]))
     sizes = sizes[sizes != 0.0]
@@ -272,22 +270,22 @@ def _share(error: Fraction, bound: Fraction) -> float:
     if not error or not bound:
         return math.inf if error else 0.0
     ratio = error / bound
-    # A ratio above 1 must not be rounded to 1, so that the comparison with 1 is exact.
+    # A ratio above 1 must not be rounded to 1, so that its comparison with 1 is exact.
     return max(float(ratio), math.nextafter(1.0, 2.0)) if ratio > 1 else float(ratio)
 
 
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the largest relative shortfall of a pivot from the best candidate, and its bound.
 
-    The pivots are those of exact elimination in `order`, as the solver chose them. The bound, from
-    `sizes` (abs(L) abs(U)), is what rounding may cause.
+    The pivots are from exact elimination in `order`, the solver's choice. The bound is the effect
+    of rounding, from `sizes`, abs(L) abs(U).
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
-        # Two pivot candidates are compared. Each has the rounding errors of its sum and its scale.
+        # Both candidates of a comparison have the rounding errors of a sum and a scale.
         wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)
@@ -298,8 +296,8 @@ def _columns(
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
     """Eliminate a matrix exactly; yield pivot row, candidates and rows before each column.
 
-    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`
-    the largest is taken, as in LEQT1F.
+    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`,
+    the largest candidate becomes the pivot, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

@@ -1,7 +1,7 @@
-"""Error amplification by Euler's equations themselves, which bounds all methods.
+"""Error amplification by Euler's equations themselves, which affects all methods.
 
-The state-transition matrix Phi(t, s), of the equations linearised along the solution, multiplies an
-error of omega at s until t.
+The state-transition matrix Phi(t, s) of the equations linearised along the solution multiplies an
+error of omega at time s to give the error at t.
 """
 
 import math
@@ -19,11 +19,11 @@ ROUNDING = 2.0**-53
 # Bound of the number of roundings in a right-hand side of Euler's equations: two in each of A, B,
 # C, two in the products, and those of the sums.
 _ROUNDINGS = 8.0
-# Rounding error of an attitude (rad). As an angle it is twice the rounding error of a component of
-# the quaternion, which has some twenty roundings.
+# Rounding error of an attitude (rad), twice the rounding error of a component of the quaternion,
+# which has some twenty roundings.
 ATTITUDE = 40.0 * ROUNDING
-# Up to this error amplification, the error of a method must be at most its tolerance. Beyond it,
-# the tolerance is multiplied by the error amplification.
+# Largest error amplification at which a method's error must be at most its tolerance. Beyond it,
+# the tolerance is amplified.
 LIVELY = 1e3
 FLOW = Basis(
     "derived",
@@ -46,18 +46,17 @@ class Conditioning:
     # the result are wrong by a few roundings of their own magnitude, in the worst direction
     rounding: float
     storing: float  # error at the end over `largest`, caused by each step that rounds omega
-    # sum of the errors in `rounding` without amplification, which bounds the errors of the
-    # invariants
+    # NaN allows no error.
     unamplified: float
     largest: float  # largest magnitude of any component of omega until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the largest final error of omega that a method may have, over `largest`.
 
-        `made`, the relative sum of the errors allowed in the steps, is multiplied by the
-        amplification; two bounds of amplified rounding errors are added, the second proportional to
-        `steps`, how often omega is rounded (0 with compensated summation). The limit is at most 2,
-        as components up to `largest` differ by no more.
+        `made`, the relative sum of the errors allowed in the steps, is amplified. Two bounds of
+        amplified rounding errors are added; the second is proportional to `steps`, the number of
+        roundings of omega (0 with compensated summation). The limit is at most 2, because
+        components up to `largest` differ by no more.
         """
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.
@@ -66,8 +65,8 @@ class Conditioning:
     def angle_limit(self, made: float, time: float) -> float:
         """Return the largest error of an attitude at `time` (s), in rad.
 
-        It is `made` (rad), the attitude's rounding error, and the angle from the largest rounding
-        error of omega at all times.
+        It is the sum of `made` (rad), the attitude's rounding error, and the angle that results
+        from the largest rounding error of omega at all times.
         """
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
@@ -77,7 +76,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
     Raise InputError if the solution grows without bound before, if it would be needed at too many
-    times, or if the amplification is beyond binary64.
+    times, or if the amplification exceeds binary64.
     """
     times = _nodes(scene, time)
     omega, complete = _path(scene, times)
@@ -89,8 +88,8 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the final sensitivity along the solution `omega` (rad/s, (n, 3)) at `times` (s).
 
-    The times begin at 0, and omega changes little between them. Raise InputError if the
-    amplification is beyond the range of binary64.
+    Times begin at 0, with little change of omega between them. Raise InputError if the
+    amplification exceeds binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -124,7 +123,7 @@ def _nodes(scene: Scene, time: float) -> Array:
         with np.errstate(all="ignore"):
             largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
         wanted = largest * abs(time) * _NODES_PER_RADIAN
-        # `wanted` is NaN if numbers are so large that their product is undefined.
+        # `wanted` is NaN if the product of very large numbers is undefined.
         if not wanted <= _MOST_NODES:
             raise InputError(
                 "conditioning: the motion is too fast for so long a time; use a shorter time"
@@ -143,9 +142,9 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
     """Return the sensitivity of a final state, from state-transition matrices.
 
-    `flow` has the matrix from each time to the last, shape (n, m, m); `state` is (n, m), like
-    `source`, the sums of magnitudes of the terms of its derivative (1/s). Errors are divided by
-    `largest`.
+    `flow` has the matrix from each time to the last, shape (n, m, m). `state` and `source`, the
+    sums of magnitudes of the terms of its derivative (1/s), have the shape (n, m). Errors are
+    divided by `largest`.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -153,14 +152,14 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # The initial state and the result are rounded once each, however short the time is.
+    # Initial state and result are rounded once each, even in a very short time.
     ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     return Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        # Two divisions, because the product of the divisors may underflow.
+        # The product of the divisors might underflow.
         storing=ROUNDING * float(gathered(np.abs(state)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
@@ -170,8 +169,8 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sums of magnitudes of the terms of Euler's equations (1/s2), shape (n, 3).
 
-    That of a sine or cosine is multiplied by 1 plus its angle, whose rounding error is proportional
-    to its size.
+    A sine or cosine is multiplied by 1 plus its angle, because the angle's rounding error is
+    proportional to its size.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)

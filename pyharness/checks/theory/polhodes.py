@@ -1,6 +1,6 @@
-"""Polhodes, and the growth rates of all bodies, as data for plots.
+"""Polhodes, and growth rates for all bodies, as data for plots.
 
-A polhode, the path of omega without torque, is shown by the direction of the angular momentum.
+A polhode, the path of torque-free omega, is shown by the direction of the angular momentum.
 """
 
 import math
@@ -18,12 +18,12 @@ _POINTS = 181
 
 
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
-    """Yield the name and the points, shape (n, 3), of curves of L / abs(L) without torque.
+    """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
 
     L is the angular momentum along the body axes. The last two curves are in the planes of the
-    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), j = 1 / I (kg m2), axis 2 that of the
-    middle moment. With two equal moments both are perpendicular to the third axis. A sphere has no
-    curves.
+    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), where j = 1 / I (kg m2) and axis 2 has the
+    middle moment. With two equal moments both planes are perpendicular to the third axis. A sphere
+    has no curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -57,8 +57,8 @@ def growth_of_bodies(first: Array, third: Array) -> Array:
     -C, from -1 to 1.
     """
     a, c = first, -third
-    # Coefficients that belong to moments satisfy A + B + C + ABC = 0. At two corners of the square
-    # of K1 and K3, which belong to bodies without extent, B is arbitrary.
+    # Coefficients of a body satisfy A + B + C + ABC = 0. At two corners of the square of K1 and K3,
+    # for bodies without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):
         b = -(a + c) / (1.0 + a * c)
     b = np.where(np.isfinite(b), b, 0.0)

@@ -45,6 +45,6 @@ def norm(matrix: Fractions) -> Fraction:
 
 
 def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
-    """Return the derivatives of t, t**2, ..., t**n at n points, a row each (eq. 36)."""
+    """Return the matrix of derivatives of t, t**2, ..., t**n, one row per point (eq. 36)."""
     rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
     return np.array(rows, dtype=object)

@@ -18,17 +18,12 @@ _HIDDEN = 1e-13  # largest growth that is regarded as a rounding error
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The spectral radius of one amplification matrix on a grid of z.
-
-    The imaginary axis has finer samples.
-    """
+    """The spectral radius of an amplification matrix on a grid of z and on the imaginary axis."""
 
     name: str  # a text that names the programs and methods that have this matrix
-    # shape (imaginary, real); spectral radius on the grid. The vector of the step's result is left
-    # out of the matrix if it only accumulates other vectors.
+    # shape (imaginary, real); spectral radius on the grid, of the matrix from `moving`
     radius: Array
-    # spectral radius minus 1 on the imaginary axis, at `Regions.distances`; 0 if it is only a
-    # rounding error
+    # spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if it is only rounding
     growth: Array
 
 
@@ -46,7 +41,7 @@ class Regions:
 def matrices() -> dict[str, Amplification]:
     """Return the distinct amplification matrices, by the names of programs and `rk4`.
 
-    Two more belong to the Runge-Kutta program with a single defect.
+    The Runge-Kutta program has two more, each with a single defect.
     """
     return {
         "two-term and four-term, original and corrected": amplification(
@@ -64,8 +59,8 @@ def matrices() -> dict[str, Amplification]:
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
-    The Runge-Kutta program is included also with `stage-base` or `base-not-restored` alone; Gauss
-    collocation, whose region is the left half-plane, is not.
+    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. Gauss
+    collocation is omitted; its region is the left half-plane.
     """
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     low, high, count = _DISTANCES

@@ -2,11 +2,11 @@
 
 Grammel's method, equation 32 of the thesis (III.4.a): omega is a steady rotation (a, b, c) plus a
 small perturbation proportional to exp(Q t). With A, B, C of Euler's equations and M = N / I, torque
-over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3, and the rates Q (1/s) are
-the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q (1/s) are the
+roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
 Below, `share` is the initial perturbation over the rotation, and a place is a pair of a description
-and omega (rad/s). Of a continuous family only some members are reported.
+and omega (rad/s). Only some members of a continuous family are reported.
 """
 
 import cmath
@@ -24,8 +24,8 @@ from pyharness.model.trajectory import ROUNDING, Array
 Rates = tuple[complex, complex, complex]
 Places = list[tuple[str, Triple]]  # steady rotations: a description, and omega (rad/s)
 
-# The points shown of a hyperbola of steady rotations: the ratio of one component of omega to the
-# same component at the vertex.
+# Points shown of a hyperbola of steady rotations: ratios of a component of omega to its value at
+# the vertex.
 _OVERFLOWS = (
     "rotations: a steady rotation or its rates overflow; use a smaller omega or torque, or moments "
     "nearer to each other"
@@ -39,7 +39,7 @@ OFF = 0.1
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """One steady rotation of a scene, and a small perturbation of it."""
+    """A steady rotation of a scene, and the development of a small perturbation."""
 
     place: str  # a description: an axis, a point of a hyperbola, ...
     omega: Triple  # of the steady rotation, rad/s
@@ -53,7 +53,7 @@ class SteadyRotation:
 
     @property
     def doubling_time(self) -> float | None:
-        """Return the doubling time of the fastest growth exp(Q t) (s); None without growth."""
+        """Return the doubling time of the fastest growth exp(Q t) (s), or None without growth."""
         rate = self.rates[0].real
         return math.log(2.0) / rate if rate > 0.0 else None
 
@@ -66,10 +66,7 @@ class SteadyRotation:
 
 @dataclass(frozen=True)
 class SteadyRotations:
-    """The steady rotations of a scene, with their stability.
-
-    All have a perturbation of the same relative magnitude.
-    """
+    """The steady rotations of a scene, perturbed by the same relative magnitude."""
 
     told: str  # text: which steady rotations exist, and which of them are shown
     disturbance: float  # magnitude of the perturbation over the magnitude of the rotation
@@ -77,10 +74,10 @@ class SteadyRotations:
 
 
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
-    """Return the steady rotations of a scene, and how perturbations of them develop.
+    """Return the steady rotations of a scene, and the development of perturbations.
 
     `disturbance` is the perturbation over the rotation. Raise InputError if the torque varies with
-    time, or if a rotation or its rates are beyond the range of binary64.
+    time, or if a rotation or its rates exceed binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -99,7 +96,7 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
-    # omega is scaled to components of at most 1, so that their products do not overflow.
+    # Components are scaled to at most 1, so that their products do not overflow.
     (a, b, c), (x, y, z) = coefficients, (w / size for w in omega)
     terms = (b * c * x * x, c * a * y * y, a * b * z * z)
     slope, half = sum(terms), a * b * c * x * y * z
@@ -111,11 +108,11 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
 
 
 def _roots(slope: float, half: float) -> Rates:
-    """Return the roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small ones."""
+    """Return the roots of Q**3 - slope Q - 2 half = 0, without loss of digits in small roots."""
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
-    # The root with the sign of `half` is simple, and its formula subtracts nothing.
+    # The root with the sign of `half` is simple, and its formula has no cancellation.
     unit = math.sqrt(abs(slope) / 3.0)
     ratio = abs(half) / unit**3 if unit**3 > 0.0 else math.inf
     if math.isinf(ratio):
@@ -141,7 +138,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
         raise InputError(_OVERFLOWS)
-    # The rates add up to 0. If all are 0, but the Jacobian is not, a perturbation grows like t.
+    # The sum of the rates is 0. If all are 0, but the Jacobian is not, a perturbation grows like t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
     until: float | None = None
@@ -163,8 +160,8 @@ def _growing(
 ) -> float | None:
     """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    Linear theory holds until then. It is infinite if these terms are zero, None beyond binary64.
-    `rate` is the fastest Q, `matrix` the Jacobian (1/s).
+    Linear theory is valid until then. The time is infinite if these terms are zero, None if they
+    exceed binary64. `rate` is the fastest Q, `matrix` the Jacobian (1/s).
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -183,12 +180,12 @@ def _growing(
 
 
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
-    """Return the time (s) until an oscillation about a stable axis has a phase error of 0.1 rad.
+    """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
 
     `coefficients` are in cyclic order from the axis; `rate` is the linear frequency (rad/s). A tilt
-    by d (rad) towards another axis changes it by the fraction d**2 / 4 times the first coefficient
-    over that axis's. The time is infinite if the first coefficient is 0, and None if the frequency
-    is: then only the spin drifts.
+    by d (rad) towards another axis changes the frequency by the fraction d**2 / 4 times the first
+    coefficient over the coefficient of that axis. The time is infinite if the first coefficient is
+    0, and None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun == 0.0:
@@ -202,11 +199,11 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
 def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> float | None:
     """Return the shortest time (s) between flips about the middle axis.
 
-    `coefficients` are in cyclic order from that axis, `spin` is in rad/s. The time is 2 K / lambda,
-    near (2 / lambda) ln(4 / k') for a small perturbation: K is the complete elliptic integral with
-    the complementary modulus k', lambda is near the growth rate. It is shortest for a perturbation
-    along the other axis with the smaller coefficient. None if the signs are impossible for a middle
-    axis.
+    `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
+    near (2 / lambda) ln(4 / k') for a small perturbation, where K is the complete elliptic integral
+    with the complementary modulus k', and lambda is near the growth rate. It is shortest for a
+    perturbation along the other axis with the smaller coefficient. Return None if the signs are
+    impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -262,8 +259,8 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
     """Return a text and places for a torque about the axis `held`, from 0.
 
-    The product of the other components is constant, `product` (rad2/s2). One branch is shown; the
-    other is opposite.
+    `product` is the constant product of the other components (rad2/s2). One branch is shown; the
+    other is its opposite.
     """
     one, other = (held + 1) % 3, (held + 2) % 3
     told = (
@@ -273,7 +270,7 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
     if coefficients[one] == coefficients[other] == 0.0:
         told += f"; to each any w{held + 1} may be added"
     along = dict.fromkeys(_ALONG, "hyperbola")
-    # At the margin of stability the square of Q, which is C (B a**2 + A b**2), changes its sign.
+    # At the margin of stability Q**2 = C (B a**2 + A b**2) changes its sign.
     if coefficients[one] * coefficients[other] < 0.0:
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"

@@ -1,4 +1,4 @@
-"""The picture of the verb `rotations`: polhodes of one body, and growth rates of all bodies."""
+"""The picture of `rotations`: polhodes of one body, and growth rates of all bodies."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,8 @@ from pyharness.model.trajectory import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Direction to the viewer, in components along the axes of the smallest, the middle and the largest
-# moment. The axis of the smallest moment points upwards in the picture.
+# Direction to the viewer, along the axes of the smallest, the middle and the largest moment. The
+# axis of the smallest moment points upwards.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
 _HIDDEN = 0.22  # opacity of curves and points behind the sphere
@@ -30,7 +30,7 @@ _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0
 def rotations_picture(scene: Scene) -> Picture:
     """Return the polhodes of a scene with moments, beside the growth rates of all bodies.
 
-    The right panel has the growth rate about the middle axis over the spin, and marks the cases of
+    The right panel shows the growth rate about the middle axis over the spin, with the cases of
     Table 1.
     """
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return points' coordinates to the right, upwards, and to the viewer (a unit vector)."""
+    """Return points' coordinates to the right, upwards and to the viewer, `toward`."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward

@@ -1,4 +1,4 @@
-"""The report of the verb `rotations`."""
+"""The report of `rotations`."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -61,7 +61,7 @@ def _table(rotations: Sequence[SteadyRotation]) -> Table:
 
 
 def _rates(rates: Rates) -> str:
-    """Return three rates (1/s) as text, opposite or conjugate ones with +-."""
+    """Return three rates (1/s) as text, with opposite or conjugate pairs as +-."""
     first, second, third = rates
     if not any(rates):
         return "0"
@@ -100,7 +100,7 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 
 
 def _picture(scene: Scene) -> Picture:
-    # Imported here, because only the picture needs this module, and the table does not.
+    # The table does not need this module.
     from pyharness.checks.theory.rotations_picture import rotations_picture
 
     return rotations_picture(scene)

@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme computes one step with `Numbers`, or with `Series`, power series in the step size that
-yield each term of the truncation error. It shares no code with the method. Its arguments are `on`,
-one of the two, and `omega` at the start. The torque is constant; equations 16-18.
+A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
+is `Numbers`, or `Series`, power series in the step size, which yield each term of the truncation
+error. Schemes share no code with the methods.
 """
 
 import math
@@ -26,14 +26,14 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Store the equations and a step (s); with `sizes` the sums of magnitudes of terms."""
+        """Store the equations and a step (s); with `sizes`, terms are replaced by magnitudes."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
         self._torque = size(np.array(scene.normalized_torque(0.0)))
 
     def rate(self, omega: Array) -> Array:
-        """Return the right-hand sides for each omega (rad/s2)."""
+        """Return the right-hand sides (rad/s2)."""
         turned, onward = np.roll(omega, -1, axis=-1), np.roll(omega, -2, axis=-1)
         return np.asarray(self._torque + self._coefficients * turned * onward)
 
@@ -63,7 +63,7 @@ class Series:
         return result
 
     def times_step(self, x: Array) -> Array:
-        """Return the series times the step size, without its last term."""
+        """Return the series times the step size, truncated."""
         return np.concatenate([np.zeros_like(x[:1]), x[:-1]])
 
     def solution(self, omega: Array) -> Array:
@@ -80,7 +80,7 @@ Scheme = Callable[[Arithmetic, Array], Array]
 
 @dataclass(frozen=True)
 class FixedStep:
-    """A program or method with a fixed step: order, rounding error and scheme."""
+    """A program or method with a fixed step."""
 
     name: str  # of the program or method
     order: int  # of the global error of the program or method
@@ -96,7 +96,7 @@ def constant(omega: Array) -> Array:
 
 
 def collocation(program: str) -> Scheme:
-    """Return the scheme of a collocation program: a first estimate and one correction."""
+    """Return the scheme of a collocation program: an estimate and one correction."""
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
@@ -111,7 +111,7 @@ def collocation(program: str) -> Scheme:
 
 
 def collocation_singular(program: str) -> Scheme:
-    """Return the scheme of a collocation program whose matrix is declared singular.
+    """Return the scheme of a collocation program whose matrix is reported as singular.
 
     LEQT1F then returns the right-hand sides of the system, which the program uses as c1, c2, ...
     """
@@ -148,7 +148,7 @@ def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
 def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
     """Return omega after the first step of the original Runge-Kutta program.
 
-    Its third stage starts from the point of the second, and its fourth from that of the third;
+    The third stage starts from the point of the second, and the fourth from the point of the third;
     classically both start from `omega`.
     """
     first = on.times_step(on.rate(omega))
@@ -220,8 +220,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
-    Weight i, from 1, multiplies the difference of the values at i and -i spacings; the sum over
-    `count` pairs, over the spacing, is exact up to degree 2 count.
+    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum over
+    `count` pairs, divided by the spacing, is exact up to degree 2 count.
     """
     middle = math.comb(2 * count, count)
     return [

@@ -1,7 +1,8 @@
 """Error amplification under a torque that depends on omega and attitude.
 
-The state-transition matrix is that of both; its derivative follows from the tape of the equations.
-Errors of omega are divided by the largest |omega|, and those of the attitude are angles (rad).
+The state-transition matrix includes the attitude; its derivative follows from the tape of the
+equations. Errors of omega are divided by the largest |omega|; errors of the attitude are angles
+(rad).
 """
 
 import math
@@ -33,9 +34,9 @@ _OF_ANGLE = 0.5
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is that at the last time; else the largest at any of the times, because
-    damping may reduce errors. Raise InputError if the torque is opaque, if the solution grows
-    without bound, or if it would be needed at too many times.
+    Under a torque law it is the sensitivity at the last time; else the largest at any of the times,
+    because damping may reduce errors. Raise InputError if the torque is opaque, if the solution
+    grows without bound, or if it would be needed at too many times.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -81,7 +82,7 @@ def _of_state(scene: Scene, time: float) -> Conditioning:
 
 
 def _path(scene: Scene, times: Array) -> Array:
-    """Return omega and the scene's attitude at `times`, which begin at 0."""
+    """Return omega and the scene's attitude at `times` (s), which begin at 0."""
     if times[-1] == 0.0:
         return np.tile([*scene.omega, *(scene.attitude or ())], (len(times), 1))
     attitude = scene.attitude is not None
@@ -100,9 +101,9 @@ def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds of the rounding errors of the equations (1/s) over the unit roundoff.
+    """Return bounds of the rounding errors of the equations (1/s), over the unit roundoff.
 
-    By running error analysis each operation adds the error of its result; for a sum the magnitudes
+    By running error analysis each operation adds the error of its result; in a sum the magnitudes
     of all terms count.
     """
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
@@ -156,7 +157,7 @@ _BOUNDS: Functions[Any] = Functions(
     lambda x: x.chained(np.sqrt(x.value), 0.5 / np.sqrt(x.value)),
     lambda x: x.chained(np.exp(x.value), np.exp(x.value)),
     lambda x: x.chained(np.tanh(x.value), 1.0 - np.tanh(x.value) ** 2),
-    # The reduction of a large angle has an error of its own.
+    # The reduction of a large angle adds an error.
     lambda x: x.chained(np.sin(x.value), 1.0),
     lambda x: x.chained(np.cos(x.value), 1.0),
     lambda table, time: time.chained(table_values(table, time.value), 0.0),

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The errors of a step, the truncation error from `schemes`, are propagated by the state-transition
-matrix. The methods are not run.
+The errors of steps, with the truncation errors from `schemes`, are propagated by the
+state-transition matrix. The methods are not run.
 """
 
 import math
@@ -21,9 +21,9 @@ from pyharness.model.trajectory import Array
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
 # Rounding errors of many steps with independent directions add up like the square root of the
-# number of steps. The mean rounding error of a step is taken as a third of the largest one.
+# number of steps. The mean error of a step is taken as a third of the largest.
 _MEAN_ROUNDING = 1.0 / 3.0
-# Largest ratio of the last term of a power series to its sum for which the sum is accepted.
+# Largest ratio of the last term of a power series to its sum, beyond which it is not accepted.
 _CONVERGED = 1e-3
 FORECAST = Basis(
     "derived",
@@ -36,7 +36,7 @@ FORECAST = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of a scene, and the state-transition matrices from each time to the end."""
+    """The solution of a scene, with the state-transition matrices from each time to the end."""
 
     scene: Scene  # its torque must be constant
     times: Array  # shape (n,), s: from 0 to the end
@@ -48,11 +48,11 @@ class Path:
 
     @property
     def norms(self) -> Array:
-        """Return the row-sum norm of each matrix, shape (n,)."""
+        """Return the row-sum norms of the matrices, shape (n,)."""
         return np.asarray(np.abs(self.propagators).sum(axis=2).max(axis=1))
 
     def over_time(self, values: Array) -> Array:
-        """Return the time integral of `values`, an element for each time."""
+        """Return the integral over time (s) of `values`, one for each time."""
         return np.asarray(np.trapezoid(values, self.times, axis=0))
 
 
@@ -70,7 +70,7 @@ class Forecast:
 def path(scene: Scene, time: float) -> Path:
     """Return the solution to `time` (s), with its state-transition matrices.
 
-    Raise InputError if the solution grows without bound before `time`.
+    Raise InputError if the solution grows without bound before.
     """
     from pyharness.engine.solve import solve
 
@@ -91,7 +91,7 @@ def path(scene: Scene, time: float) -> Path:
 
 
 class Forecaster:
-    """The error predictions for one method along one solution."""
+    """Error predictions for one method along one solution."""
 
     def __init__(self, along: Path, method: str) -> None:
         self._path = along
@@ -113,9 +113,8 @@ class Forecaster:
         worst = float(here.over_time(here.norms * np.abs(local).max(axis=1))) / h / largest
         last = float(np.abs(terms[-1]).max())
         known = last <= _CONVERGED * float(np.abs(local).max())
-        # Because of this error, later steps start beside the exact solution, where local errors and
-        # their amplification are larger. A bound is returned only if they are at most twice as
-        # large as on the exact solution.
+        # Later steps start off the exact solution, where local errors and their amplification are
+        # larger. The bound is valid only if they are at most twice as large.
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
@@ -124,9 +123,9 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step (s) below which expected rounding exceeds the truncation error.
+        """Return the step (s) below which the expected rounding error exceeds the truncation error.
 
-        It is found by bisection between `smallest` (s) and the whole run.
+        It is at least `smallest` (s), and computed by bisection.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -141,7 +140,7 @@ class Forecaster:
     def _of_one_step(self) -> float:
         """Return the mean relative final error from one step's rounding.
 
-        A component's error is proportional to it, and 0 if it never changes.
+        A component's rounding error is proportional to it, and 0 if the component never changes.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)
@@ -173,7 +172,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # The order of the scheme implies that these terms are zero; their computed values are
-        # rounding errors.
+        # The order of the scheme implies that these terms are zero, except for rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -2,8 +2,9 @@
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
 + c1 t + ... + cn t**n. The conditions make its derivative a projection of the right-hand side f
-along the step on the polynomials of degree n - 1. It is computed on the unit interval s = t / h in
-the basis of Legendre polynomials, well conditioned; c1, ..., cn are never formed.
+along the step on the polynomials of degree n - 1. The projection is computed on the unit interval s
+= t / h in the basis of Legendre polynomials, which is well conditioned; c1, ..., cn are never
+formed.
 """
 
 from dataclasses import dataclass
@@ -37,9 +38,9 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
     is for collocation, as in `grid`. The Gauss-Legendre quadrature with m points is exact to degree
-    2m - 1: for constant torques the products of two omegas have degree 2n, and the weights n
-    (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time its error is of order
-    2n + 1 or higher, above the method's order.
+    2m - 1. For constant torques the products of two omegas have degree 2n, and the weights n
+    (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time the error of the
+    quadrature is of order 2n + 1 or higher, above the method's order.
     """
     n = terms
     if weighting == "collocation":
@@ -91,7 +92,7 @@ def grid(points: str | tuple[float, ...] | None, n: int) -> Array:
     """Return the n collocation points in units of the step, shape (n,).
 
     `points` is "gauss" for Gauss-Legendre nodes, "thesis" or None for k / (n + 1) with k = 1 to n,
-    or the tuple itself.
+    or a tuple of points.
     """
     if points == "gauss":
         return _gauss(n)[0]

@@ -50,13 +50,12 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# The limits of a closed form do not depend on the conditioning, which would be expensive to compute
-# for a million revolutions.
+# Limits of closed forms need no conditioning, which would take long for a million revolutions.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# An angle in degrees is rounded when it is formed, converted and read again. The errors of three
-# angles add up.
+# An angle in degrees is rounded when it is formed, converted and read. The errors of three angles
+# add up.
 _ANGLES = 64.0 * ROUNDING
 _OPERATIONS = Basis(
     "derived",
@@ -75,7 +74,7 @@ _MOTIONS = {
 
 @dataclass(frozen=True)
 class Turn:
-    """A rotation of the scene about body or space axes; its inverse for quaternions (n, 4)."""
+    """A rotation of a scene about body or space axes, and its inverse for quaternions (n, 4)."""
 
     scene: Callable[[Scene], Scene]
     back: Callable[[Array], Array]
@@ -115,10 +114,10 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
 
 
 POLICY = Policy(_limit, FLOW, refusable)
-"""Policy whose limit is rounding for closed forms, and tolerance plus rounding for other methods.
+"""Policy whose limit is rounding for closed forms, else tolerance plus rounding.
 
-For the other methods, the flow amplifies the rounding errors and, if perturbations grow more than a
-thousandfold, the tolerance.
+The flow amplifies the rounding errors of the other methods and, if it amplifies errors more than a
+thousandfold, their tolerance.
 """
 
 
@@ -161,7 +160,7 @@ def _attempts() -> Iterator[Attempt]:
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
-    # Quaternions are compared with their signs, since the sign is continuous in time.
+    # Quaternions are compared with their signs, which are continuous in time.
     yield judge(name.with_quantity("angle"), tried, truth, POLICY)
     answer = tried.answer
     if answer.attitude is None:
@@ -169,8 +168,8 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
-        # An error of the angle changes the angular momentum by at most that angle. The moments
-        # multiply omega, and the rotation takes two products.
+        # An error of the angle changes the direction of the angular momentum by at most that angle.
+        # The moments multiply omega, and the rotation takes two products.
         limit = ATTITUDE + _omega_limit(scene)
         yield name.with_quantity("momentum").bounded(
             _momentum_drift(scene, answer), limit, CLOSED_FORM
@@ -178,7 +177,7 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _omega_limit(scene: Scene) -> float:
-    """Return the relative error of the angular momentum by 16 rounding errors of omega."""
+    """Return the relative error of the angular momentum from 16 rounding errors of omega."""
     momentum = np.array(scene.moments) * scene.omega
     size = float(np.linalg.norm(momentum)) or 1.0
     largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -194,11 +193,11 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 
 
 def _montgomery(name: Name) -> Check:
-    """Check the body's rotation about its angular momentum in a period by Montgomery's formula.
+    """Return the check of the rotation in a period against Montgomery's formula.
 
-    Its angle is 2 E T/L less the solid angle that the angular momentum L encloses in the body,
-    about the axis along which its component keeps its sign, with energy E and period T. As the
-    angle is not conserved, no other check detects a wrong rate.
+    The angle about the angular momentum L is 2 E T/L less the solid angle that L encloses in the
+    body, about the axis along which its component keeps its sign, with energy E and period T. As
+    the angle is not conserved, no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -220,7 +219,7 @@ def _montgomery(name: Name) -> Check:
 
 
 def _solid_angle(scene: Scene, period: float) -> float:
-    """Return the solid angle that the angular momentum encloses in the body in one period (s).
+    """Return the solid angle that the angular momentum encloses in the body in a period (s).
 
     The trapezoidal rule converges exponentially.
     """
@@ -235,7 +234,8 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # Rotate by half a turn about the first axis.
+            # Half a turn about the first axis makes the third component positive, as the formula
+            # requires.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
         found = float(((m[:, 0] * rate[:, 1] - m[:, 1] * rate[:, 0]) / (1.0 + m[:, 2])).mean())
@@ -267,7 +267,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The error of omega after the forward integration rotates the body in the backward integration.
+    # The forward run's error of omega rotates the body in the backward run.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)
@@ -276,7 +276,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Check Euler angles `off` (rad) from a pole against SciPy's rotations."""
+    """Return the check of Euler angles `off` (rad) from a pole against SciPy's rotations."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

@@ -1,7 +1,7 @@
-"""Trial of invariance: results must transform with a problem that is rotated or rescaled.
+"""Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations only change axes, signs or exponents must give the same bits; all others
-agree within an error bound.
+Methods whose operations differ only in axes, signs or exponents must return the same bits; all
+others must agree within an error bound.
 """
 
 import random
@@ -51,9 +51,9 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A rotation or rescaling of a problem, and its inverse for omega.
+    """A rotation or rescaling of a problem, with its inverse for omega.
 
-    A time t becomes t/`faster`; those in `bitwise` must give the same bits.
+    A time t becomes t/`faster`; the methods in `bitwise` must return the same bits.
     """
 
     turn: Callable[[Scene], Scene]
@@ -81,13 +81,12 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
 
 
 # Only exponents change, and our methods compare only quantities with the same unit. SciPy's choice
-# of the first step does not do so, and the implicit row scaling of LEQT1F compares powers of the
+# of the first step compares others, and the implicit row scaling of LEQT1F compares powers of the
 # step.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
-    # The methods listed treat each axis alike, by products of the next two axes in this order. The
-    # Taylor series and the sums of the other methods add or multiply over the axes in a fixed
-    # order.
+    # These methods treat all axes alike, by products of the next two axes in this order. The Taylor
+    # series and the sums of other methods process the axes in a fixed order.
     "cyclic": Symmetry(
         lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
@@ -153,7 +152,7 @@ def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name
     difference = float(np.abs(plain - other).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference)
-    # Each of the two results may have the error that the method is allowed.
+    # Each of the two results may have the allowed error.
     return name.bounded(difference, 2.0 * flow.limit(tolerance), FLOW)
 
 
@@ -161,7 +160,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = end(scene, time, method, tolerance)
     start = restarted_at(scene, there, time)
-    # In the backward run, a method of SciPy may be able to meet only a coarser tolerance.
+    # Backward, a method of SciPy may meet only a coarser tolerance.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
@@ -177,7 +176,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
 
 def _split(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
-    # The seed is fixed, so that the three cuts are always the same.
+    # A fixed seed keeps the three cuts the same.
     source = random.Random("cuts")
     cuts = sorted(source.uniform(0.0, time) for _ in range(3))
     omega = np.array(scene.omega)
@@ -187,7 +186,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         omega = end(restarted_at(scene, omega, begin), stop - begin, method, tolerance)
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # The rest of the trajectory propagates the error of each piece.
+        # The rest of the trajectory amplifies the error of each piece.
         limit += piece.limit(tolerance) * rest
     whole = end(scene, time, method, tolerance)
     difference = float(np.abs(omega - whole).max()) / flow.largest

@@ -1,8 +1,8 @@
-"""Trial of length: energy, momentum and phase over a million revolutions, against Brouwer's law.
+"""Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
 The phase is the position along the closed curve of omega. Rounding errors of energy and momentum
-grow like the power 1/2 of the number of steps, of the phase like 3/2; if the errors of a step are
-biased, like 1 and 2.
+grow with the power 1/2 of the number of steps, and the phase error with the power 3/2; if the
+errors of a step are biased, the powers are 1 and 2.
 """
 
 import math
@@ -37,23 +37,23 @@ REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.
     "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0)),
-    # All three components take part, and the elliptic modulus is large.
+    # All three components vary, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# Number of initial conditions of each motion. With so many initial conditions, over two decades of
-# steps, a random walk is mistaken for a drift with a probability below one in a thousand.
+# Number of initial conditions of each motion. With so many, over two decades of steps, a random
+# walk is mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
-# Below this number of revolutions the rounding of the result itself is not negligible.
+# Below this number of revolutions the rounding of the result is not negligible.
 _FIT_FROM = 10**2.5
-# Half the difference between the exponents of random rounding and of biased rounding.
+# Half the difference between the powers for random and for biased rounding.
 _HALFWAY = 0.25
-# Beyond this phase error (rad), its linear measure is no longer accurate.
+# Phase error (rad) beyond which its linear measure is not accurate.
 _LOST = 0.1
 
 # Bound on the last two terms of the Taylor series at the finest tolerance, as a fraction of omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Step of Gauss collocation by number of stages, in radians of the fastest rate. With 8 stages
-# truncation is far below rounding. With 4 stages truncation dominates the phase error and must not
+# truncation is far below rounding. With 4 stages truncation dominates the phase error, but must not
 # change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
 _CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of a value of the closed form at any time
@@ -62,18 +62,18 @@ CLOSED_FORM = Basis(
     "errors that follow from 16 rounding errors of omega by a closed form",
     "`pytest tests/engine/test_closed_form.py`",
 )
-"""Basis of limits that assume that a closed form has at most 16 rounding errors."""
+"""Basis of limits that assume at most 16 rounding errors of a closed form."""
 
 Runner = Callable[[Scene, Sequence[float]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """A method whose growth of errors is measured, with bounds on the errors of its steps.
+    """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors that a step (s) may add. `revolutions` is the longest run from the first initial
-    condition, `others` from the rest; `preference`, whether errors are biased.
+    errors of a step (s). `revolutions` is the longest run from the first initial condition,
+    `others` from the rest. `preference` is whether errors are biased.
     """
 
     run: Runner
@@ -109,9 +109,9 @@ def _rate(scene: Scene) -> float:
 
 
 INTEGRATORS = {
-    # The truncation error of a series keeps its sign. Its steps also lock to the periodic motion,
-    # so that the rounding of a step recurs in every revolution. The last two terms are at most
-    # SLACK times the local tolerance. Each later term is at most half of the term before it.
+    # The truncation error of a series keeps its sign, and steps lock to the periodic motion, so
+    # that rounding recurs in every revolution. The last two terms are at most SLACK times the local
+    # tolerance; each later term is at most half of the previous one.
     "taylor": Integrator(
         _taylor,
         partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
@@ -119,8 +119,8 @@ INTEGRATORS = {
         10**5.5,
         preference=True,
     ),
-    # Equal steps of at most one radian of the fastest rate. A step takes ten times as long as a
-    # Taylor step.
+    # Steps of at most one radian of the fastest rate. A step takes ten times as long as a Taylor
+    # step.
     "gauss-8": Integrator(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
     "gauss-4": Integrator(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
@@ -146,7 +146,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
-    """Yield the checks of the fitted powers, and of the errors after each number of revolutions."""
+    """Yield the checks of fitted powers, and of errors after each number of revolutions."""
     motion = name.circumstance
     for what, found, steps, limits in measured(integrator, MOTIONS[motion], orbit_of(motion)):
         horizons = np.array(REVOLUTIONS[: len(steps)])
@@ -166,7 +166,7 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of one quantity of a motion by one method, as a function of the number of steps.
+    """The errors of one quantity of a motion by one method, by number of steps.
 
     `error` is the root mean square over `starts` initial conditions.
     """
@@ -181,7 +181,7 @@ class Drift:
 
 
 def curves() -> Iterator[Drift]:
-    """Yield the errors of all three quantities by every method on every motion."""
+    """Yield the errors of energy, momentum and phase by every method in every motion."""
     for motion, scene in MOTIONS.items():
         for method, integrator in INTEGRATORS.items():
             for what, found, steps, limits in measured(integrator, scene, orbit_of(motion)):
@@ -193,9 +193,9 @@ def curves() -> Iterator[Drift]:
 def measured(
     integrator: Integrator, scene: Scene, body: Orbit
 ) -> Iterator[tuple[str, Array, Array, list[float]]]:
-    """Yield the name, errors, numbers of steps and error bounds of energy, momentum and phase.
+    """Yield name, errors, numbers of steps and error bounds of energy, momentum and phase.
 
-    Errors have the shape (initial conditions, horizons), NaN after the end of a run.
+    Errors have the shape (initial conditions, horizons), with NaN after the end of a run.
     """
     turn = 2.0 * math.pi / body.largest
     reached = [r for r in REVOLUTIONS if r <= 1.01 * integrator.revolutions]
@@ -217,12 +217,12 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the factors from errors of omega to those of energy, momentum and phase."""
+    """Return the factors from errors of omega to errors of energy, momentum and phase."""
     return brouwer.orbit(MOTIONS[motion])
 
 
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
-    """Return scenes along one motion, because errors depend on the initial phase."""
+    """Return scenes that start along one motion, because errors depend on the initial phase."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
     rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
     return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]

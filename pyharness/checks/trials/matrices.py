@@ -1,4 +1,4 @@
-"""Trial of the collocation matrices for step sizes from 1e-10 to 10 s, and of their singularity."""
+"""Trial of the collocation matrices for steps from 1e-10 to 10 s, and of their singularity."""
 
 import math
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
-# Step sizes (s) of runs. With some of them the matrix of the four-term program is singular.
+# Step sizes (s) of runs; at some of them the matrix of the four-term program is singular.
 _RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -67,19 +67,22 @@ def _condition_note(found: Solved) -> str:
 
 
 def _threshold(name: Name) -> Check:
-    """Compare the step up to which LEQT1F finds the matrix singular with the exact last pivot's."""
+    """Return the check of LEQT1F's largest singular step against the exact last pivot."""
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
-    # The last pivot is proportional to a power of the step. Its relative rounding error is
-    # therefore divided by that power.
+    # The last pivot is proportional to a power of the step, by which its relative rounding error is
+    # divided.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
     return name.bounded(abs(found / wanted - 1.0), limit, PIVOTS, f"{found:.6g} s")
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Check the number of steps with IER = 129; with `dt-accumulates` singularity ends."""
+    """Return the check of the number of steps with IER = 129.
+
+    With `dt-accumulates` the matrix is singular in the first steps only.
+    """
     scene = scene_of(name)
     ier = compiled.run(scene, listing, velocity=False).ier
     assert ier is not None

@@ -1,4 +1,4 @@
-"""Trial of bodies with two or three moments of inertia that are equal or nearly equal."""
+"""Trial of bodies with two or three equal or nearly equal moments of inertia."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -9,8 +9,7 @@ from pyharness.checks.judge import unknown_flow
 from pyharness.checks.scenes.extreme import LONG, SYMMETRIC_START
 from pyharness.checks.stress import Trial
 
-# The long time is tried only with closed forms, because their limits need no bound on the error
-# amplification.
+# The long time is for closed forms only, whose limits need no error amplification.
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 
 

@@ -1,4 +1,4 @@
-"""Trial of linear stability: each program's steps against its derived amplification matrix."""
+"""Trial of linear stability: each program's steps against its amplification matrix."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -110,7 +110,7 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Report the growth of a wobble about axis 3 in a step: the spectral radius less 1."""
+    """Return the growth of a wobble about axis 3 in a step: the spectral radius less 1."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

@@ -1,4 +1,4 @@
-"""Trial of angular velocities from 1e-300 to 1e300 rad/s, with the time scaled accordingly."""
+"""Trial of angular velocities from 1e-300 to 1e300 rad/s, with rescaled time."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -40,7 +40,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
     plain = cache(lambda: _tried(method, scene, time))
 
     def same(factor: float, name: Name) -> Check:
-        # Compute the original motion first.
+        # The original motion must be computed first.
         first, run = plain(), _tried(method, scene_of(name), time / factor)
         with np.errstate(invalid="ignore"):
             wrong = float(np.abs(run.omega / factor - first.omega).max())
@@ -74,7 +74,7 @@ def _flow() -> Conditioning:
 
 
 def _truth(scene: Scene, time: float) -> Truth:
-    """Return the true omega of a scaled motion; its amplification is the unscaled one's."""
+    """Return the true omega of a scaled motion, with the amplification of the unscaled one."""
     size = max(map(abs, scene.omega)) / max(map(abs, ORDINARY.omega))
     return truth_of(scene, time, replace(_flow(), largest=_flow().largest * size))
 
@@ -89,7 +89,7 @@ def _attempts() -> Iterator[Attempt]:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
-    # A sphere, because coupling between the axes of another body would change omega as well.
+    # In another body, coupling between the axes would change omega as well.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
     for method in ALL:
         yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)

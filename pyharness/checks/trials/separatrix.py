@@ -1,4 +1,4 @@
-"""Trial of spin about the middle axis over several flips, with perturbations from .1 down to 0."""
+"""Trial of spin about the middle axis over several flips, with perturbations from .1 to 0."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ _UNDISTURBED = Basis(
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Yield checks that the exact rotation stays; only `quick` may have one rounding error."""
+    """Yield checks that the unperturbed rotation is constant, but for one rounding by `quick`."""
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
     )
@@ -31,8 +31,7 @@ def _undisturbed() -> Iterator[Attempt]:
         method = name.subject
         run = run_method(method, scene, _STAYS, None if method in FIXED_STEP else MIDDLING)
         wrong = float(np.abs(run.omega - scene.omega).max())
-        # A component that is exactly 0 must stay 0. `quick` may round the spin, since it changes
-        # units.
+        # A zero component must stay 0. `quick` changes units, and may round the spin.
         limit = 2.0**-52 if method == "quick" else 0.0
         stays = run.omega[0] == run.omega[2] == 0.0 and run.has_result
         note = "" if stays else "it left the axis"

@@ -1,4 +1,4 @@
-"""Trial of extreme shapes: needles, coins, flat plates, and moments that no body can have."""
+"""Trial of extreme shapes: needles, coins, flat plates, and impossible moments."""
 
 from pyharness.checks.hold import check_all
 from pyharness.checks.stress import Trial

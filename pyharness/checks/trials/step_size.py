@@ -1,4 +1,4 @@
-"""Trial of step sizes from 1 to 1e-6 s: truncation, rounding, their crossing, and divergence."""
+"""Trial of steps from 1 to 1e-6 s: truncation, rounding, their crossing, and divergence."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -32,8 +32,7 @@ TIME = 1.0
 SMALLEST = 1e-6
 # Numbers of steps in `TIME`, half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Divergence is also searched for over a long time (s), down to a step size (s) with which no run
-# should diverge.
+# Divergence is also searched for over this time (s), down to a step size (s) without divergence.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 _CROSSING = Basis(
@@ -76,7 +75,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
         yield Attempt(own, partial(predicted, count))
     gauss = method.startswith("gauss")
-    # At steps with visible rounding, a method of order above 4 has no truncation error left.
+    # Where rounding is visible, a method of order above 4 has no truncation error left.
     if not (before or gauss) and SCHEMES[method].order in (2, 4):
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
@@ -85,21 +84,21 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Compare the smallest step at which truncation (within 2) dominates with the predicted one."""
+    """Return the check of the smallest step at which truncation dominates against theory."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
-        # At smaller steps the matrix is declared singular.
+        # At smaller steps LEQT1F reports a singular matrix.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.predict(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
     if found > TIME / counts[-1]:
-        # The crossing is between this step and the next smaller one: take the middle on a
-        # logarithmic scale.
+        # The crossing is between this step and the next smaller one; its estimate is their
+        # geometric mean.
         found /= 10.0**0.25
     predicted = forecaster.crossing(smallest)
-    # The steps are half a decade apart. Rounding may be a tenth or ten times as large as predicted.
+    # Steps are half a decade apart, and rounding may differ from its prediction by a factor of ten.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
@@ -110,7 +109,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return omega's relative error at the end, not finite if the run ended early, and a note."""
+    """Return omega's relative error at the end, not finite for an incomplete run, and a note."""
     largest = _path(case).flow.largest
     note = ""
     if listing is not None:
@@ -141,7 +140,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Compare the smallest divergent step with linear stability, if that predicts one."""
+    """Return the check of the smallest divergent step against linear stability, if applicable."""
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)
@@ -154,8 +153,8 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
         return name.described(found, _from(found, TIME))
     seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
     note = f"{_from(seen.found, _LONG)}, predicted from {seen.predicted:.4g} s"
-    # Linear theory does not cover collocation points that move from step to step, unless the
-    # equations are linear.
+    # Linear theory excludes collocation points that move from step to step, unless the equations
+    # are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
         off = abs(seen.found / seen.predicted - 1.0)
         return name.bounded(off, seen.limit, DOUBLING, note)

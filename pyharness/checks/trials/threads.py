@@ -1,6 +1,6 @@
-"""Trial of threads: the same calls from many threads at once give bit-for-bit identical results.
+"""Trial of threads: concurrent calls must return bit-for-bit identical results.
 
-`choose_instructions` must be called before threads start, and is therefore not called here.
+`choose_instructions` is not called, because it must be called before threads start.
 """
 
 import random
@@ -29,7 +29,7 @@ from pyharness.thesis.programs import IMPLEMENTATIONS
 
 THREADS = 8
 _REPEATS = 30
-# Switch interval (s): the interpreter changes threads a hundred times as often as by default.
+# Switch interval (s), a hundredth of the default.
 _SWITCH = 5e-5
 _TOLERANCE = 1e-9
 _TIMES = (0.05, 0.1, 0.2)
@@ -67,7 +67,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
-    """Return the calls that give other bits in threads than alone, once for each time."""
+    """Return the jobs whose bits in threads differ from a call alone, once per difference."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)
@@ -90,7 +90,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return calls, and refusals, of every method, prepared solver, program and LEQT1F."""
+    """Return jobs for every method, prepared solver, program, LEQT1F, and for refusals."""
     found = []
     for scene in SCENES:
         for name in METHODS:

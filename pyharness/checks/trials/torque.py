@@ -1,6 +1,6 @@
-"""Trial of torques: waves too fast for the step, huge and tiny torques, precession resonance.
+"""Trial of torques: waves too fast for the step, huge and tiny torques, resonance.
 
-A wave is a sine or cosine term of the torque.
+A wave is a sine or cosine term of the torque. Resonance is with the precession.
 """
 
 import math
@@ -50,7 +50,7 @@ _START = (0.3, 1.0, 2.0)
 
 @dataclass(frozen=True, eq=False)
 class Circumstance:
-    """A scene that is solved until `time` (s), with the methods that are checked in it."""
+    """A scene to solve until `time` (s), with the methods to check."""
 
     scene: Scene
     time: float
@@ -60,10 +60,10 @@ class Circumstance:
 
 
 def axial(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a symmetric body whose torque acts along its axis.
+    """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
     The phase of a wave has a random rounding error in every evaluation, at least one per period.
-    `conditioning` adds up n of them in full; 4 sqrt(n) suffice for random ones (Hoeffding 1963).
+    `conditioning` adds n of them in full; 4 sqrt(n) suffice for random errors (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -84,7 +84,7 @@ def averaged(scene: Scene, time: float) -> Truth:
 
 
 def summed(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) of a sphere, with a bound on its few rounding errors.
+    """Return the true omega at `time` (s) of a sphere, with a bound on its rounding errors.
 
     The phase of a wave is in double-double; only the final sum rounds.
     """
@@ -115,7 +115,7 @@ def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
 
 
 def _huge(size: float, start: Triple = _START) -> Circumstance:
-    """Return a scene with a constant torque (N m) that turns the body by some fifty radians."""
+    """Return a scene with a constant torque (N m) that rotates the body by some fifty radians."""
     law = TorqueLaw((size, 0.7 * size, -0.5 * size))
     scene = Scene("huge torque", start, moments=_BODY, torque=law, steps=6)
     return Circumstance(scene, math.sqrt(4e3 / size), programs=size == 1e6)
@@ -152,7 +152,7 @@ CIRCUMSTANCES = {
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
     **{f"huge-{size:.0e}": _huge(size) for size in (1e6, 1e9, 1e12)},
-    # omega grows to 1e8 times its initial value by the torque alone. This is no divergence.
+    # The torque alone increases omega to 1e8 times its initial value, which is no divergence.
     "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
     "resonant": _resonant(_SYMMETRIC),

@@ -107,7 +107,7 @@ def _present(
 ) -> tuple[list[_Named], list[_Named]]:
     """Return the solvers to measure, and those not installed.
 
-    Raise InputError if none is left, or if one is missing although the user `named` it.
+    Raise InputError if there is no solver, or if one is missing although the user `named` it.
     """
     missing = [each for each in others if not each.is_installed]
     if missing and named:
@@ -128,7 +128,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return --random, or 0; set the seed, by default to the present year and week."""
+    """Return --random, or 0; set the seed, by default the present year and week."""
     if options.random is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --random, --ensemble or --terms")
@@ -148,9 +148,9 @@ def chosen(
     where: str,
     attitude: bool = False,
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that the option `where` selects.
+    """Return the solvers for single scenes that the option `where` selects, by default all.
 
-    By default all. Raise InputError if a listed one can't compute the attitude despite `attitude`.
+    Raise InputError if a listed solver can't compute the attitude, but `attitude` requires it.
     """
     if text is None:
         return list(contenders)
@@ -207,7 +207,8 @@ def _ensemble(options: argparse.Namespace) -> int:
     loads = [*with_attitudes(loads, options.seed), *loads]
     rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
     rates.refused.extend(("", each.name, _absent()) for each in missing)
-    # Run times are measured with up to 100 times as many bodies, and memory with 10 times as many.
+    # Run times are measured with up to 100 times as many bodies, memory with up to 10 times as
+    # many.
     growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.end_progress()
@@ -230,9 +231,9 @@ def _terms(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     shared.progress(0, 1, "references")
     loads = term_loads.term_loads(scenes)
-    # The first solver imports modules, whose time is none of a preparation.
+    # The first solver imports modules, whose time belongs to no preparation.
     term_contenders.term_methods()[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
-    # All solvers run on one core, whose processor time other work of the machine hardly changes.
+    # All solvers run on one core, because other load hardly affects processor time.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
     many = measure_ensembles(
@@ -262,7 +263,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
     """Return the solvers that an option lists, by name or package.
 
-    None is for all, "none" for no solver.
+    None selects all, "none" no solver.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:

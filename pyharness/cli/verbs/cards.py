@@ -38,13 +38,13 @@ EXAMPLE = "cards runge-kutta:860"
 def run(options: argparse.Namespace) -> int:
     """Print cards, or the comparison that an option requests.
 
-    Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or if
-    the list of --origins has a mistake.
+    Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or
+    --origins a mistake in its table.
     """
     if options.format == "tei":
         from pyharness.history.tei import tei_document
 
-        # A TEI document has a header and an apparatus, which only the whole edition has.
+        # Only the whole edition has the header and apparatus of a TEI document.
         shared.refuse(
             options, "--format tei", ("classes", "collate", "origins", "second_reading", "scan")
         )

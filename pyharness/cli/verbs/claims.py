@@ -27,10 +27,10 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Judge whether our programs reproduce the claims of the thesis.
+    """Print verdicts on the claims of the thesis, or with an option the effect of unstated values.
 
-    --assignments, --evidence and --atlas print with which unstated values, such as the initial
-    omega, the claims hold.
+    --assignments, --evidence and --atlas test with which values, such as the initial omega, the
+    claims hold.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

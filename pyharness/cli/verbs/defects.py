@@ -18,7 +18,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the apparatus entries, or one with its effect in the seven cases."""
+    """Print all apparatus entries, or one with its effect in the seven cases."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Print the card `options.name`, our findings about it, and their effects."""
+    """Print the card `options.name`, its apparatus entries, and their effects."""
     from pyharness.history.cards_report import cards_report
     from pyharness.thesis.cards import chosen
 

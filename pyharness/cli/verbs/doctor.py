@@ -1,4 +1,4 @@
-"""The verb `doctor`: report what a bug report needs: build, machine, packages, environment."""
+"""The verb `doctor`: report build, machine, packages and environment, for bug reports."""
 
 import argparse
 

@@ -36,6 +36,6 @@ def run(options: argparse.Namespace) -> int:
         drawn.append(finding)
     shared.end_progress()
     write_folder(options.out, content, "--out")
-    # The list is printed to the standard output, because --out names the folder of the files.
+    # --out names the folder of the files, so that the list is printed to standard output.
     shared.emit(render(room.figures_report(drawn), options.format or "table"), None)
     return 0

@@ -34,7 +34,7 @@ EXAMPLE = "prove --case 3 --times 1,3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print an enclosure of the solution, or check a proof; return 1 if it does not hold."""
+    """Print an enclosure of the solution, or check certificates; return 1 if one is invalid."""
     if options.check is not None:
         return _check(options)
     scene = shared.chosen_scene(

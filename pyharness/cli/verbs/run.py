@@ -20,7 +20,7 @@ from pyharness.thesis.programs import (
     run_program,
 )
 
-# Output formats of programs only: the page of the line printer, and the binary file TAPE5.
+# Output formats of programs only: the line printer's page, and the binary file TAPE5.
 PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
@@ -97,10 +97,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
-    """Raise InputError if the result can't be "printer" or "tape5".
-
-    Only programs have these formats; TAPE5 is binary, and not for a terminal.
-    """
+    """Raise InputError if the result can't be "printer" or "tape5", formats of programs only."""
     if options.program is None:
         raise InputError(
             f"--format {form} has no meaning with --method; allowed: {', '.join(shared.FORMATS)}"
@@ -153,7 +150,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
 
 
 def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajectory]:
-    # These modules are imported here, because a run of a program does not need them.
+    # A run of a program does not need these modules.
     from pyharness.engine.registry import METHODS
     from pyharness.engine.solve import solve
 

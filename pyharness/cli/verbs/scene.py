@@ -49,7 +49,7 @@ EXAMPLE = "scene new --out brick.toml"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write, check or describe scene files; raise InputError for any other file."""
+    """Write, check or describe scene files; raise InputError for an invalid file or option."""
     action = options.action
     if action is None:
         raise InputError(f"give an action; allowed: {', '.join(_ACTIONS)}")

@@ -46,8 +46,7 @@ def run(options: argparse.Namespace) -> int:
     failed = [check for check in checks if not check.passed]
     if options.save is not None:
         _save(options.save, checks)
-    # The scene of a check that is requested by its id is not saved, because an earlier run that
-    # failed has saved it.
+    # A scene whose check is requested by id is not saved: an earlier failed run has saved it.
     elif trials is None and not any("/" in each for each in only):
         try:
             _save(_FOLDER, failed)

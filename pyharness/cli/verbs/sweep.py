@@ -1,6 +1,6 @@
 """The verb `sweep`: solve a grid of scenes, and store the results in a folder.
 
-A later run computes what an interrupted one lacks.
+A later run completes an interrupted one.
 """
 
 import argparse
@@ -56,8 +56,7 @@ def run(options: argparse.Namespace) -> int:
     workers = _workers(options, executor)
     sweep = read_sweep(options.file, CLAIMS)
     quantity = None
-    # The option --out is removed for `show`, because it names the store. The report is printed to
-    # the standard output.
+    # --out names the store, so that the report is printed to standard output.
     shown = argparse.Namespace(**{**vars(options), "out": None})
     if options.plot is not None:
         from pyharness.sweep.picture import chosen_quantity

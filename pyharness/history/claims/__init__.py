@@ -1,1 +1,1 @@
-"""The claims of the thesis, the tests of these claims, and the verdicts on them."""
+"""The claims of the thesis, their tests, and the verdicts on them."""

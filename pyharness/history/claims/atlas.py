@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
 The starts cover the sphere of directions at several magnitudes. A claim has 1 point if it is
-reproduced, 1/2 in part, without weights; its codes are those of `over_starts`.
+reproduced, 1/2 if in part, without weights. Verdict codes are from `over_starts`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,8 +39,8 @@ Codes = NDArray[np.int8]
 class Atlas:
     """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
 
-    The axes are reading, steps, magnitude of omega(0) (rad/s), height (omega3 over the magnitude)
-    and longitude (rad).
+    The axes of `codes` are reading, steps, magnitude of omega(0) (rad/s), height (omega3 over the
+    magnitude) and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -56,15 +56,15 @@ class Atlas:
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
     def choices(self) -> list[tuple[str, int]]:
-        """Return all pairs of a reading and a number of steps, in the order of the codes."""
+        """Return all pairs of reading and number of steps, ordered like the codes."""
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the sum of points for each start; `reading` and `steps` are indices."""
+        """Return the points of each start; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether every claim is reproduced, at least in part."""
+        """Return for each start whether no claim fails."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -96,7 +96,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the sum of the points of several claims, for each start."""
+    """Return the total points of several claims, for each start."""
     values = np.zeros(len(_CODES) + 1)
     for code, points in _POINTS.items():
         values[code] = points
@@ -104,20 +104,20 @@ def sum_of_points(codes: Sequence[Codes]) -> Array:
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of starts from which a claim is reproduced, in part, and not at all."""
+    """Return the fractions of starts with verdicts "reproduced", "in part" and "not reproduced"."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy of the verdict on a claim over the starts, in bits."""
+    """Return the entropy (bits) of the verdict on a claim over the starts."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, for each case, the claims in `names` that are about this case alone."""
+    """Return, by case, the claims in `names` about that case alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -127,7 +127,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the codes of the claims, for the original programs, from the starts shown."""
+    """Return the codes of the claims for the original programs, by start in `starts`."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

@@ -1,4 +1,4 @@
-"""The report of `claims --atlas`: how the verdicts on claims depend on the initial omega."""
+"""The report of `claims --atlas`: the effect of the initial omega on the verdicts."""
 
 import math
 from collections.abc import Sequence
@@ -157,7 +157,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return the percentage of starts from which one other choice changes a verdict."""
+    """Return the percentage of starts at which another reading or step number changes a verdict."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []
@@ -170,7 +170,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Draw maps of the points over the sphere of directions, and the mean points of each claim."""
+    """Return maps of the points over the sphere of directions, and each claim's mean points."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
@@ -204,7 +204,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # Leave out the first and last magnitude, whose maps look like the maps of their neighbours.
+    # The maps of the first and last magnitude resemble their neighbours'.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)

@@ -1,9 +1,9 @@
-"""Evidence on the choices that the thesis leaves open: a score for every combination of them.
+"""Evidence on the choices that the thesis leaves open: a score for every combination.
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
-either one value for all cases in which the thesis gives none, or for each case the value that we
-adopt. The score is the number of testable claims about the original programs that are reproduced;
-in part counts one half. There are no weights and no tuned parameters.
+one value for all cases in which the thesis gives none, or for each case the value that we adopt.
+The score is the number of testable claims about the original programs that are reproduced; in part
+counts one half. There are no weights and no tuned parameters.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from pyharness.model.listing import PROGRAMS, names_of
 POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
 STEPS = (100, 300)
 KINDS = ("result", "design")
-"""The kinds of claims that are about the programs."""
+"""The kinds of claims about the programs."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class Combination:
 
     @property
     def score(self) -> float:
-        """Return the score."""
+        """Return the sum of the verdicts' points."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Return how many claims are reproduced, at least in part."""
+        """Return the number of claims reproduced, at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return, by name of the choice, the value that this combination takes, as text."""
+        """Return this combination's values, as text, by name of the choice."""
         given = self.assumptions
         start = given.start or ()
         return {
@@ -56,7 +56,7 @@ class Combination:
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination with its verdicts, computed just before."""
+    """Yield every combination with its verdicts."""
     for assumptions in combinations():
         verdicts = {}
         for entry in claims():
@@ -69,7 +69,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def evidence_rule() -> str:
-    """Return the text in the report that explains the score."""
+    """Return the report's explanation of the score."""
     return (
         "Every combination of starts (one for all cases in which none is given, or those adopted), "
         "readings, conjectures and steps, scored by the claims about results and design of the "
@@ -79,7 +79,7 @@ def evidence_rule() -> str:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination; the start None takes the adopted omega(0) of each case."""
+    """Return every combination; the start None stands for each case's adopted omega(0)."""
     return [
         Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
         for start, readings, conjectures, steps in product(
@@ -89,7 +89,7 @@ def combinations() -> list[Assumptions]:
 
 
 def discriminating(found: list[Combination]) -> list[str]:
-    """Return the identifiers of the claims whose verdict differs between combinations."""
+    """Return the claims whose verdict differs between combinations."""
     every = dict.fromkeys(name for each in found for name in each.verdicts)
     return [
         name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
@@ -97,14 +97,17 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return the values of each choice that occur among the combinations with the highest score."""
+    """Return the values of each choice among the combinations with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with adopted values for what does not affect a claim, to test it once."""
+    """Return `chosen` with adopted values for choices that do not affect a claim.
+
+    Equal results share one test of the claim.
+    """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]

@@ -1,4 +1,4 @@
-"""The report of `claims --evidence`: how well the claims agree with each combination of choices."""
+"""The report of `claims --evidence`: the score of each combination of choices."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -34,7 +34,7 @@ _SHORT = {
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
-    """Return the report on how well the claims agree with each combination."""
+    """Return the report of the combinations, highest score first, with a picture."""
     ordered = sorted(found, key=lambda each: -each.score)
     axes = list(ordered[0].choices())
     columns = [

@@ -1,4 +1,4 @@
-"""The laboratory that tests claims: it runs the programs under given assumptions, each run once."""
+"""The laboratory that tests claims: it runs the programs under assumptions, each run once."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from pyharness.truth.reference import Reference, reference
 class Assumptions:
     """One value for each choice that the thesis leaves open.
 
-    `start` is omega(0) (rad/s) where the thesis gives none; None takes that of `cases.toml`.
+    `start` is omega(0) (rad/s) where the thesis gives none; None selects the value in `cases.toml`.
     `readings` are those that this edition does not adopt. `word` is the arithmetic.
     """
 
@@ -37,7 +37,7 @@ class Assumptions:
 
 @dataclass(frozen=True)
 class Laboratory:
-    """The three programs, original or corrected, which run the cases under given assumptions.
+    """The three programs, original or corrected, run on the cases under assumptions.
 
     `parts` divides the step size of a run; results are at the steps of the case. Without `may_stop`
     the stop test of the Runge-Kutta program is skipped. Errors are against the reference solution.
@@ -48,7 +48,7 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program; the corrected one depends on no assumption."""
+        """Return the listing of a program; a corrected one is independent of the assumptions."""
         if not self.is_original:
             return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -62,21 +62,21 @@ class Laboratory:
         return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
-        """Run a program on a case."""
+        """Return the run of a program on a case."""
         return self.run_on(self.scene(case, parts), self.listing(program), may_stop)
 
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Run a listing on a scene in the assumed arithmetic; `lipschitz` is in 1/s."""
+        """Return the run of a listing on a scene in the assumed word; `lipschitz` is in 1/s."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
-        """Return the reference solution of a case at the end of each of its steps."""
+        """Return the reference solution of a case at its steps."""
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program and return omega, NaN after the end of the run, with the outcome."""
+        """Return a program's omega, NaN after the end of the run, with its steps and ending."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -103,7 +103,7 @@ class Laboratory:
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s), maybe infinite, that passes every step."""
+        """Return the least Lipschitz constant (1/s) that stops no step; it may be infinite."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -117,14 +117,14 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return all initial omegas (rad/s) that the thesis shows, and one of our own."""
+    """Return all initial omegas (rad/s) in the thesis, and one that we add."""
     return [
         (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
     ]
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component in the rows that both have."""
+    """Return the largest difference (rad/s) of any omega component, over rows in both arrays."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
@@ -136,7 +136,7 @@ def ranges(truth: Reference) -> Array:
 
 
 def largest(truth: Reference) -> float:
-    """Return the largest magnitude of any omega component of a reference solution (rad/s)."""
+    """Return the largest magnitude of any omega component of a reference (rad/s)."""
     return float(largest_of(truth.omega))
 
 
@@ -183,7 +183,7 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""The statements in which the collocation decks have the step size as a literal number.
+"""The statements of the collocation decks with the step size as a literal number.
 
 ``DT=`` sets the interval length DT before the loop, ``T=`` sets the end of the interval, and
 ``DT+`` adds to DT in every step.
@@ -194,10 +194,10 @@ LITERALS = ("DT=", "T=", "DT+")
 def by_literals(
     scenes: tuple[Scene, ...], terms: int, changed: frozenset[str], parts: int
 ) -> Array:
-    """Return omega as an original collocation program with changed step literals computes it.
+    """Return omega of an original collocation program with changed step literals.
 
-    `changed` are the places on the cards, of `LITERALS`, whose step size is divided by `parts`. An
-    equivalent model, which differs in rounding errors, integrates all scenes at once under constant
+    The step sizes at the places `changed`, elements of `LITERALS`, are divided by `parts`. An
+    equivalent model, with other rounding errors, integrates all scenes at once under constant
     torque. The result (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3),
     NaN from an overflow on.
     """
@@ -215,12 +215,12 @@ def integrate_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip
-    """Integrate the collocation model of bodies with constant torque from n initial omegas at once.
+    """Integrate the collocation model of n bodies with constant torque at once.
 
-    `omega` (rad/s) has shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is over
-    the moments (rad/s2). The points divide (0, dt) evenly, where dt (s) grows by `growth` (s) in
-    every step of length `end` (s). Return omega (rad/s), shape (n, steps, 3), but for rounding that
-    of the programs; NaN from an overflow on.
+    `omega` (rad/s) has the shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is
+    over the moments (rad/s2). The points divide (0, dt) evenly, where dt (s) grows by `growth` (s)
+    in every step of length `end` (s). Return omega (rad/s), shape (n, steps, 3), as in the programs
+    except for rounding; NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

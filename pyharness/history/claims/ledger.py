@@ -1,4 +1,4 @@
-"""The claims of the thesis, and the verdicts computed for the original and corrected programs.
+"""The claims of the thesis, and verdicts on them for original and corrected programs.
 
 A claim is an entry of `data/claims.toml`.
 """
@@ -22,7 +22,7 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on one claim with one assumption changed; `survives` if both are the same."""
+    """The verdicts on one claim with one assumption changed; it `survives` if they are the same."""
 
     assumption: str
     original: str
@@ -32,7 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim with its verdicts, and those with each assumption changed, one at a time."""
+    """The verdicts on a claim, and those with each assumption changed, one at a time."""
 
     claim: dict[str, Any]
     original: Judged
@@ -42,10 +42,10 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega (rad/s) for a case in which the thesis gives none, and its claims' verdicts.
+    """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts.
 
-    It `holds` if the original programs reproduce all, at least in part, but those that fail with
-    every start.
+    It `holds` if the original programs reproduce, at least in part, all claims about the case
+    except those that fail with every start.
     """
 
     case: int
@@ -55,7 +55,7 @@ class Assignment:
 
 
 def claims() -> list[dict[str, Any]]:
-    """Return all claims of the thesis on which we give a verdict."""
+    """Return all claims of the thesis on which we have a verdict."""
     entries: list[dict[str, Any]] = facts("claims")["claim"]
     return entries
 
@@ -69,7 +69,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 
 def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
-    """Test one claim under the adopted assumptions, and again with each assumption changed."""
+    """Return the verdicts on one claim, as adopted and with each assumption changed."""
 
     def verdicts(entry: dict[str, Any], assumptions: Assumptions) -> tuple[Judged, Judged]:
         programs = outcome(entry, Laboratory(True, assumptions))
@@ -92,17 +92,17 @@ def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on the claim `identity`, as `judge` gives them; cached."""
+    """Return the judgement of the claim `identity`."""
     return judge(claim(identity), word)
 
 
 def judgements() -> list[Judgement]:
-    """Return our verdicts on every claim."""
+    """Return our judgements of all claims."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict of a claim's test for the programs that the laboratory runs."""
+    """Return the verdict of a claim's test, for the laboratory's programs."""
     (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
     judged: Judged = test(laboratory, **entry.get("parameters", {}))
     return judged
@@ -117,7 +117,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
-            # A conjecture of the original listing is removed; any other conjecture is added.
+            # An original listing's conjecture is removed; any other is added.
             conjecture, own = (
                 name.removeprefix("conjecture "),
                 Listing.original(PROGRAMS[0]).conjectures,
@@ -131,8 +131,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    The claims about a case do not depend on the start of another, so that all hold at once if each
-    case has such a start.
+    Claims about a case do not depend on another case's start. Therefore all hold at once if each
+    case has a start with which its claims hold.
     """
     found = []
     for case in facts("claims")["assumed"]["cases"]:

@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
-decides. The thesis lists no programs for the weightings other than collocation; a test of these is
-"not testable" for the original programs.
+Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
+decision. For the original programs, tests of weightings other than collocation return "not
+testable", because the thesis lists no such program.
 """
 
 import math
@@ -61,9 +61,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The test applies eq. 19 only if its quotients, changes of a derivative between two stages over
-    changes of its variable, are Lipschitz quotients of the differential equations. These are at
-    most the norm of the Jacobian, here the largest along the reference and the run.
+    The stop test applies eq. 19 only if its quotients, changes of a derivative between two stages
+    over changes of its variable, are Lipschitz quotients of the differential equations. These are
+    at most the norm of the Jacobian, here the largest along the reference and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -106,9 +106,10 @@ def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Judge the claim that the stop test ends the runs that are unbounded, and no others.
+    """Judge the claim that the stop test ends the unbounded runs, and no others.
 
-    Without the test they overflow, or exceed `bounded` times the largest reference omega.
+    A run is unbounded if, without the test, it overflows or exceeds `bounded` times the largest
+    reference omega.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -138,7 +139,8 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The cards have it as several literals; cases that improve when some are changed count too.
+    The cards have the step size as several literals. For the original programs, the numbers include
+    cases that improve when only some literals change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -148,7 +150,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Count the cases whose error falls to half when some of `LITERALS` are divided by ten."""
+    """Return the numbers of cases with at most half the error if `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -174,7 +176,7 @@ def suffices(
 ) -> Judged:
     """Judge the claim that a three- or four-term model suffices for most problems.
 
-    It is left out for the original programs if the torque varies.
+    For the original programs, the three-term model is omitted if the torque varies.
     """
     numbers, good = {}, 0
     for case in cases:
@@ -194,8 +196,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    Operations of a step, weighted by `unit_times`, are counted on the cards and in our LEQT1F: as
-    written, and a repeated term only once.
+    Operations of a step, weighted by `unit_times`, are counted on the cards and in our LEQT1F, both
+    as written and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -216,9 +218,9 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Count the floating-point operations of 100 steps of each program.
+    """Return "not testable" on run times, with each program's operations in 100 steps.
 
-    Run times today say nothing about the original machine: not testable.
+    Present run times are no evidence on the original machine.
     """
     counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
     numbers = {
@@ -231,8 +233,8 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    The claim is undecided if the thresholds in `factors`, or counts without and with our LEQT1F,
-    give different verdicts.
+    It is undecided if the thresholds in `factors`, or counts with and without our LEQT1F, give
+    different verdicts.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -274,8 +276,8 @@ def computer_error(
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
     Two sets of differences (rad/s) are tested: errors in Case 1, which every method solves exactly
-    but for rounding, with smaller and smaller steps; and runs as in section IV.2 in binary64
-    against those in `words`.
+    but for rounding, with decreasing steps; and differences of runs as in section IV.2 between
+    binary64 and `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -286,7 +288,7 @@ def computer_error(
             found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
-    # With products written out, runs in different arithmetics differ by rounding alone.
+    # With products written out, different arithmetics differ only in rounding.
     for weighting in _OTHERS:
         floats = {case: integrate(lab.scene(case), weighting) for case in cases}
         for word in words:
@@ -331,10 +333,10 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with collocation that corrects a first estimate once per step.
+    """Compare the corrected programs with collocation that makes one correction per step.
 
-    A correction uses the right-hand sides along the previous estimate. That the thesis recommends
-    to try this is neither true nor false: "not testable".
+    A correction uses the right-hand sides along the previous estimate. The verdict is "not
+    testable", because the thesis only recommends this method.
     """
     best = Laboratory(False, lab.assumptions)
     numbers = {}

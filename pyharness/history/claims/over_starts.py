@@ -1,4 +1,4 @@
-"""Verdicts on claims from many initial omegas at once, by the functions in `rules` on arrays.
+"""Verdicts on claims from many initial omegas at once, by the functions in `rules`.
 
 A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
 steps. Each start is used in all cases in which the thesis gives none. A sweep calls one attribute
@@ -34,14 +34,14 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 
 
 class Starts:
-    """The runs from n starts, a `rules.Bench`, for the cases in which the thesis gives no omega(0).
+    """The runs from n starts, a `rules.Bench`, for cases without omega(0) in the thesis.
 
-    The reference is integrated by Taylor series to a relative tolerance of 1e-12. Arrays have the
+    The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the starts (rad/s), shape (n, 3); no program runs yet."""
+        """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
         self._one, self._omega0 = one, omega0
         self._solution = cache(self._integrated)
         self._error = cache(partial(rules.largest_error, self))
@@ -49,13 +49,12 @@ class Starts:
         self._models = cache(self._modelled)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case, not with the n starts but with the laboratory's."""
+        """Return the scene of a case, with the laboratory's omega(0)."""
         return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start."""
-        # Only runs with the full step size are cached. Others are requested once, for their error,
-        # which is itself cached.
+        """Return the runs of a program on a case from every start."""
+        # Other runs are needed once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def solution(self, case: int) -> Array:
@@ -67,7 +66,7 @@ class Starts:
         return self._error(program, case, may_stop, parts)
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the models, as `Laboratory.models` but for rounding."""
+        """Return omega (rad/s) of the models, as `Laboratory.models` except for rounding."""
         return self._models(case, terms)
 
     def _starts(self, case: int) -> Array:
@@ -114,9 +113,9 @@ class Starts:
 
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
-"""The identifiers of the claims that have a rule for many starts."""
+"""The claims with a rule for many starts."""
 FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
-"""The import path of the function of each claim, for a sweep."""
+"""The import path of each claim's function, for a sweep."""
 
 
 def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
@@ -126,9 +125,9 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the code of a claim for each start in a batch of a sweep, shape (n,).
+    """Return the code of a claim for each start in a sweep's batch, shape (n,).
 
-    It is SILENT if the claims do not apply. The claim determines which cases are run.
+    It is SILENT if the claims do not apply to the sweep. The claim determines the cases to run.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -150,15 +149,15 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
     # Two benches are cached: with the requested number of steps, and with 100 steps for claims
-    # that do not depend on this number.
+    # independent of this number.
     return Starts(one, batch.omega0)
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
-    """Return the laboratory of a sweep, or None if the claims do not apply to it.
+    """Return the laboratory of a sweep, or None if the claims do not apply.
 
-    They need an original or corrected program, a case of the thesis with its body and torque, and
-    the stop test of the cards.
+    They apply to an original or corrected program, a case of the thesis with its body and torque,
+    and the stop test of the cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

@@ -1,4 +1,4 @@
-"""The reports of the verb `claims`: all verdicts, one claim in detail, and the initial omegas."""
+"""The reports of `claims`: all verdicts, one claim in detail, and the initial omegas."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Any
 from pyharness.history.claims.ledger import Assignment, Judgement
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
 
-# How a verdict is written in the table of all claims, and in the legend above the table.
+# A verdict as written in the table of all claims, and in its legend.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),
@@ -40,7 +40,7 @@ KINDS = {
 
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
-    """Return the report of the claims and our verdicts, one line for each claim."""
+    """Return the report of our verdicts, one line for each claim."""
     rows = [
         [
             each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
@@ -66,7 +66,7 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return a table of the number of claims by kind and verdict, original / corrected."""
+    """Return a table of the numbers of claims by kind and verdict, original / corrected."""
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:
@@ -82,7 +82,7 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 
 
 def explanation(judgement: Judgement) -> Report:
-    """Return the report of one claim: quotation, rule, verdicts and the numbers behind them."""
+    """Return the report of one claim: quotation, rule, verdicts and their numbers."""
     entry = judgement.claim
     text: list[Section] = [
         [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
@@ -162,7 +162,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number as text: a whole one below a million with all digits, else three."""
+    """Return a number as text: whole numbers below a million exactly, others with three digits."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

@@ -1,10 +1,10 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
-A bench supplies runs and solutions: a `Laboratory` for one start, or `Starts` for n. Its arrays
-have the shape (..., steps, 3), where ... is () or (n,), and a `Grade` the shape .... The `rule` of
-the claim in `data/claims.toml` says how it is graded. An error is the largest of any component of
-omega over the steps that the program ran, against the reference solution. The range of a component
-is its largest minus its smallest value.
+A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. Its arrays have
+the shape (..., steps, 3), where ... is () or (n,), and a `Grade` the shape .... The `rule` of the
+claim in `data/claims.toml` describes the grades. An error is the largest of any component of omega
+over the steps that the program ran, against the reference solution. The range of a component is its
+largest minus its smallest value.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 
 
 class Runs(NamedTuple):
-    """The runs of a program on one case; `omega` (rad/s) is NaN where one has no row."""
+    """The runs of a program on one case; `omega` (rad/s) is NaN where a run has no row."""
 
     omega: Array
     steps: NDArray[Any]
@@ -31,7 +31,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a test of one claim: numbers by description, and a flag for each start."""
+    """The result of a claim's test: numbers by description, and flags for each start."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -39,17 +39,17 @@ class Grade(NamedTuple):
 
 
 class Bench(Protocol):
-    """The interface from which a test of a claim obtains runs and reference solutions of cases.
+    """The source of runs and reference solutions for a claim's test.
 
     `parts` divides the step size; rows are at the steps of the case. Without `may_stop` the stop
     test is skipped.
     """
 
     def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case; the runs may start from other initial omegas."""
+        """Return the scene of a case; the runs may have other initial omegas."""
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Run a program on a case from every start."""
+        """Return the runs of a program on a case from every start."""
 
     def solution(self, case: int) -> Array:
         """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3)."""
@@ -76,7 +76,8 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
-    In part, by `share` of the largest omega; else also by a tenth of the range of each component.
+    The differences must be at most `share` of the largest omega and a tenth of each component's
+    range; in part, only the first.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -96,9 +97,9 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails in a case: ends early or is wrong.
+    """Grade the claim that the Runge-Kutta program fails in a case: ends early and is wrong.
 
-    In part, one of the two.
+    In part, only one of the two.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -121,7 +122,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
     numbers = {}
     for n in others:
         other = bench.models(case, n)
-        # A run that overflowed agrees with no other run.
+        # An overflowed run agrees with no other.
         lost = ~(np.isfinite(other) & np.isfinite(model)).all(axis=(-1, -2))
         apart = np.where(lost, np.inf, _farthest(other, model).max(axis=-1)) / largest
         numbers[f"{n} terms against {first}, over the largest omega"] = apart
@@ -129,7 +130,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Grade the claim that the motion of a case has the largest angular acceleration of all."""
+    """Grade the claim that a case has, by `factor`, the largest angular acceleration of all."""
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -143,10 +144,10 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 
 
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
-    """Grade the claim that collocation improves with a tenth of the step size, with one exception.
+    """Grade the claim that a tenth of the step size improves collocation, with one exception.
 
-    An error must fall at least to half, from a finite one, in four fifths (in part: half) of the
-    other pairs of program and case.
+    Errors must be finite and decrease to half or less in four fifths (in part: half) of the other
+    pairs of program and case.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -165,7 +166,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 
 
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
-    """Grade the claim that the Runge-Kutta program does not improve with a tenth of the step size.
+    """Grade the claim that a tenth of the step size does not improve the Runge-Kutta program.
 
     The runs are without stop test.
     """
@@ -190,7 +191,7 @@ def largest_error(
 
 
 def share_of_range(omega: Array, truth: Array) -> Array:
-    """Return the largest ratio of error to range of a component of omega that varies."""
+    """Return the largest ratio of error to range among varying components of omega."""
     spread = spread_of(truth)
     moving = spread > 1e-12 * largest_of(truth)[..., None]
     with np.errstate(all="ignore"):
@@ -209,7 +210,7 @@ def largest_of(omega: Array) -> Array:
 
 
 def _farthest(first: Array, second: Array) -> Array:
-    """Return the largest difference of each omega component (rad/s), without missing steps."""
+    """Return the largest difference of each omega component (rad/s), ignoring missing steps."""
     with np.errstate(all="ignore"):
         apart = _by_component(first - second)
         np.abs(apart, out=apart)
@@ -217,7 +218,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous array (3, ..., steps), ten times as fast for maxima."""
+    """Return omega as a contiguous array (3, ..., steps), whose maxima are ten times as fast."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

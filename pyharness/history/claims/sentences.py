@@ -1,4 +1,4 @@
-"""The sentences of sections V and VI of the thesis, each with its claims or why it has none."""
+"""The sentences of sections V and VI of the thesis, with their claims."""
 
 from typing import NamedTuple
 
@@ -6,11 +6,11 @@ from pyharness.model.facts import facts
 
 
 class Sentence(NamedTuple):
-    """A sentence of the thesis with the claims that it makes; fields that do not apply are empty.
+    """A sentence of the thesis with its claims; fields that do not apply are empty.
 
-    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `laboratory` is
-    the run that shows it best, as in ``case=2&program=two-term``; `command` shows more than `claims
-    --explain`.
+    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` is the
+    reason for a sentence without claims. `laboratory` is the run that shows it best, as in
+    ``case=2&program=two-term``; `command` shows more than `claims --explain`.
     """
 
     where: str
@@ -23,7 +23,7 @@ class Sentence(NamedTuple):
 
 
 def sentences() -> tuple[Sentence, ...]:
-    """Return the sentences of sections V and VI of the thesis, in order, with their claims."""
+    """Return the sentences of sections V and VI of the thesis, in order."""
     return tuple(
         Sentence(**{**row, "claims": tuple(row.get("claims", ()))})
         for row in facts("sentences")["sentence"]

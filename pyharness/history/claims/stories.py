@@ -1,6 +1,6 @@
-"""Each claim of the thesis as a story of three sentences, with the computed numbers in them.
+"""Each claim of the thesis as a story of three sentences, with computed numbers.
 
-A field of a sentence in `data/claims.toml` names a number of our verdict; none is written by hand.
+A field of a sentence in `data/claims.toml` is replaced by a number of our verdict.
 """
 
 import re
@@ -12,15 +12,15 @@ from pyharness.history.claims.ledger import Judgement
 FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
 """A field: the programs, `min of` or `max of`, the name of the number, and ` in %`.
 
-After `min of` or `max of`, the name is a pattern, as for file names, and the field is replaced by
-the smallest or the largest of all numbers that fit the pattern.
+After `min of` or `max of`, the name is a file-name pattern, and the field is the smallest or
+largest of all matching numbers.
 """
 _TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Story(NamedTuple):
-    """A claim told in three sentences, with LaTeX between dollar signs."""
+    """A claim in three sentences, with LaTeX between dollar signs."""
 
     saw: str
     why: str
@@ -28,7 +28,7 @@ class Story(NamedTuple):
 
 
 def story(judgement: Judgement) -> Story:
-    """Return the story of a claim; raise ValueError if a field fits no number of its verdicts."""
+    """Return the story of a claim; raise ValueError if a field matches no number."""
     outcomes = {"original": judgement.original, "corrected": judgement.corrected}
 
     def number(field: re.Match[str]) -> str:

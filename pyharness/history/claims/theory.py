@@ -1,7 +1,7 @@
-"""Tests of the thesis's claims about history, theory and orders, most of them in sections I to IV.
+"""Tests of the thesis's claims about history, theory and orders, mostly in sections I to IV.
 
-Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` says how it
-decides. An error is the largest of any omega component against the reference solution; `limit`
+Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
+decision. An error is the largest of any omega component against the reference solution; `limit`
 bounds it as a fraction of the largest omega.
 """
 
@@ -40,14 +40,14 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict on a statement of history, which `holds` by the sources or not."""
+    """Return the verdict on a statement of history; `holds` is whether the sources support it."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
 def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that Hamilton's equations of a rigid body are partial differential equations.
 
-    Six ordinary ones, in Euler angles and their momenta, solve the case.
+    The test solves the case by six ordinary equations, in Euler angles and their momenta.
     """
     from scipy.integrate import solve_ivp
 
@@ -80,14 +80,14 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from the 3-1-3 angles (rad), then their conjugate momenta."""
+    """Return omega (rad/s) from a state: 3-1-3 angles (rad), then their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     rates: Array = momentum / np.array(moments)
     return rates
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq: the 3-1-3 angles q (rad), then momenta p; H = sum I omega**2 / 2."""
+    """Return dH/dp and -dH/dq for 3-1-3 angles q (rad) and momenta p; H = sum I omega**2 / 2."""
     theta, psi = float(state[1]), float(state[2])
     omega = _omega(moments, state)
     matrix = _angle_rates_to_omega(state[:3])
@@ -115,7 +115,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The quotients are those of the square root on (0, 1), for x down to 10**-decades and y = 2 x.
+    The counterexample is the square root on (0, 1), with quotients for x down to 10**-decades and y
+    = 2 x.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -126,7 +127,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge the claim that the error of one step falls with a power of the step size."""
+    """Judge the claim that the error of one step decreases with a power of the step size."""
     numbers = {}
     for case in cases:
         numbers[f"case {case}: power of the step"] = _power(
@@ -139,7 +140,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    In part, one step of both agrees up to O(h**5).
+    In part, their steps agree up to O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -167,7 +168,7 @@ def _power(
     method: Callable[[Scene], Array],
     truth: Callable[[Scene], Array] | None = None,
 ) -> float:
-    """Return p, the power with which a method's error in one step of size h falls as O(h**p)."""
+    """Return p if a method's error in one step of size h is O(h**p)."""
     apart = []
     for step_size in (scene.step_size, scene.step_size / 2.0):
         short = replace(scene, step_size=step_size, steps=1)
@@ -177,7 +178,7 @@ def _power(
 
 
 def _taylor_step(scene: Scene, order: int) -> Array:
-    """Return omega (rad/s) after one step of its Taylor series up to h**order, constant torque."""
+    """Return omega (rad/s) after a Taylor step up to h**order, under constant torque."""
     coefficients = np.array(scene.euler_coefficients)
     torque = np.array(scene.normalized_torque(0.0))
     terms = [np.array(scene.omega)]
@@ -193,7 +194,7 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
-    """Judge the claim that in Crandall's example four weightings are better than the Taylor series.
+    """Judge the claim that four weightings are better than the Taylor series in Crandall's example.
 
     The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
     """
@@ -227,8 +228,8 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    It has the weighted integrals over (0, 1) of the two `factors` in the residual, and of `rate`,
-    by quadrature on each half.
+    A row has the weighted integrals over (0, 1) of the two `factors` in the residual, and of
+    `rate`, by quadrature on each half.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -242,10 +243,10 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 
 
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
-    """Judge the claim that the rates Q of eq. 32 of the thesis tell if a steady rotation is stable.
+    """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
 
-    A perturbation of 1e-8 should change as exp(Q t): grow at the rate Re Q (1/s) if this is above
-    0, else stay within ten times its size for ten periods.
+    A perturbation of 1e-8 of a steady rotation should change as exp(Q t): grow at the rate Re Q
+    (1/s) if this is above 0, else stay within ten times its size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -254,7 +255,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # In these times the decaying part vanishes, and the growing part is still small.
+            # By these times the decaying part has vanished, and the growing part is still small.
             times = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             if rate:
                 times = np.array([8.0, 10.0]) / rate
@@ -275,7 +276,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
 def trial_form_solves(lab: Laboratory, cases: list[int], limit: float) -> Judged:
     """Judge the claim that a trial solution of eq. 32 of the thesis solves some cases exactly.
 
-    It is a steady rotation about axis 3 plus exponential functions of time.
+    The trial solution is a steady rotation about axis 3 plus exponential functions of time.
     """
     numbers = {}
     for case in cases:
@@ -310,7 +311,7 @@ def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
-    """Judge the claim that each of the three card decks sets DT to `step` (s) before its loop."""
+    """Judge the claim that each of the three decks sets DT to `step` (s) before its loop."""
     numbers = {
         f"{program}: DT (s)": float(card.statement.partition("=")[2])
         for program in ("two-term", "four-term", "runge-kutta")
@@ -327,7 +328,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
         run_of = lab.run(program, case)
-        # TIME grows by DT in every step, so its increments are the DT that set the points.
+        # TIME grows by DT in every step, so that its increments are the DT of the points.
         lengths = np.diff(run_of.recorded_time, prepend=0.0)
         inside = last * lengths < lab.scene(case).step_size
         shares.append(float(inside.mean()))

@@ -1,11 +1,11 @@
 """Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
 
 Each function is the `test` of one or more claims in `data/claims.toml`. The claim's `rule`
-describes how it decides, and its `parameters` are the keyword arguments. `lab` is a laboratory,
-which runs the programs under the chosen assumptions, and `case` a number of Table 1.
+describes the decision, and its `parameters` are the keyword arguments. `lab` is a laboratory, which
+runs the programs under the chosen assumptions; `case` is a number of Table 1.
 
 An error is the largest of any component of omega against the reference solution, over the steps
-that the program ran; the amplitude is half the largest range (largest minus smallest value) of a
+that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
 reference omega. A claim that fails is "not reproduced" unless a docstring says otherwise.
 """
 
@@ -32,7 +32,7 @@ UNDECIDED = "undecided"
 
 @dataclass(frozen=True)
 class Judged:
-    """The verdict on one claim, and the computed numbers that support it, by description."""
+    """The verdict on a claim, and its computed numbers by description."""
 
     verdict: str
     numbers: dict[str, float]
@@ -69,14 +69,14 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies in a case, else "false"."""
+    """Judge the claim that omega3 varies in a case; if not, it is "false"."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers also have the steps of Runge-Kutta from each of `starts`.
+    The numbers include the steps of Runge-Kutta from each of `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -130,9 +130,9 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 
 
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
-    """Judge the claim that the stop test ended the Runge-Kutta run at step number `step`.
+    """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers list the subsets of defects with which it does.
+    The numbers list the subsets of defects with which it ends there.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -166,9 +166,9 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that a search for an error in the Runge-Kutta program found none.
+    """Return "not testable" for the claim of a search for an error in the Runge-Kutta program.
 
-    No run can test this. The number is the error over that of the corrected program.
+    The number is the original program's error over the corrected program's.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)
@@ -188,7 +188,7 @@ def fails(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def differ(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that the two collocation programs differ by `share` of the largest omega."""
+    """Judge the claim that the collocation programs differ by over `share` of the largest omega."""
     two, four = (lab.run(program, case).omega for program in COLLOCATION)
     apart = distance(two, four) / largest(lab.truth(case))
     return graded({"difference over the largest omega": apart}, apart > share)
@@ -206,7 +206,7 @@ def diverged(lab: Laboratory, case: int) -> Judged:
 
 
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
-    """Judge the claim that the two-term error has its cause in a motion too fast for two terms.
+    """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
     The corrected programs run from all `starts`, because the thesis gives no omega(0) for some
     cases.
@@ -226,5 +226,5 @@ def models_concur(lab: Laboratory, case: int, share: float, terms: Sequence[int]
 
 
 def dynamic(lab: Laboratory, case: int, factor: float) -> Judged:
-    """Judge the claim that the motion of a case is the liveliest in Table 1."""
+    """Judge the claim that a case has the largest angular acceleration in Table 1."""
     return judged(rules.dynamic(lab, case, factor))

@@ -1,1 +1,1 @@
-"""The weighted residual methods as one family, with derived and measured orders of convergence."""
+"""The weighted residual methods, with derived and measured orders of convergence."""

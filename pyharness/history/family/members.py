@@ -3,8 +3,8 @@
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
-for n weight functions W (eq. 26). The thesis makes one. `checks.theory.tableau`
-computes its coefficients.
+for n weight functions W (eq. 26). The thesis makes one correction. `checks.theory.tableau` computes
+its coefficients.
 """
 
 import math
@@ -23,7 +23,7 @@ WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")
 MOST_TERMS = 12
 MOST_CORRECTIONS = 100
-# Above this condition number the points are so close together that half the digits are lost.
+# Above this condition number the points are so close that half the digits are lost.
 _WORST_CONDITION = 1e8
 
 
@@ -31,9 +31,9 @@ _WORST_CONDITION = 1e8
 class Member:
     """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
-    The derivatives of the residual with f held constant, i t**(i-1), are the weights of least
-    squares (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1) (`thesis`),
-    Gauss-Legendre (`gauss`), or n different numbers from 0 to 1.
+    The weights of least squares are the derivatives of the residual with f held constant, i
+    t**(i-1) (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1)
+    (`thesis`), Gauss-Legendre (`gauss`), or n different numbers from 0 to 1.
     """
 
     weighting: str = "collocation"
@@ -42,7 +42,7 @@ class Member:
     corrections: int = 1
 
     def __post_init__(self) -> None:
-        """Raise InputError for wrong fields; by default, points are those of the thesis."""
+        """Raise InputError for wrong fields; set the default points of collocation."""
         if self.weighting not in WEIGHTINGS:
             raise unknown("weighting", self.weighting, WEIGHTINGS)
         if not 1 <= self.terms <= MOST_TERMS:
@@ -78,7 +78,7 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """Return the collocation points as text for a table; a dash without collocation."""
+        """Return the collocation points as text for a table; a dash for other weightings."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -87,7 +87,7 @@ class Member:
 
 
 def converged_order(member: Member) -> int:
-    """Return the order with many corrections, derived in docs/explanation/methods.md."""
+    """Return the order after many corrections, as derived in docs/explanation/methods.md."""
     n = member.terms
     if member.weighting == "galerkin":
         return n
@@ -104,15 +104,18 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order p of the global error O(h**p), one more for each correction."""
+    """Return the order p of the global error O(h**p), which each correction raises by one.
+
+    Its limit is `converged_order`.
+    """
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    The first estimate takes the torque at the beginning of the step, corrections at their nodes.
-    Each step rounds omega by about one unit in the last place.
+    The first estimate uses the torque at the beginning of the step, corrections that at their
+    nodes. Each step rounds omega by about one unit in the last place.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -133,14 +136,14 @@ def run(scene: Scene, member: Member) -> Trajectory:
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     """Return omega (rad/s) by several methods at once, shape (members, steps, 3).
 
-    It is not finite after an overflow.
+    Values after an overflow are not finite.
     """
-    # Most corrections first: members that still need a correction are then contiguous in memory.
+    # Sorted so that the members that need another correction are contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
     width = max(len(scheme.nodes) for scheme in schemes)
-    # Padding nodes are at the beginning of the step and have no weight.
+    # Padding nodes are at the beginning of the step, with weight 0.
     nodes = np.zeros((len(members), width))
     matrix = np.zeros((len(members), width, width))
     weights = np.zeros((len(members), 1, width))
@@ -176,7 +179,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the products of `_sums`, from (i, j, members) matrices, in a third of the time."""
+    """Return the products of `_sums` in a third of the time, from matrices (i, j, members)."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)

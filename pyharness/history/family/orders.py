@@ -1,4 +1,4 @@
-"""The errors of weighted residual methods, and their measured and derived orders of convergence."""
+"""Errors of weighted residual methods, with measured and derived orders of convergence."""
 
 import math
 from collections.abc import Sequence
@@ -21,15 +21,14 @@ SCHEMES: tuple[tuple[str, str | None], ...] = (
     ("least-squares", None),
 )
 # `_LADDER` has the numbers of steps from 0 to the horizon; each is twice the number two places
-# before it. A horizon is a fraction of the scene's end time. The first horizon is short, so that
-# the leading term of the error dominates at large steps already. Longer horizons follow for members
-# whose error over the first horizon is mostly rounding error. The last three are shorter than the
-# first, for long scenes.
+# before. A horizon is a fraction of the scene's end time. The first is so short that the leading
+# term of the error dominates even at large steps. Longer horizons follow for members whose error
+# over the first is mostly rounding. The last three, for long scenes, are shorter than the first.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
-# A measured order counts if both errors from which it is computed are in this range; they are
-# relative to the largest omega at the horizon. Above the range, higher terms of the error matter.
-# Below it, rounding error (at most 1e-15 here) matters.
+# Range of the errors, relative to the largest omega at the horizon, from which an order is
+# computed. Above it, higher terms of the error matter; below it, rounding error (at most 1e-15
+# here).
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -39,10 +38,10 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The order of convergence of one method in one scene, derived and measured, and its error.
+    """The derived and measured order of convergence of a method in a scene, and its error.
 
-    `measured` is None for rounding alone or too large errors; `settled`, if its last two values
-    differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
+    `measured` is None if errors are only rounding or too large. It is `settled` if its last two
+    values differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
     """
 
     member: Member
@@ -53,19 +52,19 @@ class OrderFinding:
 
     @property
     def deviation(self) -> float:
-        """Return the measured minus the predicted order; NaN if no order was measured."""
+        """Return the measured minus the predicted order; NaN without a measured order."""
         return math.nan if self.measured is None else self.measured - self.predicted
 
     @property
     def misses(self) -> bool:
-        """Return whether the order is too low; a higher one may be due to the special scene."""
+        """Return whether the order is too low; a higher order may be due to a special scene."""
         return self.settled and self.deviation < -SLACK
 
 
 def family_members(
     terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
 ) -> list[Member]:
-    """Return a method for each combination of scheme (of `SCHEMES`), `terms` and `corrections`."""
+    """Return a method for each combination of scheme (in `SCHEMES`), `terms` and `corrections`."""
     return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
 
 
@@ -74,7 +73,7 @@ def order_table(
     members: Sequence[Member] | None = None,
     progress: Progress = no_progress,
 ) -> list[OrderFinding]:
-    """Measure the orders of convergence and the errors of many methods at once.
+    """Return the orders of convergence and the errors of many methods, measured together.
 
     Raise InputError for an unbounded reference or more than `MOST_STEPS` steps.
     """
@@ -118,7 +117,7 @@ def order_table(
 
 
 def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array) -> Array:
-    """Return the relative errors of several methods at `horizon` (s), (step sizes, members)."""
+    """Return the relative errors of methods at `horizon` (s), shape (step sizes, members)."""
     scale = float(np.abs(end).max()) or 1.0
     rungs = []
     for steps in _LADDER:
@@ -131,7 +130,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each usable pair of errors, two places apart, with step ratio 2."""
+    """Return the order from each usable pair of errors, whose step sizes have the ratio 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)

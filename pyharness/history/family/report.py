@@ -1,4 +1,4 @@
-"""The report of the verb `family`: the orders and errors of the weighted residual methods."""
+"""The report of `family`: orders and errors of the weighted residual methods."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from pyharness.model.scene_report import heading
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of the orders and errors in a scene, by n terms and k corrections."""
+    """Return the report of orders and errors in a scene, by n terms and k corrections."""
     names = ("predicted", "measured", "settled", "error")
     measures = [{name: getattr(each, name) for name in names} for each in found]
     data = [
@@ -37,7 +37,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return sentences on measured and derived orders: one on each miss, or one on all."""
+    """Return sentences on measured and derived orders: one for each miss, else one for all."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

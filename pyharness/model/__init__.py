@@ -1,1 +1,1 @@
-"""The data types of all subpackages: scenes, listings, trajectories and reports."""
+"""Data types of all subpackages: scenes, listings, trajectories and reports."""

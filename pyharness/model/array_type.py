@@ -1,4 +1,4 @@
-"""The type of the arrays of numbers in binary64, for annotations."""
+"""Type of arrays of binary64 numbers, for annotations."""
 
 import numpy as np
 from numpy.typing import NDArray

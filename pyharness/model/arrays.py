@@ -15,7 +15,7 @@ from pyharness.model.values import integer, number
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
-# A test that is applied to each number of an array, and a phrase that names the allowed numbers.
+# A test of each number of an array, and a phrase for the allowed numbers.
 Rule = tuple[Callable[[Array], NDArray[np.bool_]], str]
 
 ABOVE_ZERO: Rule = (
@@ -26,10 +26,10 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 
 
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
-    """Return user values as a float array of rows, a single row as one, or raise InputError.
+    """Return user values as a float array of rows, or raise InputError; a single row is allowed.
 
-    In `shape`, that of a row, a letter such as "k" is any length. Each number must pass the test in
-    `rule`, which has a phrase for those that do.
+    `shape` is the shape of a row; a letter, as "k", is any length. `rule` tests each number, and
+    has a phrase for the allowed ones.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -48,7 +48,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 
 def numbers_of(where: str, values: object) -> Array:
-    """Return real numbers, also fractions, decimals and long integers, as float64, any shape."""
+    """Return real numbers of any type and shape as float64, or raise InputError."""
     try:
         found = np.asarray(values)
     except Exception as error:  # rows of different lengths, or a user-defined class
@@ -85,13 +85,13 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 
 
 def check_rows(name: str, array: Array, n: int) -> None:
-    """Raise InputError unless the array called `name` has one row or `n`."""
+    """Raise InputError unless the array `name` has one row or `n`."""
     if len(array) not in (1, n):
         raise InputError(f"{name}: {len(array)} rows; allowed: 1, or {n}, the number of bodies")
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of body `i` (from 0), or the shared one."""
+    """Return the row of body `i` (from 0), or the shared row."""
     return array[0 if len(array) == 1 else i]
 
 
@@ -114,7 +114,8 @@ def threads_of(threads: object) -> int:
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
     """Return the user's output array if a kernel can write to it, or raise InputError.
 
-    It must have `shape`, type character `kind`, as "d", and be writable, contiguous and aligned.
+    It must have `shape` and the type character `kind`, as "d", and be writable, contiguous and
+    aligned.
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind
     if not (right and array.flags.c_contiguous and array.flags.writeable and array.flags.aligned):
@@ -125,14 +126,14 @@ def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
 
 
 def spread(rows: Array, n: int) -> Array:
-    """Return `rows`, a single one repeated, for `n` bodies."""
+    """Return `rows` for `n` bodies; a single row is repeated."""
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, (n, 4), over their norms, or NaN."""
+    """Return quaternions, (n, 4), divided by their norms; NaN where that fails."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

@@ -1,7 +1,7 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-Components v about the body axes are q v q* about those of space, with the conjugate q*. The
-equation q' = q (0, omega)/2 is integrated. Each InputError begins with `where`.
+A vector v about the body axes has the components q v q* about those of space, with the conjugate
+q*. The kinematic equation is q' = q (0, omega)/2. Each InputError begins with `where`.
 """
 
 import math
@@ -32,7 +32,7 @@ _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot redu
 
 
 def scalar_first(values: object) -> Any:
-    """Return the quaternions of a SciPy `Rotation`, not imported, and anything else as it is."""
+    """Return the quaternions of a SciPy `Rotation`, scalar first, and any other value unchanged."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
@@ -59,7 +59,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after three rotations about body axes, at first those of space.
+    """Return the attitude after rotations by three angles (degrees) about body axes.
 
     Raise InputError for a `sequence` not in `SEQUENCES`, as "3-1-3", or other than finite angles.
     """
@@ -87,7 +87,7 @@ def product(p: Iterable[Any], q: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
 
 
 def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
-    """Return the rates q' = q (0, omega)/2 for numbers, arrays, symbols or other expressions."""
+    """Return q' = q (0, omega)/2, for numbers, arrays, symbols or other expressions."""
     (x, y, z), (a, b, c, d) = omega, q
     return [
         -0.5 * (b * x + c * y + d * z),
@@ -101,7 +101,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
     Where the first and last axes are parallel, only the sum or difference of their angles is
-    determined, and the last is 0. Arc tangents of half angles are accurate even near there.
+    determined, and the last angle is 0. Arc tangents of half angles are accurate even near there.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -134,7 +134,7 @@ def matrices(attitude: Array) -> Array:
 
 
 def angle_between(attitude: Array, other: Array) -> Array:
-    """Return the angle (rad) between each pair of attitudes, (n,); 0 for a negative quaternion."""
+    """Return the angle (rad) between each pair of attitudes, (n,); 0 between q and -q."""
     a, b, c, d = attitude.T
     e, f, g, h = other.T
     vector = np.array([
@@ -148,9 +148,9 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
     """Return the attitude of a right-handed frame, the columns of a 3 x 3 array."""
-    # SciPy is imported here, because only a full inertia matrix needs it.
+    # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
-    # Older versions of SciPy take no array that is read-only.
+    # Older versions of SciPy refuse read-only arrays.
     x, y, z, w = Rotation.from_matrix(np.array(axes)).as_quat().tolist()
     return w, x, y, z

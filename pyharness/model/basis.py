@@ -1,4 +1,4 @@
-"""The basis of a limit: proved, derived or measured, and its source."""
+"""Basis of a limit: proved, derived or measured, and the source."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ MARKS = {
     "derived": "a formula from analysis, with assumptions and without rigorous rounding",
     "measured": "set from the results of runs",
 }
-"""The three marks of a limit, each with its meaning."""
+"""The marks of a limit, with their meanings."""
 
 
 @dataclass(frozen=True)
 class Basis:
     """The reason why a limit has its value, defined once, beside the limit.
 
-    `mark` is a key of `MARKS`, the weakest of the parts; `limit` has the terms, and `source` the
+    `mark` is a key of `MARKS`, the weakest of the parts. `limit` states the limit, and `source` the
     theorem, derivation or command, in Markdown.
     """
 

@@ -18,7 +18,7 @@ OPTIONAL = {
     "python-flint": "faster proofs: prove",
     "argcomplete": "completion in the shell",
 }
-"""Distributions that are needed for a part of the package only, with that part."""
+"""Optional distributions, each with the part of the package that needs it."""
 
 INFLUENCES = (
     "CC", "CFLAGS", "COLUMNS", "CPPFLAGS", "DASK_CONFIG", "FC", "FFLAGS", "GOTO_NUM_THREADS",
@@ -27,10 +27,10 @@ INFLUENCES = (
     "OPENBLAS_L2_SIZE", "PYTHONHASHSEED", "PYTHONHOME", "PYTHONOPTIMIZE", "PYTHONPATH",
     "PYTHONUTF8",
 )  # fmt: skip
-"""Variables of the environment that may change results, output, or what is imported or built."""
+"""Environment variables that may change results, output, imports or builds."""
 
 AS_WRITTEN = "as written"
-"""What `Installation.arithmetic` is unless an option or a library changes the arithmetic."""
+"""The value of `Installation.arithmetic` unless an option or a library changes the arithmetic."""
 
 _LEVELS = ("plain", "avx2", "avx512")
 
@@ -50,7 +50,7 @@ class Build:
 
 
 def build() -> Build:
-    """Return the versions, the compiler and its flags of this installation."""
+    """Return versions, compiler and flags of this installation."""
     compiler = flags = extension = None
     try:
         from pyharness import _build, _kernels
@@ -74,10 +74,10 @@ def build() -> Build:
 
 @dataclass(frozen=True)
 class Installation:
-    """The installation and the machine, for a bug report; None for what is missing.
+    """The installation and the machine, for a bug report; None if unknown or missing.
 
-    `arithmetic` says what disturbs that of the kernels, else ``as written``; `environment` has the
-    set variables of `INFLUENCES`.
+    `arithmetic` states which option or library changes the kernels' arithmetic, else ``as
+    written``. `environment` has the set variables of `INFLUENCES`.
     """
 
     folder: str
@@ -124,12 +124,12 @@ def _installer() -> str:
 
 
 def _instructions() -> str | None:
-    """Return the best set of instructions of build and processor."""
+    """Return the best instruction set that both build and processor have."""
     try:
         from pyharness._kernels import choose_instructions
     except ImportError:
         return None
-    # The best set is chosen when the extension is loaded; this call repeats the choice.
+    # Loading the extension chooses the best set; this call repeats the choice.
     return _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
 
 

@@ -20,7 +20,7 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The common part of inertias that are polynomials of time."""
+    """The base class of inertias that are polynomials of time."""
 
     place: ClassVar[str]  # the key of a scene file
 
@@ -47,7 +47,7 @@ class Changing:
         return self._values(self.elements, time)
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
-        """Return its derivative (kg m2/s)."""
+        """Return the time derivative of the inertia matrix (kg m2/s)."""
         return self._values([[derivative(each) for each in row] for row in self.elements], time)
 
     def _values(self, elements: Sequence[Sequence[Polynomial]], time: Any) -> list[list[Any]]:
@@ -64,19 +64,19 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s) around 0, or infinities, between which the matrix is positive definite."""
+        """The times (s), or infinities, around 0 between which the matrix is positive definite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
         if isinstance(self, ChangingMoments):
             zeros = [first_zeros(each) for each in self.polynomials]
         else:
-            # The least principal moment is 0 where the determinant is 0 for the first time.
+            # The least principal moment first reaches 0 where the determinant does.
             zeros = [first_zeros(determinant(self.elements))]
         return max(first for first, _ in zeros), min(last for _, last in zeros)
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError if a moment reaches 0 up to one of `times` (s)."""
+        """Raise InputError if a moment reaches 0 between time 0 and one of `times` (s)."""
         first, last = self.span
         for time in times:
             if not first < time < last:
@@ -91,10 +91,10 @@ class Changing:
 class ChangingMoments(Changing):
     """Principal moments of inertia that are polynomials of time.
 
-    Mass moves relative to the axes of the body, as with booms or propellant, but the principal axes
-    are fixed in it. Mass that moves within the body has no angular momentum relative to its axes,
-    and mass that leaves none about the centre of mass. With the moments I and the torque N, I
-    omega' = N - I' omega - omega x (I omega).
+    Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
+    in it. Mass that moves within the body has no angular momentum relative to its axes, and mass
+    that leaves none about the centre of mass. With the moments I and the torque N, I omega' = N -
+    I' omega - omega x (I omega).
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class ChangingMoments(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the inertia matrix; those of zeros are empty."""
+        """The polynomials of the inertia matrix; zero elements have empty ones."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
 

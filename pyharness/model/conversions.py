@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from pyharness.model.scene import Scene
     from pyharness.model.trajectory import Trajectory
 
-_SMOOTH = 1000  # points of a line that is drawn through dense output
-# In HTML, the first and the last so many rows are shown.
+_SMOOTH = 1000  # points of a line through dense output
+# Number of first, and of last, rows in HTML.
 _SHOWN = 3
 
 
@@ -36,7 +36,7 @@ class _Quantity(NamedTuple):
 
 
 class Conversions(SciPyNames):
-    """A base class of trajectories, with conversions."""
+    """A base class of trajectories with conversions."""
 
     recorded_time: Array
     velocity: Array | None
@@ -54,8 +54,8 @@ class Conversions(SciPyNames):
         -------
         pandas.DataFrame
             With `time` (s) as its index, and columns `omega1` to `omega3` (rad/s), `velocity1` to
-            `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s) and `ier`, if they have values of
-            their own. ``attrs["units"]`` has the units.
+            `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s, if it differs from `time`) and
+            `ier`, as far as present. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -89,8 +89,8 @@ class Conversions(SciPyNames):
         -------
         xarray.Dataset
             The variables `omega` and `velocity` with the dimensions `time` and `axis`, `attitude`
-            with `time` and `component`, and `recorded_time` and `ier`, if they have values of their
-            own, with `units` and `long_name`. Attributes say how the integration ended.
+            with `time` and `component`, `recorded_time` (if it differs from `time`) and `ier`, as
+            far as present, with `units` and `long_name`. Attributes say how the integration ended.
 
         Raises
         ------
@@ -180,10 +180,10 @@ class Conversions(SciPyNames):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        All numbers and results are then bit-for-bit the same. The file is written completely or not
-        at all, in the format of `numpy.savez`: arrays by attribute, the text `scene` of a scene
-        file, and in JSON the text `header` with other attributes and the operations of a recorded
-        torque.
+        The restored numbers are bit-for-bit the same. The file is written completely or not at
+        all, in the format of `numpy.savez`: an array for each attribute, `scene` with the text of a
+        scene file, and `header` with other attributes and the operations of a recorded torque in
+        JSON.
 
         Parameters
         ----------

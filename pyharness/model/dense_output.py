@@ -10,11 +10,11 @@ from pyharness.model.array_type import Array
 from pyharness.model.chebyshev import points, to_coefficients
 from pyharness.model.errors import InputError
 
-# Nodes of each polynomial.
+# Number of nodes of a polynomial.
 NODES = 17
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
-# Times whose polynomials are evaluated together, so that little memory is needed.
+# Number of times that are evaluated together; it limits the memory.
 _BLOCK = 20_000
 _ROUNDED = 4.0  # units in the last place by which a time such as n*dt may be beyond an end
 # Weights of the barycentric formula.
@@ -24,9 +24,9 @@ _WEIGHTS[[0, -1]] /= 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time, a polynomial on each of p intervals between `edges` (s), ascending.
+    """A function of time, a polynomial on each of p intervals between ascending `edges` (s).
 
-    `values`, (p, NODES, m), are the components at Chebyshev points.
+    `values`, (p, NODES, m), are its m components at Chebyshev points.
     """
 
     edges: Array
@@ -55,7 +55,7 @@ class Pieces:
         with np.errstate(divide="ignore", invalid="ignore"):
             weights = _WEIGHTS / apart
             found: Array = np.einsum("nj,njm->nm", weights, values) / weights.sum(axis=1)[:, None]
-        # The formula fails at the nodes themselves, where the values are known.
+        # The formula fails at the nodes, where the values are known.
         row, node = np.nonzero(apart == 0.0)
         found[row] = values[row, node]
         return found
@@ -122,7 +122,7 @@ class DenseOutput:
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            The derivatives (1/s) of the components.
+            The derivatives: of omega in rad/s2, of the quaternion in 1/s.
 
         Raises
         ------

@@ -1,8 +1,8 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-In binary64 a small eigenvalue has few digits. The elements are integer multiples of a power of 2;
-hence the absolute determinant of a regular matrix is at least the cube of this unit, and its
-smallest absolute eigenvalue has a lower bound, which determines how many bits are needed.
+In binary64 a small eigenvalue would have few digits. The elements are integer multiples of a power
+of 2. The absolute determinant of a regular matrix is hence at least the cube of this unit, and its
+smallest absolute eigenvalue has a lower bound, which determines the number of bits.
 """
 
 import math
@@ -16,16 +16,15 @@ _BITS = 128
 _PAIRS = ((0, 1), (0, 2), (1, 2))
 # An off-diagonal element below 2**_NOISE, in units of its last bit, is only rounding error.
 _NOISE = 8
-# Limit of the number of rotations. Each rotation makes the largest off-diagonal element 0. The
-# convergence is quadratic, so that about ten rotations suffice.
+# Limit of the number of rotations. The convergence is quadratic; about ten suffice.
 _MOST_ROTATIONS = 500
 
 
 @dataclass(frozen=True)
 class Diagonal:
-    """The eigenvalues of a symmetric matrix, and orthonormal eigenvectors `vectors[k]`, exact.
+    """The eigenvalues of a symmetric matrix, and orthonormal eigenvectors `vectors[k]`.
 
-    Relative errors are at most 2**-100; a singular matrix has a 0.
+    They are fractions with relative errors of at most 2**-100; a zero eigenvalue is exactly 0.
     """
 
     values: Row
@@ -35,7 +34,7 @@ class Diagonal:
 def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
     """Return the eigenvalues and eigenvectors by Jacobi's method in integers.
 
-    Those of a diagonal matrix are in its order.
+    For a diagonal matrix they are in the order of its elements.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
@@ -60,10 +59,7 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Make element p, q of `a` 0 by the smaller Jacobi rotation (Rutishauser 1966), in place.
-
-    The eigenvectors have the unit 2**-bits.
-    """
+    """Make a[p][q] 0 in place by the smaller Jacobi rotation (Rutishauser 1966); unit 2**-bits."""
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]
     root = math.isqrt(gap * gap + twice * twice)

@@ -5,13 +5,13 @@ from typing import Any
 
 
 class Dual:
-    """A value, and its derivatives by some unknowns, of any arithmetic."""
+    """A value of any arithmetic, with its derivatives by some unknowns."""
 
     def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number with a value and derivative."""
+        """Return a function of this number, from its value and its derivative by this number."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":

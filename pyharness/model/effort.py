@@ -1,4 +1,4 @@
-"""Limits of the work of a computation, reached after some ten seconds, times `effort`."""
+"""Limits of the work of a computation: some ten seconds, times `effort`."""
 
 import math
 from collections.abc import Sequence
@@ -10,19 +10,18 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, number
 
-_SLACK = 2.0  # safety factor on an estimate of the needed effort, which may be too low
+_SLACK = 2.0  # safety factor on the estimated effort, which may be too low
 _ROUNDING = 1.0 + 1e-9  # tolerates the rounding of an effort that a message suggested
 _UNFORESEEN = 10.0  # factor on the present effort if the needed effort is not estimated
-# For each implementation two numbers: the largest number of steps of a program if the torque has no
-# waves (some 30 s for the slowest program), and the work for one wave relative to such a step. The
-# key "another word" is for a Python program in another arithmetic than binary64. The keys
-# "binary32" and "binary128" are for the compiled programs in these arithmetics.
+# By implementation: the largest number of steps without waves of the torque (some 30 s for the
+# slowest program), and the work for one wave relative to such a step. "another word" is a Python
+# program in another arithmetic than binary64; "binary32" and "binary128" are compiled programs.
 _LIMITS = {
     "fortran": (1e8, 1.0),
     "python": (5e5, 0.05),
     "another word": (5e4, 0.3),
     "binary32": (2e5, 0.1),
-    "binary128": (2e5, 10.0),  # its waves take long, by our own sine function
+    "binary128": (2e5, 10.0),  # our own sine function is slow
 }
 # The largest number of steps of a compiled program on many bodies, summed over the bodies.
 _MOST_STEPS_OF_ALL = 1e9
@@ -52,7 +51,7 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return a factor on the work limit with which a computation should complete, as text.
+    """Return as text a factor on the work limit with which a computation should complete.
 
     It is twice `needed`, or ten times the insufficient `effort`.
     """
@@ -64,7 +63,7 @@ def suggested(effort: float, needed: float | None = None) -> str:
 
 
 def waves(scene: Scene) -> int:
-    """Return the number of waves in the torque; 0 under one of the state."""
+    """Return the number of waves of the torque; 0 if it depends on the state."""
     if isinstance(scene.torque, StateTorque):
         return 0
     return len(scene.law.sines) + len(scene.law.cosines)
@@ -73,7 +72,7 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`, as "python".
 
-    The work is the number of steps, increased for each wave.
+    The work is the number of steps, increased for each wave of the torque.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)

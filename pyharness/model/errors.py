@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable
 
-# The most characters of a message. A message is longer only if it quotes long input; it is then
-# shortened.
+# Most characters of a message. Only one that quotes long input is longer, and is shortened.
 _LONGEST = 900
 
 
 class InputError(ValueError):
-    """The exception for an error in the user's input; a command that it ends has exit status 2.
+    """An error in the user's input; a command that it ends has exit status 2.
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ class TimedError(InputError):
 
 
 class NotBuiltError(RuntimeError):
-    """The exception for a missing Fortran extension; a command that it ends has exit status 3.
+    """An error for a missing Fortran extension; a command that it ends has exit status 3.
 
     Examples
     --------
@@ -86,7 +85,7 @@ def kind_of(value: object) -> str:
     for name, types in kinds.items():
         if isinstance(value, types):
             return name
-    # NumPy is not imported for this. An array counts as a list.
+    # Attributes are read instead of types, so that NumPy is not imported. An array is a list.
     dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():
@@ -98,9 +97,9 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name, with a similar one that is allowed.
+    """Return the InputError for a name that is not `allowed`, with a similar name that is.
 
-    `what` is as "case", and the message begins with `where`, as "--fix".
+    `what` is the kind of name, as "case"; `where` begins the message, as "--fix".
     """
     import difflib
 

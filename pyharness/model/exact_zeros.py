@@ -1,4 +1,4 @@
-"""First zeros of polynomials of time, exactly."""
+"""Exact first zeros of polynomials of time."""
 
 import math
 import sys
@@ -30,17 +30,17 @@ def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the last zero before time 0, where it is positive, and the first after, or inf."""
+    """Return the zeros (s) next to time 0, where the polynomial is positive, or infinities."""
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)
 
 
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
-    """Return the first zero of a polynomial after time 0, or infinity.
+    """Return the first zero (s) of a polynomial after time 0, or infinity.
 
     It is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki 2012,
-    Computer Aided Geometric Design 29); others are halved.
+    Computer Aided Geometric Design 29); other intervals are halved.
     """
     if min(polynomial) >= 0:
         return math.inf
@@ -49,7 +49,7 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
     while not whole[-1]:
         whole.pop()
     exponent = _bound(whole)
-    # All zeros are between 0 and 2**exponent s; the time over this bound is the new unknown.
+    # No positive zero exceeds 2**exponent s; time over this bound is the new unknown.
     least = min(0, exponent * (len(whole) - 1))
     row = _bernstein([c << (exponent * n - least) for n, c in enumerate(whole)])
     unit = Fraction(2) ** exponent
@@ -69,10 +69,7 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
 
 
 def _bound(polynomial: Sequence[int]) -> int:
-    """Return the exponent of a power of two that no positive zero exceeds.
-
-    Kioustelidis 1986, Journal of Computational and Applied Mathematics 16, has the bound.
-    """
+    """Return log2 of a bound of positive zeros (Kioustelidis 1986, J. Comput. Appl. Math. 16)."""
     degree, last = len(polynomial) - 1, polynomial[-1]
     return 1 + max(
         -((last.bit_length() - 1 - c.bit_length()) // (degree - n))
@@ -93,7 +90,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return those of both halves, times 2**degree (de Casteljau)."""
+    """Return the coefficients in both halves, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

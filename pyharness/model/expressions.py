@@ -20,7 +20,7 @@ from pyharness.model.symbols import Recorder, Symbol
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import finite, number_list
 
-# The names of the inputs of a tape, in the order of its slots.
+# Names of the inputs of a tape, by slot.
 INPUTS = ("t", "w1", "w2", "w3", "q0", "q1", "q2", "q3")
 FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "sinh", "cosh", "tanh")
 _LONGEST = 10_000
@@ -41,11 +41,11 @@ _SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 
 def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
-    """Return the torque of three expressions about the body axes, a torque law if possible.
+    """Return the torque of three expressions about the body axes, as a torque law if possible.
 
-    They have t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, and `constants`, and are
-    in N m, or in 1/s2 for a body with coefficients. Raise InputError, with the place, for an
-    invalid one.
+    Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, and `constants`. Values
+    are in N m, or in 1/s2 for a body with coefficients. Raise InputError, with the place, for an
+    invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -60,7 +60,7 @@ def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of three checked expressions by place, for eight symbols as `inputs`."""
+    """Return the values of three checked expressions, `texts` by place, for eight symbols."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
@@ -114,7 +114,7 @@ def _three_texts(expressions: object) -> dict[str, str]:
 def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
     """Return the value of an expression, a symbol or a float."""
     found: dict[ast.AST, Any] = {}
-    # A node follows its parent in the list. A loop, unlike recursion, needs no depth of the stack.
+    # A loop, unlike recursion, is not limited by the stack; a node follows its parent in the list.
     for node in reversed(_nodes(text, place)):
         try:
             value = _value(node, found, names, place)
@@ -141,7 +141,7 @@ def _tree(text: str, place: str) -> ast.expr:
     except (RecursionError, MemoryError):
         raise _too_deep(place) from None
     except (SyntaxError, ValueError) as error:
-        # The message of Python is not shown: it speaks of statements and of memory.
+        # Python's message, about statements or memory, would mislead.
         at = getattr(error, "offset", None) or 1
         near = text[max(at - 1, 0) :] or text
         raise InputError(
@@ -150,7 +150,7 @@ def _tree(text: str, place: str) -> ast.expr:
 
 
 def _nodes(text: str, place: str) -> list[ast.expr]:
-    """Return the nodes, each after its parent, or raise InputError."""
+    """Return the nodes, each after its parent; raise InputError for one not allowed."""
     nodes, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()
@@ -184,7 +184,7 @@ def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
 def _value(
     node: ast.expr, found: Mapping[ast.AST, Any], names: Mapping[str, Any], place: str
 ) -> Any:
-    """Return the value of a node from those of its operands in `found`."""
+    """Return the value of a node; `found` has those of its operands."""
     try:
         match node:
             case ast.Constant(value):
@@ -200,7 +200,7 @@ def _value(
             case ast.Call(ast.Name(name), [argument]):
                 return _function(name, found[argument], place)
     except InputError as error:
-        # Symbols do not know in which expression they are.
+        # Messages of symbols lack the expression.
         message = str(error)
         if message.startswith("[torque]: "):
             raise InputError(f"{place}: {message.removeprefix('[torque]: ')}") from None

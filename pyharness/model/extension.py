@@ -15,7 +15,7 @@ from pyharness.model.torque_law import Wave
 COMPLETE, STOPPED, OVERFLOW = Statuses.COMPLETE, Statuses.STOPPED, Statuses.OVERFLOW
 REFUSED, GAVE_UP, INTERRUPTED = Statuses.REFUSED, Statuses.GAVE_UP, Statuses.INTERRUPTED
 SENSITIVE = Statuses.SENSITIVE
-# The statuses in words, for users; the index in the tuple is the integer of the status.
+# Names of the statuses, for users; the index is the integer.
 ENDS = tuple(name.lower().replace("_", " ") for name in vars(Statuses) if name.isupper())
 
 
@@ -37,7 +37,7 @@ def _why_missing() -> str:
         installed = Path(str(distribution(DISTRIBUTION).locate_file(here.name)))
     except PackageNotFoundError:
         installed = here
-    # Python takes the folder in which it is started before any installed package.
+    # Python prefers the folder in which it is started to installed packages.
     if installed != here and any(installed.glob("_kernels.*")):
         return (
             f"Python imported the source folder {here}, which is not built; the installed package "

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 SHIPPED = ("web", "fortran", "codemeta.json", "CITATION.cff", "LICENSE")
-"""What an installed package has in its folder `data`, and a checkout beside the Python package."""
+"""Names in the folder `data` of an installed package; in a checkout, beside the package."""
 
 _PACKAGE = Path(__file__).parent.parent
 _FOLDER = _PACKAGE / "data"
@@ -14,7 +14,7 @@ _FOLDER = _PACKAGE / "data"
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """Return the content of ``data/<name>.toml``, cached and not to be changed."""
+    """Return the content of ``data/<name>.toml``, cached; callers must not change it."""
     with open(_FOLDER / f"{name}.toml", "rb") as file:
         return tomllib.load(file)
 
@@ -25,6 +25,6 @@ def facts_folder() -> Path:
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a folder beside the package, as ``fortran``, or installed in `data`."""
+    """Return the path of a folder, as ``fortran``, in a checkout or an installed package."""
     installed = _FOLDER / name
     return installed if installed.exists() else _PACKAGE.parent / name

@@ -1,6 +1,6 @@
-"""Elementary functions of floats, by the C library, and of numbers in other formats.
+"""Elementary functions of floats, by the C library, and of other floating-point numbers.
 
-The latter are of a class in `pyharness.thesis.word`, whose methods round correctly.
+The others are of a class in `pyharness.thesis.word`, whose methods round correctly.
 """
 
 import math

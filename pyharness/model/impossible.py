@@ -1,4 +1,4 @@
-"""The warning about impossible moments of inertia."""
+"""Warning about impossible moments of inertia."""
 
 import sys
 import warnings
@@ -11,12 +11,12 @@ _BETWEEN = (
     *("pyharness.model.scene", "pyharness.model.scene_file", __name__),
 )
 
-# The largest moment over an excess that rounding of moments or elements may cause.
+# Ratio of the largest moment to an excess that rounding may cause.
 _ROUNDED = 2**50
 
 
 class ImpossibleBodyWarning(UserWarning):
-    """The warning that the largest moment of a body exceeds the sum of the other two.
+    """A warning that the largest moment of a body exceeds the sum of the other two.
 
     The results are nevertheless computed.
 
@@ -38,7 +38,7 @@ class _Body(Protocol):
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
-    """Return whether the largest exceeds the sum of the others, not by rounding."""
+    """Return whether the largest moment exceeds the sum of the others by more than rounding."""
     low, middle, high = sorted(moments)
     return bool((high - middle - low) * _ROUNDED > high)
 

@@ -16,15 +16,15 @@ from pyharness.model.values import Triple, converted, number_list, three
 Exact = tuple[Fraction, Fraction, Fraction]
 Array = NDArray[np.float64]
 
-_ALIKE = 1e-12  # allowed difference of elements that should be equal, over the largest element
-_KEPT = 256  # number of matrices whose principal frames are cached
+_ALIKE = 1e-12  # allowed asymmetry of elements, over the largest element
+_KEPT = 256  # number of cached principal frames
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments (kg m2) and axes of one body, rounded and correct to some 38 digits.
+    """The principal moments (kg m2) and axes of one body, rounded and to at least 30 digits.
 
-    Each axis, a column of `axes`, is near to the body's own axis of its number; they form a
+    Each axis, a column of `axes`, is near the body's own axis of the same number; they form a
     right-handed frame. `moments_low` is the exact minus the rounded moments.
     """
 
@@ -79,10 +79,10 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal moments, each accurate to its last digit and unsorted, and axes."""
+    """Return the principal frame; moments are unsorted, each accurate to its last digit."""
     found = diagonalised(inertia)
     order: list[int] = []
-    # To each body axis, the nearest of the remaining eigenvectors is assigned.
+    # Each body axis gets the nearest remaining eigenvector.
     for row in range(3):
         left = [k for k in range(3) if k not in order]
         order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
@@ -115,7 +115,6 @@ def _reverse(axis: Exact) -> Exact:
 
 
 def _determinant(axes: list[Exact]) -> float:
-    """Return the determinant, 1 or -1 up to rounding errors."""
     (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
     return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 

@@ -1,4 +1,4 @@
-"""The derivative of omega, in symbols or numbers, of a body with a full or changing inertia."""
+"""The derivative of omega (rad/s2), in symbols or numbers, for a full or changing inertia."""
 
 from typing import Any
 
@@ -6,11 +6,11 @@ from pyharness.model.changing import Changing, ChangingMoments
 
 
 def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega, in symbols, for an inertia that changes."""
+    """Return the derivative of omega for an inertia that changes with time."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if isinstance(changing, ChangingMoments):
         a, b, c = (matrix[k][k] for k in range(3))
-        # The differences of nearly equal moments have no rounding errors of products.
+        # Differences of nearly equal moments, unlike of products, have no rounding errors.
         products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
         return [
             (torque[k] - rate[k][k] * omega[k] + products[k]) / moment
@@ -20,7 +20,7 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
 
 
 def rates_of_inertia(matrix: Any, omega: Any, torque: Any) -> list[Any]:
-    """Return the derivative of omega, in symbols, for a full inertia matrix."""
+    """Return the derivative of omega for a full inertia matrix."""
     (x, y, z), (u, v, w) = omega, (_dot(row, omega) for row in matrix)
     products = z * v - y * w, x * w - z * u, y * u - x * v
     return _solved(matrix, [torque[k] + products[k] for k in range(3)])
@@ -31,10 +31,7 @@ def _dot(first: Any, second: Any) -> Any:
 
 
 def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
-    """Return the solution of a positive definite system by L D L^T.
-
-    The source is Golub and Van Loan 2013, Matrix Computations, section 4.1.
-    """
+    """Return the solution by L D L^T (Golub and Van Loan 2013, Matrix Computations, 4.1)."""
     (a, f, e), (_, b, d), (_, _, c) = matrix
     l21, l31 = f / a, e / a
     second, below = b - l21 * f, d - l31 * f

@@ -1,4 +1,4 @@
-"""Torque laws, or fields, in symbols."""
+"""Torque laws, or fields of the same form, in symbols."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return a law at a time, about the law's axes."""
+    """Return three components of a law at a time, about the law's axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -19,14 +19,14 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return the integral of a law from time 0: three components."""
+    """Return three components of the integral of a law from time 0."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
     ]
     for amplitude, frequency in law.sines:
         if frequency:
-            # It is (1 - cos(f t))/f, without its cancellation for small angles.
+            # The integral, (1 - cos(f t))/f, without cancellation for small angles.
             half = np.sin(0.5 * frequency * time)
             wave = half * half
             found = [x + 2.0 * a / frequency * wave for x, a in zip(found, amplitude, strict=True)]
@@ -38,7 +38,7 @@ def law_integral(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_derivative(law: TorqueLaw) -> TorqueLaw:
-    """Return the derivative of a law, or raise InputError if an amplitude overflows."""
+    """Return the time derivative of a law; raise InputError if an amplitude overflows."""
     sines = [([-f * a for a in amplitude], f) for amplitude, f in law.cosines]
     cosines = [([f * a for a in amplitude], f) for amplitude, f in law.sines]
     return TorqueLaw(law.rate, sines=sines, cosines=cosines, frame=law.frame)
@@ -47,7 +47,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 def to_body(vector: Any, attitude: Any) -> Array:
     """Return a vector about the axes of space in components about the body axes.
 
-    The matrix is written out, because terms of one torque then share its products.
+    The matrix is written out, so that terms of one torque share its products.
     """
     u, v, w = vector
     a, x, y, z = attitude

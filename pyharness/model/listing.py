@@ -1,8 +1,8 @@
 """Listings: programs of the thesis with a choice of their defects, readings and conjectures.
 
 A card has one line of a program. A defect is a mistake of the printed program, active if not
-corrected; a reading an interpretation of a doubtful card other than the one that we adopt; a
-conjecture an assumption about a statement for which no card exists.
+corrected. A reading is an interpretation of a doubtful card other than the one that we adopt. A
+conjecture is an assumption about a statement for which no card exists.
 """
 
 from collections.abc import Iterable, Set
@@ -83,7 +83,7 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind: `corrected` if nothing is active, `original` by `switches`, or `custom`."""
+        """The kind: `corrected` if nothing is active, `original` for `switches`, else `custom`."""
         if not self.active:
             return "corrected"
         return (

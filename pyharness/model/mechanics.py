@@ -1,7 +1,7 @@
-"""The mechanical quantities of a trajectory: angular momentum, energy, power and work.
+"""Mechanical quantities of a trajectory: angular momentum, energy, power and work.
 
-An inertia that changes with time is that at the time of the row. Where moments of inertia are
-needed, coefficients raise InputError.
+A changing inertia is taken at the time of the row. Where moments of inertia are needed, a body with
+coefficients raises InputError.
 """
 
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Mechanics:
-    """A base class of trajectories, with what follows from omega and the body."""
+    """A base class of trajectories: quantities that follow from omega and the body."""
 
     time: Array
     omega: Array
@@ -118,7 +118,7 @@ class Mechanics:
             along = torque.in_space
             omega = turned_to_space(self._attitudes(), self.omega) if along else self.omega
         else:
-            # A torque that does not depend on the attitude accepts any.
+            # A torque that does not depend on the attitude gets any.
             needed = torque.needs_attitude
             attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
             rows = zip(self.time.tolist(), self.omega.tolist(), attitudes.tolist(), strict=True)
@@ -130,10 +130,10 @@ class Mechanics:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        It is the change of the kinetic energy; the motors of the ready term `wheels` are not
-        included. Computed as (omega - omega0) . I (omega + omega0) / 2 it loses no digits where
-        omega has changed little, unlike a difference of energies; its error is that of omega times
-        the angular momentum.
+        It is the change of the kinetic energy, without the motors of the ready term `wheels`. The
+        formula (omega - omega0) . I (omega + omega0) / 2, unlike a difference of energies, loses no
+        digits where omega has changed little; the error is that of omega times the angular
+        momentum.
 
         Returns
         -------
@@ -193,7 +193,7 @@ class Mechanics:
 
 
 def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Transform vectors, (n, 3), from the body to space."""
+    """Return vectors, (n, 3), rotated from body to space."""
     scalar, vector = attitude[:, :1], attitude[:, 1:]
     twice = 2.0 * np.cross(vector, vectors)
     return vectors + scalar * twice + np.cross(vector, twice)

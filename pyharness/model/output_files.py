@@ -1,4 +1,4 @@
-"""Writing of output files, each either completely or not at all."""
+"""Writing of output files, each completely or not at all."""
 
 import os
 import signal
@@ -12,10 +12,7 @@ from pyharness.model.pipes import write_waiting
 
 
 def check_writable(path: str, option: str) -> None:
-    """Raise InputError, which names `option`, if no file can be written at `path`.
-
-    Callers check before any computation.
-    """
+    """Raise InputError, which names `option`, if no file can be written at `path`."""
     try:
         # A link is followed to its target, as in an ordinary write.
         target = Path(os.path.realpath(path)) if "\0" not in path else Path()
@@ -37,8 +34,7 @@ def check_writable(path: str, option: str) -> None:
         elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             reason = "permission denied"
         else:
-            # A temporary file is written, because permissions do not show that a file system, such
-            # as /proc, accepts no file.
+            # Permissions do not show that a file system, such as /proc, accepts no file.
             probe = _File(path)
             try:
                 probe.write(b"")
@@ -51,9 +47,9 @@ def check_writable(path: str, option: str) -> None:
 
 
 def write_files(contents: dict[str, bytes], option: str) -> None:
-    """Write several files, either all or none, or raise InputError, which names `option`.
+    """Write several files, all or none; raise InputError, which names `option`, on failure.
 
-    They have temporary names and are then renamed; after any failure or Ctrl-C the previous files
+    Files have temporary names and are then renamed; after any failure or Ctrl-C the previous files
     are restored. Devices and pipes are written first, and never replaced.
     """
     path = ""
@@ -115,7 +111,7 @@ class DeferredInterrupt:
 
 
 class _File:
-    """A file with paths of its `new` content and its `old` copy."""
+    """A file to write, with the paths of its `new` content and its `old` copy."""
 
     def __init__(self, path: str) -> None:
         self.path = path

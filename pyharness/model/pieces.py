@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from pyharness.model.progress import count_done, expect_bodies, has_bar
 
-# The most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
+# Most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
 _PIECE = 1 << 18
-# The fewest bodies per thread. With fewer, a further thread costs more time than it saves.
+# Fewest bodies per thread. With fewer, a further thread costs more time than it saves.
 _SMALL = 256
-# The fewest pieces of many bodies if a bar shows the progress.
+# Fewest pieces with a progress bar.
 _REPORTS = 100
 
 
@@ -25,10 +25,10 @@ def share(
 ) -> None:
     """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
 
-    After an exception, as by Ctrl-C, the integer `given_up` is 1, and kernels, which poll it, end.
+    After an exception, as by Ctrl-C, the integer `given_up` is 1; kernels read it and return.
     """
     if threads == 1 or len(pieces) < 2:
-        # The work is done in the calling thread, because only the main thread receives signals.
+        # Only the main thread receives signals; this is usually the calling one.
         for piece in pieces:
             work(piece)
             count_done(piece.stop - piece.start)

@@ -15,8 +15,9 @@ _PIECE = 1 << 20
 def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) -> bytes:
     """Return the content of a file or pipe that a user named.
 
-    Raise InputError, beginning with `where`, for what can't be read, a folder, a device, more than
-    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds; `what` is expected.
+    Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more than
+    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds; `what` is the expected
+    content.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -55,14 +56,14 @@ def _read(path: str, limit: int) -> bytes | None:
 
 
 def _is_quiet(handle: int) -> bool:
-    """Return whether a device is a terminal or null, which may be read."""
+    """Return whether a device is a terminal or /dev/null, which may be read."""
     return os.isatty(handle) or os.fstat(handle).st_rdev == os.stat(os.devnull).st_rdev
 
 
 def write_waiting(path: str, content: bytes) -> None:
     """Write to a device, or to a pipe once it has a reader.
 
-    Raise OSError if there is none within `PATIENCE` (10) seconds.
+    Raise OSError if a pipe has no reader within `PATIENCE` (10) seconds.
     """
     end = time.monotonic() + PATIENCE
     while True:

@@ -7,7 +7,7 @@ Polynomial = tuple[float, ...]
 
 
 def powers(time: Any, count: int) -> list[Any]:
-    """Return the first `count` powers of a time, perhaps a symbol, from power 0."""
+    """Return the powers 0 to `count` - 1 of a time, which may be a symbol."""
     found: list[Any] = [1.0]
     while len(found) < count:
         found.append(found[-1] * time)

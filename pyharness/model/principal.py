@@ -18,8 +18,8 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about the principal axes, with moments in double-double precision.
 
-    Otherwise rounding errors would be a large part of the coefficients A, B, C of nearly equal
-    moments. `moments_low` is the exact moments minus `moments` (kg m2).
+    In double precision, rounding errors would be a large part of A, B, C of nearly equal moments.
+    `moments_low` is the exact moments minus `moments` (kg m2).
     """
 
     moments_low: Triple = (0.0, 0.0, 0.0)
@@ -56,7 +56,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         the axes of space is unchanged, and the result then has an attitude.
     axes : ndarray, shape (3, 3)
         The principal axes in columns, about the body's own: a right-handed frame, in which each
-        axis is near to the body's own of its number.
+        axis is near the body's own axis of the same number.
 
     Raises
     ------
@@ -88,8 +88,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     if isinstance(law, StateTorque):
         law = law.rotated(frame.axes)
     elif not law.in_space:
-        # The torque about an axis of small moment may result from cancellation of large
-        # components. Therefore it is rounded only after the transformation.
+        # Large components may cancel in the torque about an axis of small moment. It is therefore
+        # rounded only after the transformation.
         law = exact_law(law).rotate(frame.into).rounded()
     bare = PrincipalScene(
         scene.name,
@@ -108,7 +108,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory, transformed back to the body's own axes."""
+    """Return a trajectory transformed from principal `axes` (columns) back to the body's own."""
     attitude = found.attitude
     if attitude is not None:
         w, x, y, z = quaternion_of_axes(axes)

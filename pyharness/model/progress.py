@@ -8,13 +8,12 @@ from typing import Any
 from pyharness.model.values import boolean
 
 Progress = Callable[[int, int, str], None]
-"""The type of a function that is called as a computation completes its parts.
+"""The type of a function that is called whenever a part of a computation is completed.
 
-Its arguments are the number of completed parts, the number of all parts, and the name of the part
-that is computed next.
+Its arguments are the numbers of completed parts and of all, and the name of the next part.
 """
 
-# The bar of the bodies that are being computed; None if no bar was requested.
+# None if no bar was requested.
 _bar: ContextVar[Any] = ContextVar("bar", default=None)
 
 
@@ -45,14 +44,14 @@ def has_bar() -> bool:
 
 
 def expect_bodies(n: int) -> None:
-    """Tell the bar, if any, the number of bodies, once."""
+    """Set the number of bodies of the bar, if any, once."""
     bar = _bar.get()
     if bar is not None and bar.total is None:
         bar.reset(total=n)
 
 
 def count_done(n: int) -> None:
-    """Tell the bar, if any, of n completed bodies."""
+    """Add n completed bodies to the bar, if any."""
     bar = _bar.get()
     if bar is not None:
         bar.update(n)
@@ -60,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide the user's function that reports progress; True is a bar."""
+    """Provide the user's function that reports progress, or a bar for True."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

@@ -1,6 +1,6 @@
 """Reports: the results of a verb as data, which `pyharness.views` renders.
 
-Every start creates the types; a dataclass takes as long as five of these named tuples.
+Types are named tuples, because each start creates them, and a dataclass takes five times as long.
 """
 
 import math
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def exact(value: Any) -> str:
-    """Return a value for CSV, with all digits; None is empty."""
+    """Return a value as text for CSV, with all digits; None is empty."""
     if isinstance(value, float):
         return float.__repr__(value)  # the repr of a NumPy float names its type
     if value is None:
@@ -30,7 +30,7 @@ def plain(value: Any) -> str:
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number with two digits, as 1.2e-3; None is a dash."""
+    """Return a number as text with two digits, as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -58,11 +58,11 @@ class Column(NamedTuple):
     unit: str = ""  # of the values, as CSV has them; `write` may convert them
     name: str = ""  # head in CSV; if empty, `head` is used
     full: Callable[[Any], str] = exact
-    fit: str = ""  # "wrap" or "cut": what is done with a last column that is too wide
+    fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
 
 
 def words(heads: str) -> list[Column]:
-    """Return left-aligned columns with heads separated by blanks."""
+    """Return left-aligned columns; `heads` are separated by blanks."""
     return [Column(head, left=True) for head in heads.split()]
 
 
@@ -87,7 +87,7 @@ class Table(NamedTuple):
 
 
 def numbers(names: str, rows: Sequence[Sequence[Any]]) -> Table:
-    """Return a table for CSV only, with heads separated by blanks."""
+    """Return a table for CSV only; `names` are its heads, separated by blanks."""
     return Table([Column(name) for name in names.split()], rows)
 
 
@@ -104,7 +104,7 @@ class Field(NamedTuple):
     text: str
 
 
-# A section is a list of paragraphs and tables. Blank lines are only written between sections.
+# Paragraphs and tables. Blank lines are written only between sections.
 Section = Sequence[str | Field | Table]
 
 
@@ -112,7 +112,7 @@ class Picture:
     """A matplotlib figure, the table of its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Store the parts."""
+        """Store figure, numbers and title."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 

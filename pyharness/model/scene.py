@@ -27,8 +27,8 @@ from pyharness.model.values import Triple as Triple
 if TYPE_CHECKING:
     from pyharness.model.inertia import Exact
 
-# The bytes of memory for the results of a step: eight binary64 numbers and the error code IER. They
-# are stored twice, in the kernel and in the trajectory.
+# Bytes for the results of a step: eight binary64 numbers and the error code IER, stored twice, in
+# the kernel and in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # The compiled programs count steps and right-hand sides in 32 bits. A step evaluates at most five
 # right-hand sides.
@@ -72,8 +72,8 @@ class Scene:
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
-        The torque; zero by default. A function returns its components about the body axes; it is
-        recorded with symbols, or else given as ``opaque(function)``.
+        The torque; zero by default. A function returns the components about the body axes. It is
+        recorded with symbols; one that can't be is passed as ``opaque(function)``.
     step_size : float
         The step size of programs and methods with a fixed step (s).
     steps : int
@@ -85,7 +85,7 @@ class Scene:
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional
-        A symmetric inertia matrix about the body axes (kg m2), or None if it is `changing`.
+        A symmetric inertia matrix about the body axes (kg m2); None if the inertia changes.
     changing : ChangingMoments or ChangingInertia, optional
         An inertia that changes with time.
 
@@ -115,7 +115,7 @@ class Scene:
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
     changing: ChangingMoments | ChangingInertia | None = None
-    # Norm of the attitude before it was normalised.
+    # Norm of the attitude before normalisation.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class Scene:
         object.__setattr__(self, name, value)
 
     def _set_changing(self) -> None:
-        # Code that takes a constant inertia finds none in a scene whose inertia changes.
+        # A changing inertia is moved, so that code for a constant inertia does not use it.
         for kind in (ChangingMoments, ChangingInertia):
             if isinstance(getattr(self, kind.place), kind) and self.changing is None:
                 self._set("changing", getattr(self, kind.place))
@@ -253,7 +253,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest exceeds the sum of the others by more than rounding (2**-50 of it).
+        The largest then exceeds the sum of the others by more than rounding (2**-50 of the
+        largest).
         """
         moments, inertia = self.moments, self.inertia
         if isinstance(self.changing, ChangingMoments):
@@ -268,7 +269,7 @@ class Scene:
 
     @property
     def law(self) -> TorqueLaw:
-        """The torque law, for code that can treat no other scene.
+        """The torque law, for code that supports no other torque.
 
         Raise InputError if the torque depends on the state, or the inertia changes.
         """
@@ -280,7 +281,7 @@ class Scene:
 
     @property
     def body_torque(self) -> TorqueLaw:
-        """The torque law about the axes of the body; raise InputError as `law`, or for space."""
+        """The torque law about the body axes; raise InputError as `law`, or for axes of space."""
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.law
@@ -317,7 +318,7 @@ class Scene:
 
 
 def most_steps() -> int:
-    """Return how many steps fit in half of the memory, and in the 32 bits of programs."""
+    """Return how many steps fit in half of the memory, and in the programs' 32-bit counters."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 

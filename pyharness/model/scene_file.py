@@ -75,12 +75,12 @@ def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file, which a pipe gives only once."""
+    """Return the bytes of a user's TOML file. A pipe can be read only once."""
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
 def toml_of(content: bytes, where: str) -> dict[str, Any]:
-    """Return the data of TOML; raise InputError if it is none."""
+    """Return the data of a TOML text; raise InputError if it is not TOML."""
     try:
         return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -94,10 +94,10 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
-    """Return the text of a scene file, from which `read_scene` restores a scene bit for bit.
+    """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
     Masses, forces and case are not written. Raise InputError for an opaque or recorded torque, and
-    above 1 000 000 bytes.
+    above 50 ready terms or 1 000 000 bytes.
     """
     import json
 
@@ -141,7 +141,7 @@ def _torque_lines(scene: Scene) -> list[str]:
         raise InputError(f"[[torque.terms]]: {count} terms; allowed: at most {MOST_TERMS}")
     lines = ["[torque]"]
     if torque.expression:
-        # The texts have printable characters of ASCII alone, and neither quotes nor backslashes.
+        # The texts need no escapes: they have neither quotes, backslashes nor control characters.
         texts = ", ".join(f'"{text}"' for text in torque.expression)
         lines += [f"expression = [{texts}]", "[torque.constants]"]
         lines += [f"{name} = {value!r}" for name, value in torque.constants]
@@ -154,7 +154,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term, whose inertia may only change as the body's."""
+    """Return the lines of a ready term; its inertia may change only as the body's."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "
@@ -178,7 +178,6 @@ def _law_lines(law: TorqueLaw) -> list[str]:
 
 
 def _toml(value: Any) -> str:
-    """Return a value of a ready term as TOML."""
     if isinstance(value, TorqueLaw):
         lines = _law_lines(value)
         return f"{{ {', '.join(line for line in lines if not line.startswith('frame'))} }}"
@@ -190,7 +189,7 @@ def _toml(value: Any) -> str:
 
 
 def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return the key, "moments", "coefficients" or "inertia", and the list of a file's body."""
+    """Return key ("moments", "coefficients" or "inertia") and list of a scene file's body."""
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
     if isinstance(scene.changing, ChangingMoments):
@@ -220,7 +219,7 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a user's file has an unsupported schema; it may have none."""
+    """Raise InputError if a user's file has an unsupported schema number; it may have none."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 

@@ -11,7 +11,7 @@ from pyharness.model.tape import ATTITUDE, OMEGA, TIME
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 
-# The most characters of an expression, or of the constants in expressions, in a heading.
+# Most characters of an expression, or of its constants, in a heading.
 _LONGEST_TEXT = 60
 
 
@@ -46,7 +46,7 @@ def _polynomials(coefficients: Sequence[Sequence[float]]) -> str:
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:
-    """Return a polynomial as text, as in "40 + 0.5 t - 0.01 t^2"."""
+    """Return a polynomial of time as text, as in "40 + 0.5 t - 0.01 t^2"."""
     text = ""
     for power, coefficient in enumerate(coefficients):
         if coefficient:
@@ -135,13 +135,13 @@ def ending(trajectory: Trajectory) -> str:
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:
-    """Return a phrase on amplified rounding errors."""
+    """Return a phrase on amplified rounding errors and remaining digits."""
     left = counted(math.floor(digits or 0.0), "digit")
     return f"sensitive: rounding errors are amplified by {short(growth)}; {left} left"
 
 
 def estimates(trajectory: Trajectory) -> list[str]:
-    """Return a line with a method's estimates, or none."""
+    """Return at most one line, with a method's estimates."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
         told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")

@@ -1,4 +1,4 @@
-"""Schema numbers, the versions of file formats, of which docs/reference/formats.md tells."""
+"""Schema numbers: versions of file formats (docs/reference/formats.md)."""
 
 from pyharness.model.errors import InputError, kind_of
 
@@ -22,9 +22,9 @@ The number is increased if an old version would misread a new file, or a new ver
 
 
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
-    """Raise InputError if `found` is not the schema number of a `kind` that this version reads.
+    """Raise InputError unless `found` is the schema number of a `kind` that this version reads.
 
-    The message is between `where`, as "scene file 'a.toml'", and `remedy`.
+    The message has `where`, as "scene file 'a.toml'", before, and `remedy` after the problem.
     """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:

@@ -1,4 +1,4 @@
-"""The attributes of a trajectory under the names of SciPy's `solve_ivp`."""
+"""Attributes of a trajectory under the names of SciPy's `solve_ivp`."""
 
 import math
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class SciPyNames:
-    """A base class of trajectories, with the names of SciPy's results."""
+    """A base class of trajectories with the names of SciPy's results."""
 
     time: Array
     omega: Array
@@ -41,7 +41,7 @@ class SciPyNames:
 
     @property
     def y(self) -> Array:
-        """The state, a column for each time: omega (rad/s), (3, n), or with quaternion, (7, n)."""
+        """The state at each time in columns: omega (rad/s), (3, n), or with quaternion, (7, n)."""
         if self.attitude is None:
             return self.omega.T
         return np.concatenate([self.omega.T, self.attitude.T])
@@ -53,7 +53,7 @@ class SciPyNames:
 
     @property
     def status(self) -> int:
-        """The ending as in SciPy: 0 if all times were reached, 1 by a terminal event, or -1."""
+        """The ending as in SciPy: 0 if all times were reached, 1 for a terminal event, else -1."""
         if self.ended == "event":
             return 1
         return 0 if self.has_all_rows else -1

@@ -26,8 +26,8 @@ _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    In N m for a body with moments or inertia, in 1/s2 for coefficients. Scenes create it from the
-    function that is their torque.
+    The unit is N m for a body with moments or inertia, 1/s2 for coefficients. Scenes create it from
+    the function that is their torque.
 
     Attributes
     ----------
@@ -38,7 +38,8 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        The three expressions of a scene file that were recorded, and pairs of their constants.
+        The three recorded expressions of a scene file, and pairs of name and value of their
+        constants.
     terms : tuple
         The other summands in a scene file: at most one `TorqueLaw`, and ready terms as pairs of
         keys and values, first the kind.
@@ -61,7 +62,7 @@ class StateTorque:
     parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
     varied: Tape | None = field(default=None, repr=False)
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
-    # A torque law has these attributes too.
+    # Attributes in common with a torque law.
     is_zero: bool = field(default=False, init=False, repr=False)
     varies: bool = field(default=True, init=False, repr=False)
     in_space: bool = field(default=False, init=False, repr=False)
@@ -70,7 +71,7 @@ class StateTorque:
         """Return one line without the operations of the tape."""
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
-        # Expressions may be long; three of them and their constants are shortened together.
+        # Expressions and constants may be long, and are shortened together.
         parts = [f"{list(self.expression)}, {dict(self.constants)}"] if self.expression else []
         parts += [repr(x) if isinstance(x, TorqueLaw) else str(x[0][1]) for x in self.terms]
         given = " + ".join(parts)
@@ -82,7 +83,7 @@ class StateTorque:
         )
 
     def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
-        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where singular.
+        """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
 
         Raise InputError if an opaque function does not return three numbers.
         """
@@ -109,7 +110,10 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque, and its attitude, about the axes in columns of `axes`, (3, 3)."""
+        """Return the torque about `axes`, columns of a (3, 3) array, and with their attitude.
+
+        Raise InputError for an opaque torque.
+        """
         if self.tape is None:
             raise InputError(
                 "an opaque torque can't be transformed to principal axes; allowed: a torque that "
@@ -125,13 +129,13 @@ def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
 
 
 def replayed(function: Function) -> StateTorque:
-    """Return a torque recorded from a function of this project."""
+    """Return a torque recorded from a function of this project, without checks."""
     tape = _tape_of(function)
     return StateTorque(tape, None, tape.needs_attitude)
 
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
-    """Return a function as a tape, keyword arguments as further inputs."""
+    """Return a function as a tape; keyword arguments `names` are further inputs."""
     return _recorded_with(Recorder(n_inputs=N_INPUTS + len(names)), function, names)
 
 
@@ -143,14 +147,14 @@ def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] 
 
 
 def of_law(law: TorqueLaw) -> StateTorque:
-    """Return a torque law about any axes as a recorded torque."""
+    """Return a torque law about axes of body or space as a recorded torque."""
     return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
 
 
 def recorded(function: Function) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    A scene records its function itself; this is for sums.
+    A scene records its function itself; this function is for sums.
 
     Parameters
     ----------
@@ -166,8 +170,8 @@ def recorded(function: Function) -> StateTorque:
     Raises
     ------
     InputError
-        If the function can't be recorded, does not return three numbers, or has a memory: two calls
-        must be recorded alike.
+        If the function can't be recorded, does not return three numbers, or gives different records
+        in two calls, as with memory or random numbers.
 
     Examples
     --------
@@ -194,7 +198,7 @@ def recorded(function: Function) -> StateTorque:
 
 
 def opaque(function: Any) -> StateTorque:
-    """Return a torque that is evaluated by calling a function at each time step.
+    """Return a torque that is evaluated by calling a Python function.
 
     Only SciPy's methods solve it.
 
@@ -227,7 +231,7 @@ def opaque(function: Any) -> StateTorque:
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:
-    """Return a user's torque, with a function recorded, or raise InputError."""
+    """Return a user's torque, recorded if it is a function, or raise InputError."""
     if isinstance(value, (TorqueLaw, StateTorque)):
         return value
     if not callable(value):
@@ -240,7 +244,7 @@ def checked_torque(value: object) -> TorqueLaw | StateTorque:
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
-    """Return the torque law that equals a recorded torque, or None; methods for it are faster."""
+    """Return the torque law that equals a recorded torque, or None; laws have faster methods."""
     tape = torque.tape
     if tape is None or tape.inputs - {TIME}:
         return None
@@ -270,7 +274,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque with its function's keyword numbers, if recorded, as parameters."""
+    """Return a torque with its function's numeric keywords, as far as recordable, as parameters."""
     pairs = {
         each.name: converted(each.default)
         for each in signature(function).parameters.values()
@@ -308,10 +312,7 @@ def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | Torq
 
 
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
-    """Return the sum of torques, of which at least one depends on the state.
-
-    The order is that of a scene file, so that its text has the same tape.
-    """
+    """Return a sum in the order of a scene file, so that its text gives the same tape."""
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
     tapes = [each.tape for each in torques if each.tape is not None]
@@ -377,6 +378,6 @@ def _called(
 
 
 def _old(attitude: Any, axes: Array) -> list[Any]:
-    """Return the attitude of the old axes in symbols."""
+    """Return the attitude of the body's old axes, in symbols."""
     w, x, y, z = quaternion_of_axes(axes)
     return list(product(tuple(attitude), (w, -x, -y, -z)))

@@ -1,7 +1,7 @@
 """Symbols, with which a function is called once so that its arithmetic is recorded on a tape.
 
-A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, change its
-coefficients. Any other operation has one slot, however often it is repeated.
+A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
+change its coefficients. Any other operation has one slot, however often it is repeated.
 """
 
 import math
@@ -24,15 +24,15 @@ from pyharness.model.tape import (
 )
 from pyharness.model.values import converted
 
-# Largest number of operations and of terms of a linear combination; the kernel's memory and time
-# are proportional to their number.
+# Most operations, and most terms of a linear combination: they determine the kernel's memory and
+# time.
 MOST_OPERATIONS = 2000
 _MOST_POWER = 1000
 _ALLOWED = "+ - * /, integer powers, sqrt, sin, cos, tan, exp, sinh, cosh, tanh of NumPy"
 
 
 class Recorder:
-    """A tape while it is being recorded."""
+    """A tape during its recording."""
 
     def __init__(
         self,
@@ -48,16 +48,16 @@ class Recorder:
         self._slots: dict[Operation, int] = {}
 
     def inputs(self) -> list["Symbol"]:
-        """Return a symbol for each input: time, omega and attitude."""
+        """Return a symbol for each input: time, omega, attitude, and any parameters."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str) -> InputError:
-        """Return the exception for what can't be recorded."""
+        """Return the exception for an operation that can't be recorded."""
         allowed = f"allowed: {_ALLOWED}, or {self._instead}"
         return InputError(f"{self.place}: {what} can't be recorded; {allowed}")
 
     def impure(self) -> InputError:
-        """Return the exception for a function of more than its arguments."""
+        """Return the exception for a function that depends on more than its arguments."""
         return InputError(
             f"{self.place}: two calls of the function differ, or it keeps its arguments; allowed: "
             "a function of its arguments alone, without random numbers and memory; for a "
@@ -69,7 +69,7 @@ class Recorder:
         return Symbol(self, value, {})
 
     def slot(self, operation: Operation) -> int:
-        """Return the slot of `operation`, recorded if new."""
+        """Return the slot of `operation`, which is recorded if new."""
         if operation not in self._slots:
             if len(self._operations) == self._most:
                 most = self._most
@@ -103,7 +103,7 @@ class Recorder:
 
 
 class Symbol:
-    """A linear combination of slots of a tape, which records what is done to it."""
+    """A linear combination of slots of a tape, which records the operations on it."""
 
     __slots__ = ("_constant", "_terms", "recorder")
     __hash__ = None  # type: ignore[assignment]
@@ -124,7 +124,7 @@ class Symbol:
         return Linear(self._constant, tuple(sorted(self._terms.items())))
 
     def _slot(self) -> tuple[int, float]:
-        """Return a slot and a factor, whose product is this symbol."""
+        """Return a slot and a factor whose product is this symbol."""
         if len(self._terms) == 1 and not self._constant:
             ((slot, factor),) = self._terms.items()
             return slot, factor
@@ -291,7 +291,7 @@ class Symbol:
         return self._apply("tanh", math.tanh)
 
     def of_table(self, table: Table) -> "Symbol":
-        """Return a table at this symbol, which must be the time."""
+        """Return a table at this symbol; raise InputError unless the symbol is the time."""
         if self._constant or self._terms != {TIME: 1.0}:
             raise InputError(
                 f"{self.recorder.place}: a table of anything but the time can't be recorded"
@@ -338,7 +338,7 @@ class Symbol:
 
     def __getattr__(self, name: str) -> Any:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""
-        # The mean of an array does without the `dtype` of its sum.
+        # NumPy's mean reads `dtype`, and works without it.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")
@@ -357,7 +357,7 @@ def called_once(
 ) -> list[Any]:
     """Return the components that a user's function returns for symbols.
 
-    Raise InputError if it raises an exception; `allowed` describes functions that don't.
+    Raise InputError if the function raises an exception; `allowed` describes allowed functions.
     """
     try:
         return list(function(*given))
@@ -373,7 +373,7 @@ def called_once(
         ) from error
 
 
-# The functions with which a tape is evaluated in symbols of a recorder. A constant stays a float.
+# Functions that evaluate a tape in symbols of a recorder. A constant remains a float.
 SYMBOLS: Functions[Any] = Functions(
     float,
     lambda x: np.sqrt(x),

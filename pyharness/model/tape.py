@@ -24,7 +24,7 @@ N_INPUTS = 8
 
 
 class Linear(NamedTuple):
-    """A constant plus the sum of pairs in `terms`, slot times coefficient, in order of slots."""
+    """A constant plus a linear combination; `terms` are pairs of slot and coefficient, by slot."""
 
     constant: float
     terms: tuple[tuple[int, float], ...]
@@ -33,8 +33,8 @@ class Linear(NamedTuple):
 class Table(NamedTuple):
     """A function of time that consists of cubic polynomials.
 
-    Piece k, c0 + c1 s + c2 s^2 + c3 s^3 with s the time (s) minus breaks[k], holds from this break
-    to the next; the first also before, the last for ever.
+    Piece k is c0 + c1 s + c2 s^2 + c3 s^3, with s the time (s) minus breaks[k], and holds from this
+    break to the next; the first piece also before, the last without end.
     """
 
     breaks: tuple[float, ...]
@@ -52,7 +52,7 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True)
 class Tape:
-    """A recorded function: operations in order, and outputs; the first slots are `n_inputs`."""
+    """A recorded function: `n_inputs` slots of inputs, operations in order, and outputs."""
 
     operations: tuple[Operation, ...]
     outputs: tuple[Linear, ...]
@@ -60,7 +60,7 @@ class Tape:
 
     @property
     def inputs(self) -> frozenset[int]:
-        """The slots of the inputs that are used."""
+        """The slots of inputs on which the function depends."""
         used = {slot for each in self.operations for slot in slots_of(each)}
         used |= {slot for output in self.outputs for slot, _ in output.terms}
         return frozenset(slot for slot in used if slot < self.n_inputs)
@@ -74,7 +74,7 @@ class Tape:
     def breaks(self) -> list[float]:
         """The times (s) at which a table changes, in ascending order."""
         tables = [each.table for each in self.operations if each.table is not None]
-        # The first piece holds before its breakpoint too.
+        # The first piece also holds before its break.
         return sorted({time for table in tables for time in table.breaks[1:]})
 
 
@@ -101,7 +101,7 @@ class Functions(Generic[T]):
 
 
 def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
-    """Return the outputs of a tape for eight inputs in the arithmetic of `functions`."""
+    """Return the outputs of a tape for its inputs, in the arithmetic of `functions`."""
     values = slot_values(tape, inputs, functions)
     return [_combined(each, values, functions) for each in tape.outputs]
 
@@ -157,7 +157,7 @@ def _value(table: Table, time: float) -> float:
 FLOATS: Functions[float] = Functions(float, _sqrt, _exp, math.tanh, sine, cosine, _value)
 # Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
 _LARGE_ARGUMENT = 210.0
-# The number for small arguments, if they are replaced too.
+# Replacements for small arguments, by kind.
 _SMALL = {"large": 2.0**-303, "moderate": 2.0**-140}
 _UNSEEN = 2.0**-150
 
@@ -165,8 +165,8 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another, unless
-    the outputs depend on which.
+    A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another large
+    number, unless the outputs depend on it.
     """
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
@@ -175,7 +175,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
         evaluate(tape, inputs, replace(FLOATS, exp=partial(_saturated, kind)))
         for kind in ("own", "other", "large", "moderate")
     )
-    # A pole is no scale.
+    # An output that is infinite has no scale.
     scales = (abs(x) if math.isfinite(x) else 0.0 for x in moderate)
     if all(
         max(abs(x - z), abs(y - z)) <= _UNSEEN * max(abs(x), scale) and math.isfinite(y)
@@ -186,13 +186,13 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _saturated(kind: str, x: float) -> float:
-    """Return what replaces an exponential; powers of 2 are rounded alike."""
+    """Return exp(x), or its replacement beyond 210; powers of 2 scale without rounding errors."""
     if x < -_LARGE_ARGUMENT and kind in _SMALL:
         return _SMALL[kind]
     if not x > _LARGE_ARGUMENT:
         return _exp(x)
     if kind == "large":
         return 2.0**1000
-    # It differs between arguments, so that a quotient of two exponentials is seen.
+    # Numbers differ between arguments, so that a quotient of two exponentials affects the outputs.
     part = math.fmod(math.frexp(min(x, 1e308))[0] * (1e7 if kind == "other" else 1e4), 1.0)
     return 1.01 + part if kind == "moderate" else math.ldexp(1.0, 167 + int(600.0 * part))

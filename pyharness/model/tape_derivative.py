@@ -1,4 +1,4 @@
-"""Derivatives of a tape by inputs or parameters, as a tape."""
+"""Tapes with the derivatives of a tape by inputs or parameters."""
 
 import math
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from pyharness.model.dual import Dual, dual
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate
 
-# A derivative may have more operations than a recorded torque if no kernel reads it, and fewer if
-# one does, whose memory is proportional to their number.
+# Factors on the limit of operations of a recorded torque: _MORE for a tape that no kernel reads,
+# _FEWER for one that a kernel reads, whose memory is proportional to their number.
 _MORE, _FEWER = 100, 10
 
 
@@ -33,7 +33,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     """Return a tape of the derivatives of each output by m parameters, then of the outputs.
 
-    Parameters, with these `values`, are the last inputs of `tape` alone.
+    The parameters, with these `values`, are the last inputs of `tape`; the result lacks them.
     """
     count = len(values)
     instead = "fewer parameters"

@@ -1,7 +1,7 @@
-"""Tapes as data for JSON, and tapes from such data.
+"""Conversion of tapes to data for JSON, and back.
 
-A linear combination is a list of its constant and pairs of slot and coefficient; an operation of
-its kind, and its operands, linear combination, or breaks and pieces.
+A linear combination is a list of its constant and pairs of slot and coefficient. An operation is a
+list of its kind, and its operands, linear combination, or breaks and pieces.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Any
 from pyharness.model.symbols import MOST_OPERATIONS
 from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Table, Tape
 
-# The number of operands by the kind of an operation. The functions have one.
+# The number of operands by kind of operation.
 _OPERANDS = {"product": 2, "quotient": 2} | {
     each.name: 1 for each in fields(Functions) if each.name not in ("number", "table")
 }
@@ -41,7 +41,7 @@ def _linear_record(linear: Linear) -> list[Any]:
 def tape_of(record: Any) -> Tape:
     """Return the tape that a dictionary from JSON describes.
 
-    Raise ValueError, TypeError, KeyError or OverflowError if it describes none.
+    Raise ValueError, TypeError, KeyError or OverflowError if it describes no tape.
     """
     operations = record["operations"]
     if len(operations) > MOST_OPERATIONS:
@@ -54,7 +54,7 @@ def tape_of(record: Any) -> Tape:
 
 
 def _operation(record: Any, slots: int) -> Operation:
-    """Return the operation that data describe, with slots below `slots`."""
+    """Return the operation that `record` describes, with operands in slots below `slots`."""
     kind, *rest = record
     if kind == "linear":
         (linear,) = rest

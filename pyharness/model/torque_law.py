@@ -10,7 +10,7 @@ from pyharness.model.functions import cosine, sine
 from pyharness.model.values import Number, Numbers, Triple, finite, number_list, three
 
 Wave = tuple[Triple, float]  # amplitude per axis, frequency in rad/s
-# The waves of a torque law as a user gives them: pairs of three amplitudes and a frequency.
+# User input: pairs of three amplitudes and a frequency.
 Waves = Iterable[tuple[Numbers, Number]]
 FRAMES = ("body", "space")
 
@@ -53,8 +53,7 @@ class TorqueLaw:
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
     frame: str = "body"
-    # The torque with names for its numbers, a `StateTorque`, from which the law was recognised. A
-    # copy with other numbers has none.
+    # The `StateTorque` with named numbers from which the law was recognised; None in copies.
     named: Any = field(default=None, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
@@ -125,7 +124,7 @@ class TorqueLaw:
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return the torque N at `time` (s), with terms always added in the same order."""
+        """Return the torque N at `time` (s), with a fixed order of summation."""
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):

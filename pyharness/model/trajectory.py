@@ -1,4 +1,4 @@
-"""Trajectories, the results for a scene."""
+"""Trajectories: the results for a scene."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.scene import Scene
 
-# Largest relative rounding error of a number in binary64.
+# Largest relative rounding error in binary64.
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
@@ -39,7 +39,7 @@ class Stop:
         omega) or `UV` (of both).
     quotient : float
         The Lipschitz quotient (1/s): the change of the derivative between two stages over the
-        change of the variable; infinite if that is 0.
+        change of the variable; infinite if the variable did not change.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class Stop:
 class Trajectory(Mechanics, Conversions):
     """The results of an integration, one row for each time, and how the integration ended.
 
-    What was not computed, requested or known is None.
+    An attribute that was not computed or requested is None.
 
     Attributes
     ----------
@@ -73,10 +73,10 @@ class Trajectory(Mechanics, Conversions):
     steps, evaluations : int
         Numbers of steps (rows, for SciPy's methods and the reference) and right-hand sides.
     ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
-        How the integration ended. All rows are present if it is "sensitive", the amplified rounding
-        error exceeding the tolerance, or "unchecked": SciPy may have passed a short change of a
-        recorded torque, because the series that bounds its steps does not reach the end. It was
-        "stopped" by the Lipschitz test, or by an "overflow", an undefined torque ("singular"), or a
+        How the integration ended. With all rows: "complete"; "sensitive" if the amplified rounding
+        error exceeds the tolerance; "unchecked" if SciPy may have passed a short change of a
+        recorded torque, because the series that bounds its steps does not reach the end. Early:
+        "stopped" by the Lipschitz test, "overflow", "singular" for an undefined torque, or a
         terminal "event".
     stop : Stop or None
         Where the Lipschitz test ended the run.
@@ -97,7 +97,7 @@ class Trajectory(Mechanics, Conversions):
         The principal axes, in columns; None if they are the body's own.
     exact : ndarray of object, shape (n, 8), or None
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
-        their attributes are the nearest floats.
+        the other attributes have the nearest floats.
     tolerance : float or None
         The tolerance of a method without a fixed step.
     scene : Scene or None
@@ -107,10 +107,10 @@ class Trajectory(Mechanics, Conversions):
     t_events : list of ndarray, or None
         The times (s) of the events of each function, in order.
     y_events : list of ndarray, or None
-        Omega (rad/s), with the attitude if requested, at these: shape (k, 3) or (k, 7).
+        Omega (rad/s), with the attitude if requested, at these times: shape (k, 3) or (k, 7).
     sensitivities : dict of ndarray, or None
-        For each name the derivatives of omega (rad/s), with the quaternion if requested: shape (n,
-        3, m) or (n, 7, m) for a parameter of m values.
+        By parameter the derivatives of omega (rad/s), with the quaternion if requested: shape (n,
+        3, m) or (n, 7, m) for m values.
 
     Examples
     --------
@@ -147,7 +147,7 @@ class Trajectory(Mechanics, Conversions):
 
     @property
     def digits(self) -> float | None:
-        """The number of correct decimal digits of omega by `error`, or None."""
+        """The number of correct decimal digits of omega, from `error`, or None."""
         return digits_left(self.error)
 
     @property

@@ -1,7 +1,7 @@
-"""Writing of trajectories to files. `pyharness.engine.trajectory_reader` reads them.
+"""Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
-Of the arrays of `numpy.savez`, `header` is JSON with other attributes and the schema number,
-`scene` the text of a scene file, and `sha256` a digest of all others.
+They are archives of `numpy.savez`. The array `header` is JSON with other attributes and the schema
+number, `scene` the text of a scene file, and `sha256` a digest of all other arrays.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 KIND = "pyharness trajectory"  # in the header of each file
 DIGEST = "sha256"  # the last array
 TEXTS = ("header", "scene", DIGEST)
-# For each array the kind of its numbers, and the shape of a row.
+# By array: type of the numbers, and shape of a row.
 ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "time": ("f8", ()),
     "recorded_time": ("f8", ()),
@@ -40,9 +40,9 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "ier": ("i4", ()),
 }
 AXES = "axes"  # an array without rows, shape (3, 3)
-# For all events: their number for each function, their times, and the states there.
+# The number of events of each function; the times and states of all events.
 EVENTS = ("event_counts", "event_times", "event_states")
-SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has their names and numbers
+SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has names and widths
 _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
@@ -56,7 +56,7 @@ def checked_path(path: object) -> str:
 
 
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
-    """Write a trajectory to the file `path`, as `Trajectory.save` describes it."""
+    """Write a trajectory to the file `path`, as `Trajectory.save` describes."""
     name = checked_path(path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -86,7 +86,7 @@ def file_content(found: "Trajectory") -> bytes:
     if found.scene is not None:
         header["scene"], arrays["scene"] = _scene_record(found.scene)
     for name, (kind, _) in ROWS.items():
-        # For methods, the recorded time is the time itself.
+        # For a method, the recorded time is the same array.
         if name != "recorded_time" or found.recorded_time is not found.time:
             value = getattr(found, name)
             arrays |= {} if value is None else {name: np.asarray(value, kind)}
@@ -114,7 +114,7 @@ def file_content(found: "Trajectory") -> bytes:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return the bytes of an archive of arrays, with their digest."""
+    """Return the bytes of an archive of arrays with a digest."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
@@ -122,7 +122,7 @@ def archive_of(arrays: dict[str, Any]) -> bytes:
             entry = io.BytesIO()
             np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
             add_entry(digest, f"{name}.npy", entry.getbuffer())
-            # An entry without a date has the same bytes in every run.
+            # `ZipInfo` has no date, which would change the bytes with every run.
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
                 file.write(entry.getbuffer())
     return buffer.getvalue()
@@ -144,7 +144,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return for JSON what no scene file has, and the text of that."""
+    """Return data for JSON that no scene file has, and the text of the scene file."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

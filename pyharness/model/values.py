@@ -1,4 +1,4 @@
-"""Functions that check user input and convert it to plain Python numbers.
+"""Checks of user input, and conversions to plain Python numbers.
 
 Each InputError begins with `where`.
 """
@@ -35,7 +35,7 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float, and a phrase for anything else, or beyond binary64."""
+    """Return a real number as a float; for anything else, or beyond binary64, a phrase."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -51,7 +51,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, boolean, array or the like, despite float()."""
+    """Return whether a value is text, boolean, array or the like, which float() may accept."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -59,12 +59,12 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number that `text` is, or raise ValueError, also for float()'s underscores."""
+    """Return the number in `text`; raise ValueError if there is none, or underscores."""
     return float(_read_text(text))
 
 
 def parsed_whole(text: str) -> int:
-    """Return the whole number that `text` is, or raise ValueError."""
+    """Return the whole number in `text`, or raise ValueError."""
     return int(_read_text(text))
 
 
@@ -138,7 +138,7 @@ def boolean(where: str, value: object) -> bool:
 
 
 def tolerance_of(value: object, finest: float) -> float:
-    """Return a user's tolerance as a float, unchecked against `finest`, or raise InputError."""
+    """Return a user's tolerance as a float, or raise InputError; its range is not checked."""
     found = converted(value)
     if isinstance(found, float):
         return found

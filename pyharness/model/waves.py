@@ -1,8 +1,8 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver divides amplitudes by a moment and rounds: of two opposite ones that differ by a relative
-1e-10, only six digits of the sum would be correct. Added exactly before, all are. Merged laws have
-at most one sine and one cosine per frequency, none of frequency 0.
+A solver divides amplitudes by a moment and rounds: for two opposite amplitudes with a relative
+difference of 1e-10, only six digits of the sum would be correct. After an exact sum, all are.
+Merged laws have at most one sine and one cosine per frequency, none of frequency 0.
 """
 
 import math
@@ -47,7 +47,7 @@ class ExactLaw:
         )
 
     def rounded(self) -> TorqueLaw:
-        """Return the law in floats, or raise InputError."""
+        """Return the law in floats; raise InputError if an amplitude overflows."""
 
         def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
             return tuple((_rounded(amplitude), frequency) for amplitude, frequency in each)
@@ -62,14 +62,14 @@ class ExactLaw:
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
-    """Return a merged torque law, the argument itself if nothing changes."""
+    """Return a merged torque law, or the argument itself if nothing changes."""
     return exact_law(law).rounded() if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
     """Return whether `merged` changes a law."""
     for waves in (law.sines, law.cosines):
-        # A wave of amplitude 0 is ignored.
+        # Waves of amplitude 0 do not count.
         counts = Counter(abs(frequency) for amplitude, frequency in waves if any(amplitude))
         if 0.0 in counts or any(count > 1 for count in counts.values()):
             return True
@@ -77,7 +77,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law in exact fractions, merged."""
+    """Return a torque law merged, in exact fractions."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -94,7 +94,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
-    """Return the nonzero sums of waves, cosines if `even`, by absolute frequency."""
+    """Return the nonzero sums of waves (cosines if `even`) of the same absolute frequency."""
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
         exact = _exact(amplitude)
@@ -137,7 +137,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
     """Return the constants, sines and cosines of m torque laws, merged in each finite law.
 
     Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
-    frequency (rad/s). Laws are filled up with zeros.
+    frequency (rad/s). Laws with fewer waves are filled up with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():
@@ -176,7 +176,7 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
         if waves.size:
             acts = waves[..., :3].any(axis=-1)
             frequencies = np.abs(waves[..., 3])
-            # A law with fewer waves is filled up with waves of amplitude 0, which are ignored.
+            # Waves of amplitude 0 only fill up a law.
             found = found | (acts & (frequencies == 0.0)).any(axis=-1)
             sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
             found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
@@ -193,6 +193,6 @@ def _waves_of(rows: Array) -> list[Wave]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without k where no law has any; what is not finite is kept."""
+    """Return the waves, (m, k, 4), without columns that are 0 in all laws; NaN counts as a wave."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -1,7 +1,7 @@
 """Quantities that a sweep computes from the attitudes of a batch of n scenes.
 
-Of the parameters, `samples` is the number of times at which attitudes are read; `of` names a
-principal axis by the rank of its moment.
+The parameter `samples` is the number of times at which attitudes are read; `of` names a principal
+axis by the rank of its moment.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Array
 
 Given = Mapping[str, Any]
 
-# Names of a body's principal axes, in ascending order of their moments.
+# Principal axes in ascending order of their moments.
 RANKS = ("least", "middle", "largest")
 
 
@@ -26,7 +26,7 @@ def end_attitude(batch: Batch, _: Given) -> Array:
 
 
 def largest_tilt(batch: Batch, given: Given) -> Array:
-    """Return the largest angles (rad) of an axis from its first direction, shape (n,)."""
+    """Return the largest angles (rad) of an axis from its initial direction, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     found: Array = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
     return found
@@ -45,7 +45,7 @@ def tilted_time(batch: Batch, given: Given) -> Array:
 
 
 def axis_flips(batch: Batch, given: Given) -> NDArray[np.int64]:
-    """Return how often a tilt passes a right angle between samples, shape (n,)."""
+    """Return how often an axis's tilt passes a right angle between samples, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
     count: NDArray[np.int64] = (is_over[:, 1:] != is_over[:, :-1]).sum(axis=1)
@@ -55,7 +55,7 @@ def axis_flips(batch: Batch, given: Given) -> NDArray[np.int64]:
 def pointing_error(batch: Batch, given: Given) -> Array:
     """Return the final angles (rad) of an axis from a direction in space, shape (n,).
 
-    `towards` is the direction; if empty, the axis's initial one.
+    The direction is `towards`; if empty, the axis's initial one.
     """
     if not given["towards"]:
         return largest_tilt(batch, {**given, "samples": 1})
@@ -67,8 +67,7 @@ def pointing_error(batch: Batch, given: Given) -> Array:
     w, x, y, z = attitudes.T
     _, *vector = product(product((w, x, y, z), (0.0, *unit.T)), (w, -x, -y, -z))
     axis = np.stack(vector, axis=1)
-    # The arc cosine of the product of two unit vectors would lose half of the digits of a small
-    # angle.
+    # The arc cosine of the scalar product would lose half of the digits of a small angle.
     found: Array = 2.0 * np.arctan2(
         np.linalg.norm(axis - target, axis=1), np.linalg.norm(axis + target, axis=1)
     )
@@ -81,7 +80,7 @@ def _in_space(batch: Batch) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
-    """Return cosine squared and sine squared of half an axis's angle from its start."""
+    """Return the squared cosine and sine of half the angle of an axis from its start."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
@@ -90,7 +89,7 @@ def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
 
 
 def _is_own(batch: Batch, given: Given, n: int) -> NDArray[np.bool_]:
-    """Return whether each principal axis of n bodies is `of`, shape (n, 3)."""
+    """Return whether each principal axis of n bodies has the rank `of`, shape (n, 3)."""
     axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
     found: NDArray[np.bool_] = np.arange(3) == np.broadcast_to(axis, (n,))[:, None]
     return found

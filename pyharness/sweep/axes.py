@@ -17,10 +17,10 @@ from pyharness.sweep.fields import CHOICES, CONSTANTS, field_names, number_field
 
 Floats = NDArray[np.float64]
 
-# Largest number of values on one axis. All of them are in memory at once, and in one file.
+# Most values on one axis: all are in memory at once, and in one file.
 MOST_VALUES = 30_000_000
 SPACINGS = ("linear", "log")
-# Random distributions, each with the keys of a sweep file that give its parameters.
+# Random distributions, each with the keys of its parameters in a sweep file.
 DRAWS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
@@ -41,7 +41,7 @@ class Axis:
 
     Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
     together. `how` is `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`; `values` are
-    accordingly all values, both ends, or mean and standard deviation (none for `sphere`).
+    accordingly all values, both ends, or the distribution's parameters.
     """
 
     field: str
@@ -82,8 +82,7 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
 
 
 def _draw(axis: Axis) -> Floats:
-    # All values of the axis are drawn at once, so that they do not depend on the chunks. Each field
-    # has its own sequence of random numbers.
+    # Drawn at once, values do not depend on the chunks. Each field has its own random sequence.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
     source = np.random.Generator(np.random.Philox(seeds))
     if axis.how == "sphere":
@@ -103,17 +102,14 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
     """Return ``made(first, last)`` without an overflow of `last - first`."""
     if math.isfinite(last - first):
         return made(first, last)
-    # Halving and doubling are exact, because numbers of that size are far from underflow.
+    # Numbers of that size are far from underflow; halving and doubling are therefore exact.
     with np.errstate(over="ignore"):
         doubled = 2.0 * made(0.5 * first, 0.5 * last)
     return np.clip(doubled, min(first, last), max(first, last))
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of a table [[axis]] of a sweep file.
-
-    `number`, from 1, is for messages.
-    """
+    """Return the axis of table [[axis]] `number`, from 1; raise InputError if it is invalid."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")
@@ -199,11 +195,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError if its field does not allow the extreme values.
-
-    They are those of listed or normally distributed values, else the ends of the range. `where`
-    begins the message.
-    """
+    """Return `axis`; raise InputError, with `where`, if its field does not allow its extremes."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

@@ -1,4 +1,4 @@
-"""Batches of a sweep's scenes, which are solved in one call with the same settings.
+"""Batches: scenes of a sweep that are solved in one call with the same settings.
 
 `scene` has the values that do not vary; `own` maps each varied field to its n values.
 """
@@ -28,7 +28,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing that the fields `listing` and `reading` of a sweep describe.
 
     `listing` is ``original``, ``corrected``, ``fix:`` and the only defects to correct, or ``keep:``
-    and the only ones to keep. `reading` is ``adopted``, or the readings to activate. Names are
+    and the only defects to keep. `reading` is ``adopted``, or the readings to activate. Names are
     joined by ``+``.
     """
     how, _, names = listing.partition(":")
@@ -97,7 +97,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         sizes = own.get("step_size", np.full(n, scene.step_size))
         t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     if is_refused:
-        # No method solves a scene until a time that is no number.
+        # Until the time NaN, all methods fail, and each scene reports it.
         t_end = np.full(n, np.nan)
     found = {
         "omega0": _omega(scene, own, values if body == "moments" else None, n),
@@ -111,10 +111,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 
 
 def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
-    """Return the arrays of a torque law's terms; None for a term without an axis.
-
-    A torque that depends on the state has no such terms.
-    """
+    """Return the arrays of a torque law's varied terms; {} if the torque depends on the state."""
     if isinstance(scene.torque, StateTorque):
         return {}
     return {
@@ -140,10 +137,7 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return `moments` (kg m2) or `coefficients` (A, B, C), and the numbers, shape (n, 3).
-
-    If no axis varies the body, the result is an empty text and None.
-    """
+    """Return "moments" (kg m2) or "coefficients", and numbers (n, 3); "", None if not varied."""
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
         return ("coefficients", found) if found is not None else ("", None)
@@ -156,8 +150,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # A real body has three integrals of x^2, y^2 and z^2 over its mass, which determine its
-        # moments. Here the integrals are in units of the largest of them.
+        # The integrals of x^2, y^2 and z^2 over the mass, here in units of the largest, determine
+        # the moments of a real body.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
@@ -185,11 +179,10 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors (n, 3) by angles relative to the body's principal axes.
+    """Return unit vectors (n, 3) by angles (rad) relative to the body's principal axes.
 
-    `tilt` (rad) is from the axis of the middle moment, `azimuth` (rad) about it, from the axis of
-    the least moment towards that of the largest. `moments` is (n, 3) or, for the scene's body,
-    None.
+    `tilt` is from the axis of the middle moment, `azimuth` about it, from the axis of the least
+    moment towards that of the largest. `moments` is (n, 3), or None for the scene's body.
     """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
@@ -201,6 +194,6 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 
 
 def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors (n, 3) by third component and longitude."""
+    """Return unit vectors (n, 3) by third component and longitude (rad)."""
     across = np.sqrt(1.0 - height * height)
     return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -2,7 +2,7 @@
 
 `sha256sum --check` reads a file of checksums. Its first line names the version of pyharness, the
 sweep and the part of the store, so that an exchanged file fails; the others have SHA-256 and path.
-Below, `folder` is the store's, and `name` a path in it.
+In this module, `folder` is the store's, and `name` a path in it.
 """
 
 import errno
@@ -18,7 +18,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """A file of a store differs from what was written; the message names both."""
+    """A file of a store is damaged; the message names the file and the damage."""
 
 
 class Label(NamedTuple):
@@ -30,10 +30,10 @@ class Label(NamedTuple):
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a file of checksums of present files.
+    """Return the content of a file of checksums of existing files.
 
-    `part` names their part of the store, as in "chunk 0/1". Raise DamageError if a file can't be
-    read, is not regular, or is larger than `limit` (bytes).
+    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file can't be read,
+    is not regular, or is larger than `limit` (bytes).
     """
     lines = [
         f"# pyharness sweep store, schema {label.schema}, version {label.version}, "
@@ -46,7 +46,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files differ from those of `checksum_text` in `checksums`."""
+    """Raise DamageError if files differ from the checksums in the file `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -58,7 +58,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return a file's content; raise DamageError as `_opened`."""
+    """Return a file's content; raise DamageError if it is missing, large or not regular."""
     handle = _opened(folder, name, limit)
     try:
         with open(handle, "rb") as file:
@@ -71,7 +71,7 @@ def _digest(folder: Path, name: str, limit: int) -> str:
     digest = hashlib.sha256()
     try:
         with open(_opened(folder, name, limit), "rb", buffering=0) as file:
-            # The loop is limited, because the end of a file that grows might never be reached.
+            # The end of a file that grows might never be reached.
             for _ in range(limit // _PIECE + 2):
                 piece = file.read(_PIECE)
                 if not piece:
@@ -83,10 +83,7 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Return a descriptor for reading a file.
-
-    Raise DamageError if it is missing, is not regular, or has more than `limit` bytes.
-    """
+    """Return a descriptor; raise DamageError for a missing, large or not regular file."""
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
         handle = os.open(folder / name, os.O_RDONLY | os.O_NONBLOCK)
@@ -111,7 +108,7 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a path exists; a link without target does.
+    """Return whether a path exists, if only as a link without target.
 
     Raise DamageError if an error of the file system prevents the test.
     """
@@ -125,10 +122,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove anything at a path, and any file in the place of its parents.
-
-    A link's target is not removed.
-    """
+    """Remove anything at a path, but no link's target, and any file in place of its parents."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -144,7 +138,7 @@ def clear(folder: Path, name: str) -> None:
 def place_checksums(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Write `checksums` of files written just now; raise OSError if one is damaged."""
+    """Write the file `checksums` for files written just before; raise OSError if one is damaged."""
     try:
         content = checksum_text(label, part, folder, names, limit)
     except DamageError as damage:

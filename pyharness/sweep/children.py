@@ -17,8 +17,8 @@ def deaf_children() -> Iterator[None]:
     A terminal sends SIGINT to all its processes, but only the parent should react. The entering
     thread receives a signal when the context ends.
     """
-    # Children inherit the blocking of a signal. The resource tracker is started before, because
-    # Python would otherwise start it with the first child, and would then unblock the signal.
+    # Children inherit a blocked signal. Python would start the resource tracker with the first
+    # child, and then unblock the signal.
     _start_tracker()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -28,7 +28,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def _start_tracker() -> None:
-    """Start Python's resource tracker; it then warns of no leftover semaphores."""
+    """Start Python's resource tracker, without its warnings of leftover semaphores."""
     warning = "ignore:resource_tracker"
     sys.warnoptions.append(warning)
     try:
@@ -38,7 +38,7 @@ def _start_tracker() -> None:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process with its parent, for whatever reason.
+    """Start a thread that ends this process when its parent ends, for whatever reason.
 
     Without a parent in `multiprocessing`, no thread is started.
     """
@@ -47,7 +47,7 @@ def end_with_parent() -> None:
         return
 
     def watch() -> None:
-        # The sentinel is a pipe, whose other end the system closes when the parent has ended.
+        # The sentinel is a pipe, whose other end the system closes at the parent's end.
         connection.wait([parent.sentinel])
         os._exit(1)
 

@@ -6,9 +6,9 @@ from pyharness.sweep.sweep import Arrays, Indices, Sweep, points
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve chunk number `chunk`, from 0; all executors call this.
+    """Solve chunk number `chunk`, from 0, in any executor.
 
-    Arrays have the shape of the chunk, and a dimension more for several components.
+    Arrays have the shape of the chunk, and another dimension for several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)

@@ -1,4 +1,4 @@
-"""Executors compute the chunks of a sweep, here or elsewhere; all give the same results."""
+"""Executors, which compute the chunks of a sweep here or elsewhere, with equal results."""
 
 import asyncio
 import contextlib
@@ -24,19 +24,18 @@ from pyharness.sweep.sweep import Arrays, Sweep
 EXECUTORS = ("here", "processes", "dask")
 Results = Iterator[tuple[int, Arrays]]
 
-# The number of consecutive deaths of a process, with no chunk completed between them, at which the
-# sweep ends.
+# Deaths of processes, without a completed chunk in between, at which the sweep ends.
 _ATTEMPTS = 3
 _AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
-_ANSWER = 4.0  # time (s) in which a scheduler must answer, and in which it must have a worker
+_ANSWER = 4.0  # s, in which a scheduler must answer and have a worker
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and numbers of chunks, and yields each number with its results, arrays
-    by reduction, when it is completed.
+    `computed` takes a sweep and numbers of chunks. It yields the number and the results (arrays by
+    reduction) of each chunk when it is completed.
     """
 
     workers: int
@@ -51,8 +50,8 @@ def engine(
     """Start an executor, and yield it as an `Engine`.
 
     `executor` is ``here``, ``processes`` or ``dask``; `workers` is by default the number of
-    processors. Without the `address` of a scheduler, `dask` starts a cluster here. Raise InputError
-    if no scheduler with a worker answers, and later, if no worker is left.
+    processors. Without the `address` of a scheduler, ``dask`` starts a cluster here. Raise
+    InputError if no scheduler with a worker answers, and later, if no worker is left.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -65,7 +64,7 @@ def engine(
 
 
 def _processors() -> int:
-    # Count only the processors that this process may use, if the system reports them.
+    # A process may be restricted to some processors; not every system reports this.
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -85,7 +84,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
                 left.remove(chunk)
                 yield chunk, found
         except BrokenProcessPool:
-            # A process was killed. All chunks that were submitted, but not completed, are lost.
+            # A killed process breaks the pool; chunks that are not completed are lost.
             deaths = 1 if len(left) < before else deaths + 1
             if deaths == _ATTEMPTS:
                 raise InputError(
@@ -114,7 +113,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
     finally:
-        # Chunks that are being computed are discarded, because waiting for them might never end.
+        # Waiting for the chunks that are being computed might never end.
         processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
@@ -132,7 +131,7 @@ def check_dask() -> None:
 @contextlib.contextmanager
 def _client(workers: int, address: str | None) -> Iterator[Any]:
     dask: Any = import_module("distributed")
-    # Dask's log of workers that start and end is meant for the administrators of a cluster.
+    # Dask's log of workers is meant for the administrators of a cluster.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if address is not None:
         with _connected(dask, address) as client:
@@ -164,8 +163,8 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
         except Exception as error:
             errors.append(error)
 
-    # The start takes seconds, and is therefore made in another thread. The threads and processes of
-    # the cluster do not receive Ctrl-C, but this thread does.
+    # The start takes seconds. In another thread, it leaves this one free to receive Ctrl-C, which
+    # is blocked in the threads and processes of the cluster.
     thread = threading.Thread(target=start, daemon=True)
     thread.start()
     try:
@@ -191,8 +190,7 @@ def _connected(dask: Any, address: str) -> Any:
     place = found["host"].strip("[]"), int(found["port"])
     answered: list[bool] = []
     try:
-        # A plain connection is tried first, because it fails at once if no server listens. Dask
-        # would try again and again.
+        # Without a server, a plain connection fails at once; Dask would try again and again.
         socket.create_connection(place, timeout=_ANSWER).close()
         asyncio.run(asyncio.wait_for(_has_workers(dask, address, answered), _ANSWER))
         return dask.Client(address, timeout=_ANSWER, set_as_default=False)
@@ -208,11 +206,11 @@ def _connected(dask: Any, address: str) -> Any:
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
     """Wait until the Dask scheduler has workers; the caller limits the time.
 
-    Each answer without workers appends True to `answered`, which distinguishes it from a server
-    that does not answer.
+    Each answer without workers appends True to `answered`, so that the caller can distinguish it
+    from no answer.
     """
-    # The scheduler is called directly, because a Dask client would wait for half a minute if a
-    # server accepts the connection and does not answer.
+    # A Dask client would wait half a minute for a server that accepts the connection but does not
+    # answer; the scheduler is therefore called directly.
     async with dask.rpc(address) as scheduler:
         while not (await scheduler.identity())["workers"]:
             answered.append(True)
@@ -220,11 +218,7 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield the number and the results of each chunk from a Dask cluster.
-
-    More chunks are submitted than there are workers, so that none is idle. If a worker dies, Dask
-    computes its chunks again.
-    """
+    """Yield number and results of each chunk; Dask computes the chunks of dead workers again."""
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)
@@ -233,12 +227,13 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # Each task includes the sweep. If the sweep were sent only once, it could be lost with
-            # the workers that have received it.
+            # Each task includes the sweep, which could otherwise be lost with the workers that have
+            # received it.
             future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)
 
+    # More chunks than workers, so that none is idle.
     for _ in range(_AHEAD * max(1, n_threads)):
         submit()
     for future in running:

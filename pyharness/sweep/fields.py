@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# Fields whose values are names, with the allowed values: the program or method, and the program's
-# listing and readings.
+# Fields whose values are names, with the allowed values.
 CHOICES = {
     "program": "a program of the appendix",
     "method": "a method",
@@ -17,9 +16,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `takes` returns whether a value is allowed, and `allowed` describes these. If `looped`, all
-    scenes of a call must share the value, except step size and Lipschitz constant of the thesis's
-    programs. If `whole`, values are rounded to integers.
+    `takes` returns whether a value is allowed; `allowed` describes the allowed values. If `looped`,
+    all scenes of a call must share the value, except step size and Lipschitz constant of the
+    thesis's programs. If `whole`, values are rounded to integers.
     """
 
     units: str
@@ -30,8 +29,8 @@ class Field:
     whole: bool = False
 
 
-# Beginning of the name of a field that is a constant of the expressions of a torque, as in
-# `torque.constants.k`. Its unit depends on the expressions.
+# Prefix of fields that are constants of a torque's expressions, as in `torque.constants.k`. Their
+# units depend on the expressions.
 CONSTANTS = "torque.constants."
 ATTITUDE = tuple(f"attitude.{number}" for number in range(4))
 
@@ -82,8 +81,8 @@ NUMBERS = {
         "1/s", "constant of the stop test", "a number from 0", lambda v: v >= 0.0, looped=True
     ),
 }
-# Pairs of groups of fields that exclude each other, mostly because they describe the same quantity.
-# Each field is given by the beginning of its name. A sweep may use fields of one group of a pair.
+# Pairs of groups of fields, by the beginnings of their names, that exclude each other, mostly
+# because they describe the same quantity.
 RIVALS = (
     (
         ("omega.1", "omega.2", "omega.3"),
@@ -104,12 +103,12 @@ def field_names() -> list[str]:
 
 
 def number_field(name: str) -> Field:
-    """Return a field: a key of `NUMBERS`, or as in ``torque.constants.k``; else KeyError."""
+    """Return the field of a key of `NUMBERS`, or of a constant; raise KeyError for others."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]
 
 
 def units_of(field: str) -> str:
-    """Return the unit of a field; empty if its values are names."""
+    """Return the unit of a field; empty for names and constants."""
     return NUMBERS[field].units if field in NUMBERS else ""

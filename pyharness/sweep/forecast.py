@@ -1,4 +1,4 @@
-"""Forecast of a sweep's duration, from a sample of its scenes and files."""
+"""Forecast of a sweep's duration, from samples of its scenes and files."""
 
 import math
 import time
@@ -13,19 +13,18 @@ from pyharness.sweep.reductions import empty
 from pyharness.sweep.store import scratch
 from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 
-# Numbers of scenes in the samples. The scenes are evenly spread over the grid, and the smallest
-# sample is measured first.
+# Numbers of scenes in the samples, which are evenly spread over the grid; the smallest is measured
+# first.
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large enough
-# A larger sample is taken nevertheless if it is at most the fraction `_PART` of all scenes and
-# takes at most `_LONGEST`. In a small sample, the constant cost of a batch would be counted as a
-# cost of its scenes.
+# A larger sample is nevertheless measured if it is at most the fraction `_PART` of all scenes and
+# takes at most `_LONGEST`, because a small sample overestimates the cost of a scene by the constant
+# cost of a batch.
 _PART = 0.01
 _LONGEST = 60.0  # s
-# Least number of distinct values in a sample along a dimension for which all scenes of a batch have
-# the same value.
+# Fewest distinct values in a sample along a dimension in which all scenes of a batch are equal.
 _PLACES = 5
-_FILES = 20  # largest number of chunks that are solved, or written and read, for a measurement
+_FILES = 20  # most chunks that are solved, or written and read, for a measurement
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Estimate:
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the seconds to solve and write the missing chunks, and to read all.
+    """Return the seconds to solve and write the missing chunks, and to read all chunks.
 
     If other processes compute, only the longer of the times to solve and to write counts.
     """
@@ -56,7 +55,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean seconds to write and to read a chunk's files, beside `path`.
+    """Return the mean seconds to write, and to read, a chunk's files beside `path`.
 
     Both are 0 if files can't be written; the sweep itself then reports the error.
     """
@@ -75,16 +74,13 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
                     break
     except OSError:
         return 0.0, 0.0
-    # The first chunk does not count, because modules that Zarr needs are imported in its time.
+    # The first chunk does not count, because Zarr imports modules meanwhile.
     write, read = np.mean(times[1:] or times, axis=0)
     return float(write), float(read)
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return arrays like a chunk's results, but random.
-
-    Equal values would be compressed to almost nothing, and written too fast.
-    """
+    """Return random arrays like a chunk's results; equal values would be written too fast."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -99,13 +95,13 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the seconds to solve a chunk in this process.
 
-    They follow from sample scenes or, below 0.2 s, from whole chunks.
+    They are measured on sample scenes or, below 0.2 s, on whole chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # For fast chunks the constant cost of a chunk matters, which only whole chunks show.
+    # Only whole chunks show the constant cost, which matters for fast ones.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -119,7 +115,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 def seconds_per_scene(sweep: Sweep) -> float:
     """Return the mean seconds to solve a scene, from samples spread over the grid."""
     seconds = math.nan
-    # This call is not timed, because it imports the solver's modules.
+    # Not timed, because this call imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
         where = places_of_a_chunk(sweep, spread(sweep, count))
@@ -136,15 +132,15 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
-    Along dimensions that a batch does not mix, they have five distinct values, or more if the
-    batches of a chunk are so small; the sample's batches are then about as large as real ones.
+    Along dimensions in which a batch is constant, they have five distinct values, or more if the
+    batches of a chunk are small. The sample's batches are thus about as large as real ones.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
     for (name, count), length, places in zip(
         sweep.dimensions.items(), sweep.chunk_shape, where, strict=True
     ):
-        # In a chunk, so many scenes have one index along this dimension.
+        # In a chunk, `scenes // length` scenes share an index along this dimension.
         distinct = max(_PLACES, len(places) * length // scenes)
         if name in shared and count > distinct:
             part = np.rint(places * ((distinct - 1) / (count - 1))) / (distinct - 1)
@@ -154,7 +150,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
 
 def format_estimate(estimate: Estimate) -> str:
-    """Return time, disk space and memory as a line of text."""
+    """Return numbers of scenes and chunks, time, disk space and memory as a line of text."""
     missing = estimate.n_missing
     rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
     return (

@@ -24,15 +24,15 @@ _MOST_PANELS = 6
 _MOST_PLACES = 200  # values along an axis of a map; more would not be visible
 _MOST_DOTS = 5000  # values in a panel with a line or dots
 _COLUMNS = 3  # of panels
-# A logarithmic scale is used if all values are positive, or 0, and the positive values extend over
-# more than this number of orders of magnitude.
+# A logarithmic scale is used if no value is negative, and the positive values extend over more than
+# this number of orders of magnitude.
 _ORDERS = 3.0
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction `name`, by default the first one without codes of outcomes.
+    """Return the reduction `name`, by default the first without codes of outcomes, else the first.
 
-    If all have codes, it is the first.
+    Raise InputError for an unknown name.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -44,8 +44,8 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
-    It is a map over the last two dimensions with several values, all numbers and not random; with
-    fewer such dimensions a line or dots.
+    It is a map over the last two dimensions with several values that are numbers and not random;
+    with fewer such dimensions it is a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -53,8 +53,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     axis_of = {axis.dimension: axis for axis in reversed(sweep.axes)}
     long = [d for d, axis in axis_of.items() if axis.count > 1 and not axis.is_choice]
     ordered = [d for d in sweep.dimensions if d in long]
-    # Two dimensions of the grid give a map. Values from a random distribution have no order, and
-    # are shown as dots.
+    # Random values have no order, and are shown as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
     panels = _panels(store, asked, axis_of, shown)
     rows = -(-len(panels) // _COLUMNS)
@@ -96,10 +95,7 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return title, indices and values of each panel over the dimensions `shown`.
-
-    The title states the values along the others, and the component.
-    """
+    """Return by panel title (values along other dimensions, component), indices and values."""
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = [_thinned(axis_of[d].count, most) for d in shown]

@@ -14,7 +14,7 @@ _MOST_SAMPLES = 10_000
 
 
 def reduction_spec_of(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
-    """Return the reduction of an entry: a name, or a table with name and parameters.
+    """Return the reduction of an entry, a name or a table; raise InputError if it is invalid.
 
     `claims` maps each claim to the function that checks it, as in ``package.module:name``.
     """

@@ -23,7 +23,7 @@ from pyharness.sweep.attitude_reductions import (
 from pyharness.sweep.sweep import ReductionSpec
 
 Found = NDArray[Any]
-# Value of an integer array where no scene has been computed yet.
+# Value in integer arrays of scenes that are not computed yet.
 _NOT_YET = -1
 
 
@@ -31,10 +31,10 @@ _NOT_YET = -1
 class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
-    `compute` returns, from a batch of n scenes and the parameters, n values or n rows with a value
+    `compute` returns, for a batch of n scenes and the parameters, n values, or n rows with a value
     for each of `labels`, along `dimension`. `only` is `program` or `method` if the other can't
-    compute it; `needs` lists `moments`, `no torque` or `attitude`. `parameters` has defaults,
-    `flags` the meaning of codes of outcomes.
+    compute it; `needs` lists `moments`, `no torque` or `attitude`. `parameters` has the defaults,
+    `flags` the meanings of codes of outcomes.
     """
 
     title: str
@@ -50,7 +50,7 @@ class Reduction:
 
     @property
     def fill(self) -> Any:
-        """Return the value not computed yet: NaN, or -1 in an integer array."""
+        """Return the value of scenes not computed yet: NaN, or -1 in an integer array."""
         return np.nan if self.dtype == "f8" else _NOT_YET
 
 
@@ -87,7 +87,7 @@ def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
 
 
 def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
-    # The time of the first step whose result is not finite.
+    # The first step whose result is not finite has no row.
     time = (batch.n_rows + 1) * batch.step_sizes
     return np.where(batch.status == Statuses.OVERFLOW, time, np.nan)
 
@@ -111,8 +111,7 @@ def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
-    # This formula gives the angle between two unit vectors. The arc cosine of their product would
-    # lose half of the digits of a small angle.
+    # The arc cosine of the scalar product would lose half of the digits of a small angle.
     angles: Found = 2.0 * np.arctan2(
         np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
     )
@@ -280,8 +279,8 @@ def empty(asked: ReductionSpec, n: int) -> Found:
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a reduction of a batch, a row or a value for each scene."""
+    """Return a reduction of a batch: a value, or a row of components, for each scene."""
     given = {**dict(asked.parameters), "function": asked.function}
-    # NumPy's warnings are suppressed, because infinities and NaN are valid results.
+    # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):
         return REDUCTIONS[asked.reduction].compute(batch, given)

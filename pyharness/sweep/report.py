@@ -1,4 +1,4 @@
-"""The report of `sweep`: the axes, and statistics of the stored quantities."""
+"""Report of the verb `sweep`: the axes, and statistics of the stored quantities."""
 
 from collections import Counter
 from typing import Any, NamedTuple
@@ -29,8 +29,8 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 class Found(NamedTuple):
     """Statistics of a reduction's component, in `units`.
 
-    `scenes` counts those with a finite value, and `none` the others. `least`, `mean` and `largest`
-    are None if no value is finite.
+    `scenes` counts the scenes with a finite value, and `none` the others. `least`, `mean` and
+    `largest` are None if no value is finite.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Functions that run a sweep: check its size, forecast, compute missing chunks."""
+"""Runs of a sweep: check of its size, forecast, computation of missing chunks."""
 
 import contextlib
 import math
@@ -16,8 +16,8 @@ from pyharness.sweep.reductions import empty, needs_attitudes
 from pyharness.sweep.store import Store, check_store, opened
 from pyharness.sweep.sweep import Sweep
 
-# Ratio of the memory that a process needs to the size of a chunk. The process holds several chunks
-# at once, and needs additional memory to compute them.
+# Ratio of the memory of a process to the size of a chunk: it has several chunks at once, and needs
+# more memory to compute them.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
@@ -26,8 +26,8 @@ _MOST_CHUNKS = 1_000_000
 class Outcome:
     """The chunks that one run of a sweep computed, in `seconds`.
 
-    `estimate` is None if no chunk was missing, `before` counts those of earlier runs. `repaired`
-    counts the computed chunks that had been damaged.
+    `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
+    `repaired` the computed chunks that had been damaged.
     """
 
     estimate: Estimate | None
@@ -53,7 +53,7 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     """Return the bytes of the missing chunks on disk, and of all workers in memory.
 
     Raise InputError if the disk or half of the memory is too small, or if there are too many
-    chunks. Nothing is allocated.
+    chunks.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
@@ -113,8 +113,8 @@ def swept(
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
     with contextlib.ExitStack() as stack:
         try:
-            # The engine is started first. A scheduler that does not answer is therefore reported
-            # before any file is written.
+            # Started first, so that a scheduler that does not answer is reported before any file is
+            # written.
             with engine(executor, workers, address) as own:
                 store = stack.enter_context(opened(sweep, path, repair))
                 with progress_of(progress, "chunks") as report:
@@ -141,10 +141,11 @@ def run_sweep(
 
     `path` is the store's folder, made if missing. `executor` is "here", "processes" or "dask",
     which starts a cluster here without the `address` of a scheduler, as in ``tcp://host:8786``.
-    `before` gets the forecast before anything is computed. `progress` is True for a bar, or is
-    called after each chunk with the computed chunks, all to compute, and "chunks". With `repair`,
-    damaged chunks and metadata are made again. Raise InputError if the store is another sweep's or
-    damaged, no cluster answers, or disk or memory is too small; computed chunks stay.
+    `before` gets the forecast before the computation. `progress` is True for a bar, or a function
+    that is called after each chunk with the number of computed chunks, of all to compute, and
+    "chunks". With `repair`, damaged chunks and metadata are made again. Raise InputError if the
+    store is another sweep's or damaged, no cluster answers, or disk or memory is too small;
+    computed chunks remain.
     """
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome

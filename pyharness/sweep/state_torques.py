@@ -1,6 +1,6 @@
 """Torques of a sweep that depend on the state.
 
-Their scene is read again from its text, with other numbers.
+For other numbers, their scene is read again from its text.
 """
 
 import tomllib
@@ -19,8 +19,8 @@ from pyharness.sweep.fields import CONSTANTS
 def check_state_axis(scene: Scene, field: str) -> None:
     """Raise InputError if the scene's torque lacks the field of an axis.
 
-    Such a torque has neither constant nor linear term of a law; only expressions have named
-    constants.
+    A torque that depends on the state has neither constant nor linear term; only expressions have
+    named constants.
     """
     torque = scene.torque
     if isinstance(torque, StateTorque):
@@ -56,7 +56,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(scene: Scene) -> bool:
-    """Return whether the torque has a ready term with the body's inertia, which may vary."""
+    """Return whether the torque has a ready term with the body's inertia."""
     return isinstance(scene.torque, StateTorque) and any(
         _is_of_body(dict(term), scene) for term in _terms(scene.torque)
     )
@@ -74,7 +74,7 @@ def with_numbers(
         data["body"] = {"moments": list(moments)}
         for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
             if _is_of_body(dict(term), scene):
-                # The reader then takes the inertia of the table [body].
+                # Without it, the reader takes the inertia of the table [body].
                 del table["inertia"]
     return scene_of(data, scene.name)
 

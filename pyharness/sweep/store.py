@@ -1,8 +1,8 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-Each chunk of the grid has one file for each array, and a file with the checksums of these files,
-which is written last. Every file is written under a temporary name and renamed, so that a chunk
-with checksums is complete, even if the process was killed.
+A chunk of the grid has one file for each array, and a file with their checksums, which is written
+last. Every file is written under a temporary name and renamed. A chunk with checksums is therefore
+complete, even if the process was killed.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def check_zarr() -> None:
 class Store:
     """The open store of one sweep, made by `opened`.
 
-    `repaired` counts damaged chunks that were removed when it was opened.
+    `repaired` counts the damaged chunks that were removed when it was opened.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
@@ -58,7 +58,7 @@ class Store:
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
         group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
-        # With this setting, Zarr also writes a file for a chunk that contains only the fill value.
+        # Zarr would otherwise write no file for a chunk that has only the fill value.
         with zarr.config.set({"array.write_empty_chunks": True}):
             self._arrays: dict[str, Any] = {
                 asked.name: group[asked.name] for asked in sweep.reductions
@@ -93,13 +93,13 @@ class Store:
         self.repaired = len(damages)
 
     def done(self) -> list[bool]:
-        """Return for each chunk whether it is complete."""
+        """Return whether each chunk is complete."""
         return list(self._done)
 
     def write(self, chunk: int, found: Arrays) -> None:
         """Write a chunk's results and checksums.
 
-        Raise OSError if a file can't be written; the chunk remains incomplete.
+        Raise OSError if a file can't be written; the chunk then remains incomplete.
         """
         for name, array in self._arrays.items():
             array[self.sweep.box(chunk)] = found[name]
@@ -111,7 +111,7 @@ class Store:
         return self._arrays[name][self.sweep.box(chunk)]
 
     def array(self, name: str) -> Any:
-        """Return the Zarr array of a reduction; indexing reads only a part."""
+        """Return the Zarr array of a reduction; indexing reads only the selected part."""
         return self._arrays[name]
 
     def _is_done(self, chunk: int) -> bool:
@@ -119,8 +119,7 @@ class Store:
         if exists(self.folder, checksums):
             check_files(*self._described(chunk), checksums)
             return True
-        # The chunk is incomplete. Files of it that exist will be overwritten, and must therefore be
-        # regular files.
+        # Files of an incomplete chunk will be overwritten, and must therefore be regular.
         for name in self._files(chunk):
             if exists(self.folder, name) and not (self.folder / name).is_file():
                 raise DamageError(f"'{name}' is no ordinary file")
@@ -147,8 +146,8 @@ class Store:
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open a sweep's store, lock it against other processes, check it, and yield it.
 
-    Raise InputError, without changing files, if `path` is another sweep's store, no store, or
-    damaged. With `repair`, damaged chunks are removed and damaged metadata written again.
+    Raise InputError, without changing files, if `path` is another sweep's store, no store, damaged,
+    or locked. With `repair`, damaged chunks are removed and damaged metadata written again.
     """
     check_zarr()
     folder = Path(path)
@@ -159,7 +158,7 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            # Other errors occur on file systems without locks, and are ignored.
+            # Other errors are those of file systems without locks.
             if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
                 raise InputError(
                     f"--out '{path}': another sweep is writing to it; wait until it ends, or "
@@ -207,8 +206,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
         raise InputError(
             f"--out '{path}': is not empty, and is not the store of a sweep; give a new name"
         )
-    # The store states its identity in two files. If one of them is damaged, this is detected when
-    # the store is opened.
+    # Two files state the identity; damage to one is detected when the store is opened.
     if any(type(each.schema) is int and each == ours for each in known):
         return True
     found = known[0]
@@ -225,7 +223,7 @@ def check_store(sweep: Sweep, path: str) -> bool:
 
 
 def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
-    """Compare the metadata with their checksums; raise InputError, or rewrite to repair."""
+    """Compare metadata with their checksums; raise InputError, or with `repair` rewrite them."""
     files = metadata_files(sweep)
     try:
         check_files(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
@@ -242,15 +240,12 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make an empty store under a temporary name, and rename it.
-
-    `folder` is thus always missing or has all metadata.
-    """
+    """Make an empty store by renaming, so that `folder` is always missing or has all metadata."""
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)
         except OSError as error:
-            # If another process has made the store of this sweep meanwhile, that store is used.
+            # Another process may have made the store of this sweep meanwhile.
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or not check_store(
                 sweep, str(folder)
             ):
@@ -259,6 +254,6 @@ def _make(sweep: Sweep, folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield a temporary store beside `path`, to measure the disk."""
+    """Yield a temporary store beside `path`, for measurements of the disk."""
     with filled(sweep, Path(path)) as new:
         yield Store(sweep, new)

@@ -1,4 +1,4 @@
-"""The layout of a sweep's store: its arrays, their metadata, and its identity."""
+"""Layout of a sweep's store: its arrays, their metadata, and its identity."""
 
 import contextlib
 import json
@@ -22,7 +22,7 @@ from pyharness.sweep.fields import units_of
 from pyharness.sweep.reductions import REDUCTIONS, empty
 from pyharness.sweep.sweep import Sweep
 
-CHECKSUMS = "checksums"  # the group of the checksums in a store; no array may have this name
+CHECKSUMS = "checksums"  # the group of the checksums; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"
 # In bytes: the values of the longest axis, to which compression may add a little.
 LARGEST_METADATA = 65536 + 9 * MOST_VALUES
@@ -32,14 +32,14 @@ _HEAD = re.compile(
 
 
 def label(sweep: Sweep) -> Label:
-    """Return the identity of the store that this pyharness makes."""
+    """Return the identity of a store that this version of pyharness makes."""
     return Label(SCHEMAS["sweep store"], version(), sweep.fingerprint)
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities in a store's metadata and in their checksums.
+    """Return the identities in a store's metadata and in the checksums of the metadata.
 
-    One that can't be read is left out. In an undamaged store both are equal.
+    An unreadable one is omitted. In an undamaged store both are equal.
     """
     found = []
     with contextlib.suppress(
@@ -76,7 +76,7 @@ def metadata_files(sweep: Sweep) -> list[str]:
 def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
     """Make an empty store beside `folder`, and yield its temporary path.
 
-    Files that the caller has not moved are removed in the end.
+    Files that the caller has not moved are removed at the end.
     """
     new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     try:
@@ -103,8 +103,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
     with zarr.config.set({"array.write_empty_chunks": True}):
         _fill_group(zarr.create_group(folder, zarr_format=3, attributes=attributes), sweep)
     with warnings.catch_warnings():
-        # xarray warns if consolidated metadata are missing, and Zarr warns if they are made.
-        # They are therefore made, and Zarr's warning is suppressed.
+        # xarray warns if consolidated metadata are missing, and Zarr if they are made.
         warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
         zarr.consolidate_metadata(folder)
     files = metadata_files(sweep)
@@ -158,8 +157,8 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
         name,
         shape=shape,
         chunks=chunk,
-        # A chunk that is computed again must have the same bytes. The compressor is therefore
-        # fixed, because another version of Zarr may have another default.
+        # Fixed, because a chunk that is computed again must have the same bytes, and another
+        # version of Zarr may have another default.
         compressors=ZstdCodec(level=0, checksum=False),
         dtype=reduction.dtype,
         fill_value=reduction.fill,
@@ -169,6 +168,6 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound (bytes) of any file of a chunk."""
+    """Return an upper bound of the size (bytes) of any file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

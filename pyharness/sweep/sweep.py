@@ -1,7 +1,7 @@
 """The data of a sweep: scene, axes of the grid, solver, reductions, and chunks.
 
-A sweep solves a grid of scenes. A reduction is a quantity that is stored for each; a chunk is a
-block of the grid, solved and stored at once, and numbered from 0.
+A sweep solves a grid of scenes. A reduction is a quantity that is stored for each scene. A chunk is
+a block of the grid, solved and stored at once, and numbered from 0.
 """
 
 import itertools
@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction, a key of `REDUCTIONS`, with parameters and array name.
 
-    `function`, for the reduction `claim`, names the function that checks it, as in
+    For the reduction `claim`, `function` names the function that checks the claim, as in
     ``package.module:name``.
     """
 
@@ -39,7 +39,7 @@ class Sweep:
     """A sweep as a sweep file describes it.
 
     `scene` supplies all quantities that no axis varies. `chunk` is the largest number of scenes in
-    a chunk; `fingerprint` is the SHA-256 of `text`, the sweep file, with the scene file that it
+    a chunk. `fingerprint` is the SHA-256 of `text`, the sweep file, with the scene file that it
     names.
     """
 
@@ -71,8 +71,8 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        It covers some last dimensions completely, and the one before in part. It has length 1 along
-        programs, methods, listings and readings, so that its scenes have the same solver.
+        A chunk covers some last dimensions completely, and the one before in part. It has length 1
+        along programs, methods, listings and readings, so that its scenes have the same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -118,7 +118,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
     Two or more include the first and the last scene.
     """
-    # The numbers are Python integers, because a grid may have more scenes than 64 bits can count.
+    # A grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
     flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
@@ -131,7 +131,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values in the scenes of `where`, by fields as in ``omega.1``."""
+    """Return the values of the varied fields, as ``omega.1``, in the scenes of `where`."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
@@ -139,8 +139,8 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    Each has its indices in ascending order, and a value from each column. Without columns there is
-    one group.
+    A group has its indices in ascending order, and a value from each column. Without columns there
+    is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

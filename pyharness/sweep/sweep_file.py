@@ -45,11 +45,11 @@ _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
-    """Return the sweep that a TOML file describes.
+    """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
-    A scene file's path is relative to the sweep file. `claims` maps each claim to the function that
-    checks it, as in ``package.module:name``: for a `Batch` of n scenes it returns 1 where the claim
-    holds, 0 fails, 2 does not apply, 3 holds in part.
+    The path of a scene file is relative to the sweep file. `claims` maps each claim to the function
+    that checks it, as in ``package.module:name``: for a `Batch` of n scenes it returns 1 where the
+    claim holds, 0 fails, 2 does not apply, 3 holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -92,11 +92,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of the table [scene], and the bytes of its scene file.
-
-    They begin with a zero byte, which separates them from the sweep file in the SHA-256, or are
-    empty.
-    """
+    """Return the scene of the table [scene], and its file's bytes after a zero byte, or b""."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
@@ -110,6 +106,7 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         beside = path.parent / table["file"]
         named = f"scene file '{beside}'"
         content = read_file(beside, named)
+        # The zero byte separates the files in the SHA-256.
         return checked_scene(
             scene_of_file(content, beside.stem, named), any_state=True
         ), b"\0" + content
@@ -282,10 +279,7 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError for an unknown program, method, listing or reading.
-
-    Also if a method does not allow the tolerance, or `t_end` is 0.
-    """
+    """Raise InputError for an unknown solver, a tolerance not allowed, or `t_end` 0."""
     solver = sweep.solver
     programs = list(_choices(sweep, "program", solver.program))
     own = [] if programs else _choices(sweep, "method", solver.method)

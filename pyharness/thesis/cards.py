@@ -1,9 +1,9 @@
-"""The text of the edition: every card of the three decks, and how the scan shows it.
+"""The text of the edition: every card of the three decks, and its appearance in the scan.
 
-A card is a line of a printed program, a deck the cards of one. A line of the scan is card number,
-dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and the twin's
-lines of each card; `data/apparatus.toml`, the critical apparatus, explains the deviations of the
-scan.
+A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
+number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
+the twin's lines of each card. `data/apparatus.toml`, the critical apparatus, explains the
+deviations of the scan.
 """
 
 import re
@@ -31,7 +31,7 @@ class Difference(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A card of a printed program, and how the scan shows it.
+    """A card of a printed program, and its appearance in the scan.
 
     `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
     occurrence of its characters after the one before. `printed` is another number that the scan
@@ -104,7 +104,7 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, and the source lines of port and twin for each card."""
+    """The cards of a program by number, and the lines of port and twin for each card."""
 
     def __init__(self, program: str) -> None:
         """Read the table of cards of the program from `data/cards`."""
@@ -144,22 +144,22 @@ class Deck:
 
     @cached_property
     def absent(self) -> dict[int, str]:
-        """Return, by card number, why the Fortran port omits executable cards."""
+        """Return, by card number, why the Fortran port omits an executable card."""
         return {n: why for cards, why in self._places["absent"] for n in numbers(cards)}
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, why the port has the card's statement in another form."""
+        """Return, by card number, why the port has a statement in another form."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
     def port(self) -> dict[int, list[Place]]:
-        """Return, by card number, the lines of the Fortran port that correspond to the card."""
+        """Return, by card number, the corresponding lines of the Fortran port."""
         return _by_card((cards, place) for place, cards in port_lines(self.program))
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the lines of the twin that correspond to the card."""
+        """Return, by card number, the corresponding lines of the twin."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
@@ -180,7 +180,7 @@ def numbers(ranges: str) -> list[int]:
 
 
 def find(program: str, number: int) -> Card:
-    """Return the card of a program with a number."""
+    """Return the card `number` of a program; raise InputError if there is none."""
     cards = deck(program).cards
     if number not in cards:
         near = sorted(cards, key=lambda each: abs(each - number))[:2]
@@ -195,8 +195,7 @@ def chosen(asked: Iterable[str]) -> list[Card]:
     """Return the cards that `asked` names; all cards if it is empty.
 
     Items are programs, numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
-    that has such cards), ``two-term:1660``. Raise InputError for any other item, and for a range
-    without cards.
+    that has such cards), ``two-term:1660``. Raise InputError for any other item or an empty range.
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -267,9 +266,9 @@ def passages(
 ) -> Iterator[tuple[str, Difference | None]]:
     """Yield each passage of a card's text with its difference from the scan, or None.
 
-    `differences` are all of the card's, in order; else ValueError is raised.
+    `differences` are all those of the card, in order; otherwise raise ValueError.
     """
-    # Indices of all characters that are not blanks. Blanks are ignored.
+    # Differences ignore blanks.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]
     letters = tight(text)
     done = at = 0

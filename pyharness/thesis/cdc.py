@@ -9,7 +9,7 @@ before NX (24) normalises a sum.
 
 from pyharness.thesis.rounding import Operation, Pair, Rules, rounding
 
-# Exponents of an integer coefficient: the octal exponent fields 0000 and 3776 of a word.
+# Exponents of an integer coefficient, for the octal exponent fields 0000 and 3776 of a word.
 LEAST, MOST = -1023, 1022
 
 
@@ -49,8 +49,8 @@ def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[in
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
     The frame is in units of 2**(e - p), e the larger exponent; coefficients have p bits. The
-    smaller operand is shifted and truncated; if `rounds`, half a unit in the last place is first
-    added to each, as in RX.
+    smaller operand is shifted and truncated. As in RX, if `rounds`, half a unit in the last place
+    is first added to each operand.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

@@ -1,7 +1,7 @@
 """Combinations of a listing and a case, for which Fortran port and twin are compared.
 
-A listing is a program with a choice of defects, readings and conjectures, a case a scene of Table
-1.
+A listing is a program with a choice of defects, readings and conjectures; a case is a scene of
+Table 1.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing: each subset of defects, some conjectures and readings."""
+    """Yield every listing: all subsets of readings, with all subsets of `switches`."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
@@ -48,8 +48,8 @@ def cell_name(listing: Listing, case: int) -> str:
 def listing_name(listing: Listing) -> str:
     """Return a name, without blanks, for a listing.
 
-    ``corrected``; ``original`` and readings, each after a colon; or all switches and readings,
-    joined by ``+``.
+    It is ``corrected``, ``original`` and readings, each after a colon, or all active names, joined
+    by ``+``.
     """
     if listing.label == "custom":
         return "+".join(sorted(listing.active))

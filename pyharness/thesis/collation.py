@@ -16,8 +16,8 @@ HEADING = "APPENDIX AND PROGRAMS"
 def expected_lines() -> list[tuple[str, str]]:
     """Return the lines that our tables expect in the appendix, as pairs (text, name).
 
-    The text has no blanks. The name is a card's, as in ``two-term:1660``, or ``furniture`` for a
-    line that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The text has no blanks. The name is a card's, as in ``two-term:1660``, ``furniture`` for a line
+    that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -49,9 +49,9 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return a sentence for each line in which a scan disagrees with our tables of cards.
+    """Return a sentence for each line in which a scan of the thesis disagrees with our tables.
 
-    `scan` is the text of the whole thesis.
+    Raise InputError for a text without the appendix.
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):
@@ -79,8 +79,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    Each deviation must name an entry that declares it and vice versa; a lost card must name an
-    entry of the kind ``missing text``.
+    Each deviation must name an entry that declares it, and each declared deviation must exist. A
+    lost card must name an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):

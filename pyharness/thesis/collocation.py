@@ -1,9 +1,9 @@
 """Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
 
-In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34), with
-the right-hand side as derivative at as many collocation points as there are terms after x(0) (eq.
-36). A first estimate assumes a constant right-hand side; one correction evaluates it at the points
-along the estimate.
+In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34), whose
+derivative equals the right-hand side at as many collocation points as there are terms after x(0)
+(eq. 36). A first estimate assumes a constant right-hand side; one correction evaluates it at the
+points along the estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -77,7 +77,10 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return c1, c2, ... and IER from the `rates` at `points` (s), a row for each point."""
+    """Return the coefficients c1, c2, ... of each unknown, and IER.
+
+    `rates` has a row for each of `points` (s).
+    """
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 

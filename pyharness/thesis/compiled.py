@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `run_program`, and are not checked.
+    The arguments are those of `run_program`, unchecked.
     """
     rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
         *program_arguments(scene, listing, lipschitz, may_stop, velocity)
@@ -39,9 +39,9 @@ def read_rows(
     """Return the output of a compiled program as a trajectory.
 
     `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
-    velocity (m/s). `ier` has at least n codes. `stop_variable` is the number, from 1 in
-    `STOP_VARIABLES`, of the variable that failed the stop test, or 0. `stop_quotient` is the change
-    of the right-hand side over that of the variable (1/s).
+    velocity (m/s). `ier` has at least n codes. `stop_variable` is the number in `STOP_VARIABLES`,
+    from 1, of the variable that failed the stop test, or 0. `stop_quotient` is the change of the
+    right-hand side over that of the variable (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0
@@ -61,9 +61,9 @@ def read_rows(
 class Arguments(NamedTuple):
     """The arguments of the compiled function `run_program`, in its order.
 
-    `flags` is a bit mask of defects, readings and conjectures. `body` contains the moments (kg m2)
-    if `by_moments`, else A, B and C of Euler's equations. `torque_first` is the initial torque
-    divided by the moments (1/s2), or zeros.
+    `flags` is a bit mask of defects, readings and conjectures. `body` has the moments (kg m2) if
+    `by_moments`, else A, B and C of Euler's equations. `torque_first` is the initial torque divided
+    by the moments (1/s2), or zeros.
     """
 
     program: int
@@ -118,5 +118,5 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether the stop test needs the velocity: defect `lipschitz-tests-velocity`."""
+    """Return whether the stop test reads the velocity, by the defect `lipschitz-tests-velocity`."""
     return may_stop and listing.has("lipschitz-tests-velocity")

@@ -1,6 +1,6 @@
 """Runs of the compiled programs in a floating-point format of IEEE 754.
 
-Numbers are passed to the extension module, and returned by it, as bytes.
+Numbers are exchanged with the extension module as bytes.
 """
 
 import itertools
@@ -63,10 +63,7 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the compiled programs support.
-
-    The tuple is empty if the extension is not built.
-    """
+    """Return the names of the words that the compiled programs support, none if not built."""
     try:
         from pyharness import _build
     except ImportError:

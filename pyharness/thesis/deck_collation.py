@@ -1,7 +1,7 @@
-"""A comparison of the decks with each other and with the thesis, operation by operation.
+"""Comparison of the decks with each other and with the thesis, operation by operation.
 
-`data/cards/collation.toml` lists the operations of the programs, and what sections II to V state
-about them. Whether the decks agree is computed from their statements.
+`data/cards/collation.toml` lists the operations of the programs, and the statements of sections II
+to V about them. Whether the decks agree is computed from their statements.
 """
 
 import re
@@ -17,11 +17,11 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 class Row(NamedTuple):
     """An operation, and whether the decks and the thesis agree on it.
 
-    `cards` has the numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all decks
-    with the operation have the same statements, ``names`` if only names differ, ``order`` if only
-    names and order, else ``differ``; ``-`` if no deck has it. `thesis` is ``agrees``, ``differs``
-    or ``silent``; `text` and `says` are place and statement. `entries` of the apparatus, or
-    `reason`, explain a disagreement.
+    `what` names the operation. `cards` has the numbers by program, as in ``750-770, 800``. `decks`
+    is ``agree`` if all decks with the operation have the same statements, ``names`` if only names
+    differ, ``order`` if only names and order, else ``differ``; ``-`` if no deck has it. `thesis` is
+    ``agrees``, ``differs`` or ``silent``; `text` and `says` are place and statement. `entries` of
+    the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str
@@ -48,8 +48,8 @@ def rows() -> list[Row]:
 def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement.
 
-    An apparatus entry must be known, in a row, and name a card of its row. A card must be known and
-    in exactly one row.
+    An apparatus entry must be known, be in a row, and name a card of its row. A card must be known
+    and in exactly one row.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
@@ -102,7 +102,6 @@ def _row(given: dict[str, Any]) -> Row:
 
 
 def _decks(given: dict[str, Any]) -> str:
-    """Return the value of `Row.decks` for a row of `data/cards/collation.toml`."""
     found = {program: statements(program, cards) for program, cards in given["cards"].items()}
     if not found:
         return "-"

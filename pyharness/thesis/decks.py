@@ -1,7 +1,7 @@
 """Decks as fixed-form FORTRAN, and runs of them after compilation.
 
-They are a third, independent way from the cards to the results: the author's statements, compiled
-with a separate LEQT1F (`data/cards/leqt1f.f`). They share no code with port and twin.
+They are a third, independent path from the cards to the results: the author's statements, compiled
+with a separate LEQT1F (`data/cards/leqt1f.f`), share no code with port and twin.
 """
 
 import re
@@ -22,8 +22,8 @@ from pyharness.thesis.cards import deck, numbers
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-# Numbers of terms of two further collocation programs, which V.2 of the thesis used in Case 6. The
-# thesis does not print their decks.
+# Numbers of terms of two further collocation programs, used in V.2 of the thesis for Case 6, whose
+# decks it does not print.
 MODELS = (3, 5)
 COMPILER = "gfortran"
 # REAL is binary64, variables are 0 until they are set, and no operations are fused.
@@ -57,7 +57,7 @@ def deck_text(
     By default it is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
     with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
     DO statement. `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7,
-    "gfortran" also what a modern compiler needs; column 73 marks these cards. `terms`, 3 or 5,
+    "gfortran" also adaptations to a modern compiler; column 73 marks these cards. `terms`, 3 or 5,
     requests the conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card
     can express the request.
     """
@@ -95,13 +95,13 @@ def card_steps(program: str) -> int:
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return each card of the corrected program by number, inserted ones in between."""
+    """Return each card of the corrected program by number, including inserted ones."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
 
 def corrections(program: str) -> dict[int, list[str]]:
-    """Return the defects whose correction replaces, deletes or inserts a card, by number."""
+    """Return, by card number, the defects whose correction replaces, deletes or adds the card."""
     found: dict[int, list[str]] = {}
     for each in facts("cards/alterations")["alteration"]:
         if each["program"] == program and "corrects" in each and "case" not in each:
@@ -116,7 +116,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
 
     It includes our LEQT1F if needed. `system` is "nos" or "nosbe"; `rounds` sets FTN's option ROUND
-    for sums, products and quotients.
+    for sums, products and quotients. Raise InputError for another system.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -132,10 +132,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an entry of `data/cards/alterations.toml` hold.
-
-    `case` is None for the case on the published cards.
-    """
+    """Return whether all conditions of an alteration hold; `case` None is the published one."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -162,8 +159,8 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 def model_cards(terms: int) -> dict[int, str]:
     """Return the cards, by new number, of a collocation deck with `terms` terms.
 
-    A conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such deck. The n
-    collocation points are at k/(n+1) of the interval, k = 1 to n.
+    The deck is a conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such
+    deck. The n collocation points are at k/(n+1) of the interval, k = 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -235,7 +232,7 @@ def model_cards(terms: int) -> dict[int, str]:
     tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
     ending = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]
     text = [*head, *text[:tail], *ending]
-    # A statement whose card ends with an operator continues on the next card.
+    # Cards that end with an operator continue on the next one.
     for n, each in enumerate(text[:-1]):
         if each.rstrip().endswith("+"):
             text[n + 1] = "     C" + text[n + 1].strip().removeprefix("C")
@@ -291,7 +288,7 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
 
 
 def solver_object(folder: Path) -> Path:
-    """Return the path of the compiled solver in `folder`; compile it if it is missing."""
+    """Return the path of the compiled solver in `folder`, compiled if missing."""
     found = folder / "leqt1f.o"
     if not found.exists():
         _command([COMPILER, *FLAGS, "-c", str(_SOLVER), "-o", str(found)], folder)
@@ -305,7 +302,7 @@ def _command(words: list[str], folder: Path) -> None:
 
 
 def _records(path: Path) -> np.ndarray:
-    """Return TAPE5, shape (n, 7): records between copies of their lengths."""
+    """Return TAPE5, shape (n, 7); each record is between copies of its length."""
     record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
     return np.fromfile(path, dtype=record)["values"]
 

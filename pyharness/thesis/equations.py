@@ -1,4 +1,4 @@
-"""Right-hand sides and the record of a run, for all three twins."""
+"""Right-hand sides, and the record of a run, for all three twins."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of eqs. 16-18 (rad/s2) from A, B, C, torque over moment (1/s2), omega."""
+    """Return F, G, H of eqs. 16-18 (rad/s2) from A, B, C, torque over moment (1/s2), and omega."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -60,10 +60,7 @@ class Record:
     """The results of a twin's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Create a record without rows.
-
-        `evaluations_per_step` counts evaluations of the right-hand sides.
-        """
+        """Create a record; `evaluations_per_step` counts evaluations of the right-hand sides."""
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []
@@ -78,10 +75,9 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows.
+        """Return the trajectory of all rows, with IER if `prints_ier`.
 
-        If `prints_ier`, it contains IER. A step that overflows has no row, but its evaluations are
-        counted.
+        A step that overflows has no row, but its evaluations are counted.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

@@ -15,7 +15,7 @@ _BITS = {24: 32, 53: 64, 113: 128}
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number: binary32, binary64 or binary128."""
+    """Return the number of bytes of a number in binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
@@ -26,7 +26,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
-    # A copy, because memory that NumPy allocates is aligned for any number.
+    # Memory of a copy, which NumPy allocates, is aligned for any number.
     return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
 
 
@@ -46,8 +46,7 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the exponent field 0, but the same unit in the last place as a
-        # number with the exponent field 1.
+        # A subnormal number has the field 0, but the unit in the last place of the field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

@@ -11,8 +11,8 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
 
-    If A is algorithmically singular, IER is `SINGULAR` (129), and every b is returned instead of
-    its x; otherwise IER is 0.
+    If A is algorithmically singular, IER is `SINGULAR` (129), and each b replaces its x; otherwise
+    IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -22,10 +22,7 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite the rows of a matrix by its LU factors; return the pivot rows, None if singular.
-
-    A pivot row is the index of the row exchanged with that of the diagonal element.
-    """
+    """Overwrite rows by LU factors; return the index of each row exchanged, None if singular."""
     n = len(a)
     pivots = []
     scale = []
@@ -42,8 +39,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # The pivot is the element on or below the diagonal with the largest scaled magnitude. If
-        # several elements have this magnitude, the first one is taken.
+        # Of several elements with the largest scaled magnitude, the first one is the pivot.
         biggest = 0.0
         pivot = j
         for i in range(j, n):

@@ -49,7 +49,7 @@ class ProgramEnsemble(BatchResult):
     status : ndarray of int8, shape (n,)
         How each run ended: COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses`.
     at : ndarray of int, shape (m,)
-        The steps to which the rows belong, counted from 1.
+        The steps of the rows, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Translational velocity along the body axes, m/s; None if it was not requested.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
@@ -75,8 +75,8 @@ class ProgramEnsemble(BatchResult):
     ier: NDArray[np.int32] | None
 
 
-# The annotations are text, because otherwise the signature shows the definition of ArrayLike, which
-# has 300 characters, in each of them.
+# The annotations are text, because the signature would otherwise show the 300 characters of
+# ArrayLike's definition in each.
 def run_many(
     scene: Scene,
     listing: Listing,
@@ -200,8 +200,7 @@ def _run(
 ) -> ProgramEnsemble:  # fmt: skip
     """Run a compiled program for n bodies, with checked arguments.
 
-    `inputs` has the arrays of `run_many` by name; ``inputs["body"]`` moments if `by_moments`, else
-    A, B, C. `wanted` are the returned steps.
+    `inputs` has the arrays of `run_many` by name, and "body" the moments or A, B, C.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
@@ -214,7 +213,7 @@ def _run(
     # The kernel needs at least one requested step.
     at = np.unique(wanted) if wanted.size else np.full(1, scene.steps, dtype=np.int32)
     back = np.searchsorted(at, wanted)
-    # The first axis is the body, so that the transposes are the kernel's column-major arrays.
+    # The body is the first axis, so that transposes are the kernel's column-major arrays.
     omega_rows = np.full((n, at.size, 3), np.nan)
     velocity_rows = np.full((n * velocity, at.size, 3), np.nan)
     times = np.full((1 if one_step_size else n, at.size), np.nan)
@@ -252,15 +251,12 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies for each call of the kernel.
-
-    One thread makes one call, several share more; all but the last have a multiple of the bodies
-    that the kernel processes at once.
-    """
+    """Yield the range of bodies for each call of the kernel: one call, or several per thread."""
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
         size = max(fair, _LEAST_WORK // steps, 1)
+        # The kernel integrates so many bodies at once.
         size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))
@@ -277,7 +273,7 @@ def _check_ends(step_size: Array, steps: int) -> None:
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:
-    """Return the requested steps as an array, by default the last; check them."""
+    """Return the requested steps as an array, by default the last; raise InputError if invalid."""
     if at is None:
         return np.array([steps], dtype=np.int32)
     found = [integer("at", each) for each in number_list("at", at, "allowed: a list of steps")]

@@ -1,4 +1,4 @@
-"""Numbers of a CDC machine, written in octal, and the results of CDC instructions on them.
+"""Numbers of a CDC machine in octal, and the results of CDC instructions on them.
 
 A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
 60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
@@ -27,8 +27,8 @@ _INSTRUCTIONS = tuple(
 def from_octal(text: str) -> Pair:
     """Return the number m 2**e that 20 octal digits represent, as the pair (m, e).
 
-    Words of all bits 0 or 1 are zero. For zero, infinity and nan, m is 0 and e the value as a
-    float. Raise InputError for other texts, and if the coefficient is not normalised.
+    Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e the value
+    as a float. Raise InputError for other texts, and if the coefficient is not normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -51,7 +51,7 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the CDC word of a number (m, e) as in `from_octal`, in groups of four digits."""
+    """Return the CDC word of a pair (m, e), as in `from_octal`, in groups of four digits."""
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))
@@ -65,7 +65,7 @@ def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
     `name` is F (truncating) or R (rounding), X, and +, -, * or /, as in ``FX*``. A sum or
-    difference is normalised only if NX follows, as in ``RX+ NX``.
+    difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
     """
     if name not in _INSTRUCTIONS:
         raise unknown("instruction", name, _INSTRUCTIONS)

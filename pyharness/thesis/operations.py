@@ -1,4 +1,4 @@
-"""Counts of the floating-point operations in a step of a program, made on the cards.
+"""Counts of the floating-point operations in a step of a program, from its cards.
 
 The author's statements are interpreted with numbers that count operations; LEQT1F is our own
 version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each; subscripts, jumps, ABS
@@ -26,8 +26,8 @@ ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts all on the cards; `once` no repetition on the same operands. With unit times
-    they are times in sequence.
+    `written` counts all on the cards; `once` omits repetitions with the same operands. With unit
+    times as weights, both are times of sequential execution.
     """
 
     written: int
@@ -63,8 +63,7 @@ def _value(x: Any) -> float:
 class _Number:
     """A floating-point value, with the counter of the operations on it.
 
-    A repeated operation on the same operands returns the same object, so that objects are identical
-    exactly if computed in the same way.
+    A repeated operation on the same operands returns the same object.
     """
 
     def __init__(self, counter: _Counter, value: float) -> None:
@@ -141,10 +140,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of a value from before a step, whose operations `counter` counts.
-
-    Anything but a number or an array of numbers is returned unchanged.
-    """
+    """Return a copy of numbers from before a step, with `counter`; other values unchanged."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)
@@ -152,7 +148,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
 
 
 def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Yield the label and the text of every statement of a deck, without blanks."""
+    """Return the label and the text, without blanks, of every statement of a deck."""
     found: list[list[str]] = []
     for line in text.splitlines():
         label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())

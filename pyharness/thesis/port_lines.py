@@ -18,7 +18,7 @@ PORT = "fortran/original"
 
 
 class Place(NamedTuple):
-    """A line of a source file: name, number from 1, and text."""
+    """A line of a source file: name of the file, number from 1, and text."""
 
     file: str
     line: int
@@ -31,7 +31,7 @@ def port_file(program: str) -> str:
 
 
 def port_lines(program: str) -> Iterator[tuple[Place, str]]:
-    """Yield each line of a port that corresponds to cards, with their numbers as text."""
+    """Yield each line of a port that corresponds to cards, with the card numbers as text."""
     file = port_file(program)
     for number, text in enumerate(_lines(shipped(PORT) / file), 1):
         if match := _MARGIN.match(text):
@@ -41,7 +41,7 @@ def port_lines(program: str) -> Iterator[tuple[Place, str]]:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the defect or reading on which a port's line depends, and whether it is active.
 
-    None for a line that does not depend on a single switch.
+    None means that the line depends on no single switch.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
@@ -57,7 +57,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the line of a twin with this text; raise ValueError unless it is one."""
+    """Return the line of a twin with this text; raise ValueError unless there is exactly one."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

@@ -1,8 +1,8 @@
 """The line-printer output of a program, made from its trajectory.
 
 The page lacks the first character of each record, the carriage control, always a blank.
-`data/printer.toml` contains the FORMATs, and marks which parts of them are conjecture.
-`fortranformat` writes the values; only zeros and values that are not finite are treated here.
+`data/printer.toml` has the FORMATs, and marks their conjectural parts. `fortranformat` writes the
+values; only zeros and values that are not finite are treated here.
 """
 
 import math
@@ -21,8 +21,8 @@ from pyharness.model.trajectory import Trajectory
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# A value that is not finite is printed as asterisks, like a value that is too wide for its field.
-# The machine printed R or I instead, which contains no more information.
+# A value that is not finite is printed as asterisks, like one that is too wide for its field. The
+# machine printed R or I, which has no more information.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
@@ -49,8 +49,8 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
     """Return omega (rad/s) and velocity (m/s) of each row, as six floats.
 
-    Numbers that are not binary64 are rounded to the decimals of `form`, so that the floats are
-    printed like the exact numbers.
+    Numbers of other arithmetics are rounded to the decimals of `form`, so that the floats print
+    alike.
     """
     if trajectory.exact is None:
         assert trajectory.velocity is not None
@@ -60,10 +60,7 @@ def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
 
 
 def _to_places(x: Any, places: int) -> float:
-    """Return a number rounded to `places` decimals, ties away from zero, as a float.
-
-    A number that is not finite becomes nan.
-    """
+    """Return a number rounded to `places` decimals, ties away from zero; nan if not finite."""
     if not is_finite(x):
         return math.nan
     value = Fraction(x) if isinstance(x, float) else x.fraction()
@@ -77,7 +74,7 @@ def _to_places(x: Any, places: int) -> float:
 def formats_of(program: str) -> dict[str, Any]:
     """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
 
-    Further keys name their cards, and say which characters are certain and which are conjecture.
+    Further keys name their cards, and mark characters as certain or conjecture.
     """
     formats: dict[str, dict[str, Any]] = {
         each["name"]: each for each in facts("printer")["program"]
@@ -93,7 +90,7 @@ def _torque_cards(scene: Scene) -> tuple[float, float, float]:
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records that a FORTRAN WRITE makes of values, with carriage control."""
+    """Return the records, with carriage control, that a FORTRAN WRITE makes of values."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 

@@ -20,7 +20,7 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 
 @dataclass(frozen=True)
 class Program:
-    """One of the three programs from the appendix.
+    """One of the three programs of the appendix.
 
     Its corrected version has a global error of O(h**order), h the step size. `source` names its
     equation and sections.
@@ -43,7 +43,7 @@ class Program:
     ) -> Trajectory:
         """Run this program and return its trajectory; see `run_program`.
 
-        InputError is also raised if the listing belongs to another program.
+        Raise InputError also if the listing belongs to another program.
         """
         checked_scene(scene)
         checked_listing(listing)
@@ -70,10 +70,7 @@ class Program:
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
-        """Run the program in binary64, with checked arguments.
-
-        `options` are `lipschitz`, `may_stop` and `velocity`, in this order.
-        """
+        """Run the program in binary64; `options` are `lipschitz`, `may_stop` and `velocity`."""
         if implementation == "fortran":
             return compiled.run(scene, listing, *options)
         lipschitz, may_stop, _ = options
@@ -90,7 +87,7 @@ def work_of(word: str, implementation: str) -> str:
 
 
 def checked_word(word: object, implementation: str) -> str:
-    """Return `word` if the implementation can run in it; raise InputError otherwise."""
+    """Return `word` if the implementation supports it; raise InputError otherwise."""
     if not isinstance(word, str) or word not in WORD_NAMES:
         raise unknown("word", word, WORD_NAMES, "--word")
     if word not in COMPILED_WORDS and implementation == "fortran":
@@ -138,8 +135,8 @@ def run_program(
         Whether the translational velocity is needed. If False, the compiled program computes it
         only if the stop test reads it. The other results are the same.
     effort : float
-        Factor on the work limit. The work is the number of steps, plus a contribution of each sine
-        or cosine of the torque in each step.
+        Factor on the work limit. The work is the number of steps, increased for each sine or cosine
+        of the torque.
     word : str
         The arithmetic, one of `pyharness.thesis.programs.WORD_NAMES`. One that is not in
         `pyharness.thesis.programs.COMPILED_WORDS` needs `implementation="python"`.
@@ -148,7 +145,7 @@ def run_program(
     -------
     Trajectory
         One row for each step, up to a stop or an overflow. In an arithmetic other than binary64,
-        the attribute `exact` contains the results as numbers of that arithmetic.
+        the attribute `exact` has the results as numbers of that arithmetic.
 
     Raises
     ------

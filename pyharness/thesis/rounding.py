@@ -3,7 +3,7 @@
 A number m 2**e is a pair of integers (m, e); m has p bits, or fewer if subnormal. If m is 0, e is
 the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an `Operation` have m other than 0.
 No library has all these rules: mpmath and gmpy2 have no limited exponents, SoftFloat and numpy only
-IEEE 754, and none those of the CDC machines (`cdc.py`).
+IEEE 754, and none has the rules of the CDC machines (`cdc.py`).
 """
 
 import math
@@ -20,7 +20,7 @@ class Rules(NamedTuple):
 
     `nearest` (ties to even) is for square roots, sines, cosines and literals, `cut` (towards zero)
     for literals if the word truncates them. A difference is the sum with the negative; `difference`
-    is for comparison only: numbers are equal if it is zero.
+    is for comparisons only: numbers are equal if it is zero.
     """
 
     nearest: Rounding
@@ -36,8 +36,8 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
     The integer m may have any length. Rounding is towards zero if `cut`, else to nearest, ties to
-    even. A larger exponent gives infinity; a smaller one underflows gradually, as in IEEE 754, if
-    `gradual`, else to zero.
+    even. A larger exponent gives infinity; a smaller one underflows to zero or, if `gradual`,
+    gradually as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 
@@ -78,8 +78,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
     If `cut`, sums, products and quotients are truncated towards zero. A result that is then too
-    large becomes infinite, as on machines that truncated; by IEEE 754 it would be the largest
-    number.
+    large becomes infinite, as on machines that truncated; IEEE 754 requires the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -89,8 +88,7 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
             xm, xe, ym, ye = ym, ye, xm, xe
         apart = xe - ye
         if apart > p + 2:
-            # y is below an eighth of the last unit of x. Any such y of the same sign has the same
-            # effect on the rounded sum.
+            # All y below an eighth of the last unit of x, with the same sign, have the same effect.
             return fit((xm << 3) + (1 if ym > 0 else -1), xe - 3)
         return fit((xm << apart) + ym, ye)
 

@@ -33,7 +33,7 @@ def run(
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Points and slopes of the stages are stored under the program's own indices: 1, 2, 3, 4.
+    # Points and slopes of the stages have the program's own indices.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -106,10 +106,10 @@ def lipschitz_test(
 ) -> tuple[str, float] | None:
     """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
-    `change_k` and `change_u` are magnitudes for the six right-hand sides and unknowns within a
-    step. Norms over omega are compared; by the defect `lipschitz-per-component` components, and by
-    `lipschitz-tests-velocity` the velocity too. The quotient is infinite if the unknowns do not
-    change.
+    `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
+    step. Norms over omega are compared; by the defect `lipschitz-per-component` single components,
+    and by `lipschitz-tests-velocity` the velocity too. The quotient is infinite if the unknowns do
+    not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -1,4 +1,4 @@
-"""Test vectors for the arithmetic of CDC machines, and the results that we compute.
+"""Test vectors for the arithmetic of CDC machines, and our results.
 
 `data/words/cdc.json` follows from the CYBER 170 hardware reference, CDC 60463560; a public emulator
 agrees. A file is a JSON object with `schema` and `vectors`: objects with `name`, `op` (as in
@@ -31,7 +31,7 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector and our own result, `found` (octal)."""
+    """A test vector, and `found`, our own result (octal)."""
 
     vector: Vector
     found: str
@@ -43,7 +43,7 @@ class Answer(NamedTuple):
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the test vectors of a JSON file, by default ours, with our results."""
+    """Return the vectors of a JSON file with our results; raise InputError if it is invalid."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)

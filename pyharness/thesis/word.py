@@ -47,7 +47,7 @@ class Number:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Number":
-        """Return the sum with the negative of `other`."""
+        """Return the rounded difference."""
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
@@ -96,9 +96,10 @@ class Number:
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the difference computed in the word is zero.
+        """Return whether the difference, computed in the word, is zero.
 
-        In a CDC word it can be zero for two neighbouring numbers, which are then regarded as equal.
+        In a CDC word, two neighbouring numbers may have the difference zero, and then count as
+        equal.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -125,7 +126,7 @@ class Number:
         return self._order(other) >= 0
 
     def __float__(self) -> float:
-        """Return the nearest float, or infinity with the same sign."""
+        """Return the nearest float, or an infinity with the same sign."""
         if not self.m:
             return float(self.e)
         try:
@@ -180,12 +181,12 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        `operation` is applied to floats that stand for the operands. If it yields zero, infinity or
-        nan, so is the result. Otherwise zero was added to a number, which is the result.
+        `operation` is applied to floats that represent the operands. A finite result other than
+        zero means that zero was added.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
-            return self if self.m else other  # a zero was added
+            return self if self.m else other
         return self._without_sign_of_zero(found)
 
     def _without_sign_of_zero(self, value: float) -> "Number":
@@ -193,7 +194,7 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return the zero, infinity or nan of this number, else 1.0 or -1.0."""
+        """Return a zero, infinity or nan as a float; for other numbers 1.0 or -1.0, the sign."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
@@ -217,10 +218,10 @@ class Word:
     """A floating-point format with its arithmetic: a number of bits p, and a rounding rule.
 
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
-    (rounding). Except for these two, numbers are below 2**(largest + 1), and the smallest exponent
-    follows as in IEEE 754; the default is binary64's if p is at most 53, else binary128's. With
-    `cut_literals` converted values are truncated. Raise InputError if the rule is unknown, or if p
-    is below 4.
+    (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
+    follows as in IEEE 754; `largest` is by default that of binary64 if p is at most 53, else of
+    binary128. With `cut_literals`, converted values are truncated. Raise InputError for an unknown
+    rule, or p below 4.
     """
 
     def __init__(
@@ -251,7 +252,7 @@ class Word:
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a float, integer, fraction, decimal text or own number as a number of the word.
+        """Return a float, integer, fraction, decimal text or own number as a number of this word.
 
         A float is converted from its shortest decimal representation. Raise TypeError for any other
         type, and for a number of another word.

@@ -1,1 +1,1 @@
-"""Reference solutions of a scene in multiple precision, with bounds of their errors."""
+"""Reference solutions of scenes in multiple precision, with bounds of their errors."""

@@ -19,7 +19,7 @@ DIGITS = 50
 def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
     """Return omega (rad/s) at `times` (s) of a body with I1 = I2 and its torque along axis 3.
 
-    Raise InputError if the scene has other moments or another torque.
+    Raise InputError for other moments or another torque.
     """
     law, moments = scene.body_torque, scene.moments
     vectors = [law.constant, law.rate, *(a for a, _ in law.sines + law.cosines)]
@@ -56,10 +56,7 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
 
 
 def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
-    """Return a context whose precision suffices for angles of the size of a product.
-
-    Each of `sizes` gives its largest absolute value as a factor.
-    """
+    """Return a decimal context precise enough for products of the largest of each of `sizes`."""
     context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
     largest = [max(map(abs, each), default=1.0) for each in sizes]
     context.prec = DIGITS + sum(max(0, Decimal(x).adjusted() + 1) for x in largest)

@@ -1,6 +1,6 @@
-"""Numbers of the enclosures: balls, power series of balls, complex balls, and functions.
+"""Number types of the enclosures: balls, power series of balls, complex balls, and functions.
 
-A ball is an interval given by its middle and its radius. Each operation of python-flint returns a
+A ball is an interval with a middle and a radius. Each operation of python-flint returns a
 ball that contains the exact result for all numbers in its operands.
 """
 
@@ -17,18 +17,18 @@ from pyharness.truth.enclosed import Balls
 
 
 def ball(x: Fraction) -> Any:
-    """Return a ball that contains a fraction; it is exact if the precision suffices."""
+    """Return a ball that contains a fraction, exactly if the precision suffices."""
     return arb(fmpq(x.numerator, x.denominator))
 
 
 def fraction(x: Any) -> Fraction:
-    """Return the middle of a ball exactly."""
+    """Return the exact middle of a ball."""
     mantissa, exponent = x.mid().man_exp()
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
 def balls(row: Sequence[Any]) -> Balls:
-    """Return a row's exact middles, with the largest of their radii."""
+    """Return the exact middles of a row, with the largest of their radii."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
@@ -48,7 +48,7 @@ def _exp(x: Any) -> Any:
 
 
 def _tanh(x: Any) -> Any:
-    # Power series have no method for it.
+    # python-flint has no hyperbolic tangent of power series.
     return 1 - 2 / (_exp(2 * x) + 1)
 
 
@@ -61,9 +61,9 @@ def _cosine(x: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return a tape's functions, with the pieces of its tables that hold after `time` (s).
+    """Return the functions of tapes for a step after (or before) `time` (s).
 
-    Before `time`, if `forward` is false.
+    A table is replaced by its piece in the step.
     """
 
     def table(each: Table, at: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The error of the reference: a proved bound where a proof is cheap, or the estimate.
+"""Error of the reference: a proved bound where a proof is cheap, else the estimate.
 
 A proof encloses the solution in balls; the distance of the reference from the farthest points of
 the balls bounds its error. The reference and its estimate do not depend on the proof.
@@ -21,10 +21,10 @@ from pyharness.truth.enclosed import Balls, Enclosure
 from pyharness.truth.reference import Reference
 
 PROVED, ESTIMATED = "proved", "estimated"
-# Factors on the work limits of the two provers that take steps. Each limit is about half a second.
+# Factors on the work limits of the two provers that take steps, each then about half a second.
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
-# A ball is smaller than the estimated error by this number of digits.
+# Digits by which a ball is smaller than the estimated error.
 _SPARE_DIGITS = 2
 _DIGITS, _MOST_DIGITS = 20, 60  # without an estimate; the largest number with a proof
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
@@ -50,7 +50,7 @@ class ErrorBound(NamedTuple):
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the statement relative to `scale` (rad/s) unless it is 0; the angle stays."""
+        """Return the statement relative to `scale` (rad/s) unless it is 0; the angle is kept."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
@@ -65,13 +65,13 @@ class ErrorBound(NamedTuple):
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """Return the statement on the attitude alone (rad); None without attitude."""
+        """Return the statement on the attitude alone (rad), or None without attitude."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
 
     def record(self) -> dict[str, Any]:
-        """Return the statement as a dictionary for JSON."""
+        """Return the statement as a JSON dictionary."""
         turned = {"angle": self.angle, "angle_basis": self.angle_basis}
         return {
             "value": self.value,
@@ -99,7 +99,7 @@ def bound_of(
 ) -> ErrorBound:
     """Return a statement on the error of the reference `known` of a scene.
 
-    If `before_rounding`, it is on omega plus its `remainder`, the part that rounding to binary64
+    With `before_rounding`, it is on omega plus `remainder`, the part that rounding to binary64
     removed.
     """
     exact = before_rounding and known.remainder is not None
@@ -134,8 +134,8 @@ def error_bound(
     `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4);
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates. Omega is proved if the scene has
     a certificate, which needs no library. With python-flint the attitude is proved in torque-free
-    motion, and if `any_torque`, both under any recorded torque. The limit of a proof is about half
-    a second times `effort`.
+    motion, and with `any_torque`, both under any recorded torque. The limit of a proof is about
+    half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -168,7 +168,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return a statement that holds for all given ones, of which there is at least one."""
+    """Return a statement that holds for all statements in `found`, at least one."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -215,8 +215,8 @@ class _Statement(NamedTuple):
     def _balls(
         self, any_torque: bool, effort: float
     ) -> tuple[Sequence[Balls] | None, Sequence[Balls] | None]:
-        """Return balls of omega and of the attitude; None where there is no proof."""
-        # The provers are imported where they are used: not every program needs them.
+        """Return balls of omega and of the attitude, each None without a proof."""
+        # Imported only here, because few programs need the provers.
         from pyharness.truth.certificate import has_certificate, prove
 
         digits = self._digits()
@@ -224,8 +224,7 @@ class _Statement(NamedTuple):
             return None, None
         omega = attitude = None
         if has_certificate(self.scene):
-            # This prover is also used where python-flint is installed, so that the bound of omega
-            # is the same without it.
+            # Used also with python-flint, so that the bound of omega is the same without it.
             bare = replace(self.scene, attitude=None)
             found = _tried(
                 lambda: prove(bare, self.times, digits, effort * _INTEGER_WORK).enclosure
@@ -265,7 +264,7 @@ def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):
         apart = max(map(_distance, row, middle))
-        # The distance and the radius are rounded to nearest, and their sum is again.
+        # The distance, the radius and their sum are rounded to nearest.
         around = _up(float(radius))
         least = max(least, _down(_down(apart) - around))
         most = max(most, _up(_up(apart) + around))
@@ -282,11 +281,11 @@ def _distance(x: float | Fraction, y: Fraction) -> float:
 def _extreme_angles(
     rows: Sequence[Sequence[Fraction]], found: Sequence[Balls]
 ) -> tuple[float, float]:
-    """Return the least and the largest error (rad) that quaternions may have.
+    """Return the least and the largest error (rad) that the quaternions `rows` may have.
 
-    It is twice the angle between the lines of two quaternions. Its sine s to the ball's middle is
-    exact before rounding, and arcsin(s) < s (1 + s**2) for s <= 1/2. Four radii r have the norm 2
-    r: middle and true line differ by at most arcsin(2 r) < 4 r.
+    The error is twice the angle between the lines of two quaternions. The sine s of the angle to
+    the ball's middle is exact before rounding, and arcsin(s) < s (1 + s**2) for s <= 1/2. Four
+    radii r have the norm 2 r: middle and true line differ by at most arcsin(2 r) < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

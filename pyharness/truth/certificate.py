@@ -1,7 +1,7 @@
-"""Proofs by Taylor steps in integer arithmetic, and the certificates that state them.
+"""Proofs by Taylor steps in integer arithmetic, and their certificates.
 
 The bounds of a step are those of `certificate_checker`, which verifies each step and ball of a
-certificate and does not trust this module.
+certificate without trusting this module.
 """
 
 import math
@@ -36,8 +36,8 @@ _SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or less tha
 _TOLERATED = 3  # bits by which the last terms may exceed their limit
 _MOST_STEPS = 20_000  # some five to thirty seconds
 _MOST_ATTEMPTS = 6
-# After this share of the time, the growth of the radius is extrapolated. If it needs more digits,
-# they are exceeded by some more.
+# After the fraction _EARLY of the time, the growth of the radius is extrapolated. If it needs more
+# digits, _MORE are added to them.
 _EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
 
@@ -52,7 +52,7 @@ class _Step:
 
 @dataclass(frozen=True)
 class Proof:
-    """An enclosure at requested times, and its certificate."""
+    """An enclosure with its certificate."""
 
     enclosure: Enclosure
     _run: "_Run"
@@ -64,7 +64,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """The errors grow so much that this many more digits are needed."""
+    """The errors grow so much that `digits` more digits are needed."""
 
     def __init__(self, digits: float) -> None:
         super().__init__()
@@ -72,7 +72,7 @@ class _AmplifiedError(Exception):
 
 
 def has_certificate(scene: Scene) -> bool:
-    """Return whether moments are constant and the torque is a law about body axes."""
+    """Return whether moments are constant and the torque is a law about the body axes."""
     constant = scene.changing is None and scene.inertia is None
     return constant and isinstance(scene.torque, TorqueLaw) and not scene.torque.in_space
 
@@ -84,7 +84,7 @@ def prove(
     effort: float = 1.0,
     progress: Progress = no_progress,
 ) -> Proof:
-    """Return balls that contain omega at `times` (s), and a certificate of them.
+    """Return balls that contain omega at `times` (s), and their certificate.
 
     A radius is at most 10**-digits rad/s, times the largest component of omega if that exceeds 1
     rad/s. `effort` is a factor on the limit of steps. Raise InputError if there is no certificate,
@@ -102,7 +102,7 @@ def prove(
     for attempt in range(_MOST_ATTEMPTS):
         run = _Run(record, times, wanted, digits)
         try:
-            # The last attempt shows how far a proof leads, for example to a singularity.
+            # The last attempt is not stopped early: its message states how far a proof reaches.
             last = attempt == _MOST_ATTEMPTS - 1
             run.prove(limit, effort, progress, 1.0 if last else _EARLY)
         except _AmplifiedError as error:
@@ -133,7 +133,7 @@ def _scene_record(scene: Scene) -> dict[str, Any]:
 
     return {
         "name": scene.name,
-        # The moments of a principal scene have more digits than a binary64 number.
+        # The moments of a `PrincipalScene` have more digits than a binary64 number.
         body: [
             float(x) if Fraction(float(x)) == x else str(x)
             for x in scene.exact_moments or scene.coefficients or ()
@@ -154,7 +154,7 @@ class _Run:
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
         self._goal = goal
-        # More terms make fewer steps and a smaller certificate; too many cost time.
+        # More terms give fewer steps and a smaller certificate; too many cost time.
         self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
         self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
         needed = math.ceil(digits / math.log10(2.0)) + _GUARD_BITS
@@ -166,15 +166,15 @@ class _Run:
         scales = scales_of([Fraction(terms[0], common) for common, terms in rows])
         whole = [round(x * (1 << SCALE_BITS)) for x in scales]
         self._system = System(record, self._bits, self._clock, whole)
-        # For each step, the share of the last time and the logarithm of the amplification so far.
+        # By step: the fraction of the last time, and the logarithm of the amplification so far.
         self._amplified: list[tuple[float, float]] = [(0.0, 0.0)]
         self.steps: list[_Step] = []
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
-        """Find the steps up to the last time, and the balls of omega.
+        """Compute the steps up to the last time, and the balls of omega.
 
-        Raise _AmplifiedError if the radius grows too fast after the share `early` of the time.
+        Raise _AmplifiedError if the radius grows too fast after the fraction `early` of the time.
         """
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
@@ -189,7 +189,7 @@ class _Run:
                 instead = advice("use a shorter time", effort, effort / share)
                 raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
             h = side * min(length, abs(end - time))
-            # Residuals that are much smaller than the present radius would cost time.
+            # Residuals much smaller than the present radius would only cost time.
             most, longer = max(self._most, radius.bit_length() - _SHARE_BITS), 1.0
             while True:
                 expansion = system.expand([*middle, *waves], time, h, self._order)
@@ -223,13 +223,11 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return how many digits the last radius will be too large.
-
-        The logarithm of the amplification is extrapolated at its mean rate since half the time.
-        """
+        """Return by how many digits the last radius will be too large, by extrapolation."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))
+        # The mean rate since half the present time is assumed to remain.
         then, before = amplified[bisect(amplified, (share / 2.0, 0.0))]
         rate = (total - before) / (share - then) if share > then else 0.0
         unit = max(1 << self._bits, *map(abs, middle))
@@ -242,12 +240,12 @@ class _Run:
         return radius + self._system.norm(residuals) + forced
 
     def _tube(self, source: int, expansion: Expansion) -> int:
-        """Return a radius larger than the error of an ordinary step."""
+        """Return a tube radius larger than the error of an ordinary step."""
         thick: int = max(max(map(abs, each)) for each in expansion[0][:3]) >> _TUBE_BITS
         return 8 * source + thick + 8
 
     def _add_balls(self, series: list[list[int]], radius: int, time: int, h: int) -> None:
-        """Add the balls at the requested times in a step, or at its begin if h is 0."""
+        """Add the balls at the requested times in a step, or at its beginning if h is 0."""
         unit = 1 << self._bits
         for t in self._times[len(self.omega) :]:
             passed = t * (1 << self._clock) - time

@@ -1,21 +1,20 @@
 """Check a certificate: a proof that balls contain the solution of Euler's equations.
 
-The program needs nothing but Python, and takes nothing from the program that found the proof. It
-computes with integers, and with fractions of integers where it reads numbers. Its arguments are
-files of certificates. It prints the scenes and rows that they prove; its exit status is 1 unless
-all of them hold.
+The program needs only Python's standard library, and imports nothing from the prover. It computes
+with integers, and with fractions where it reads numbers. Its arguments are files of certificates;
+it prints the scenes and rows that they prove. The exit status is 1 unless all certificates hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
-torque. In a step of the length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
+torque. In a step of length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
 whose coefficients are those of the Taylor series, rounded down. The proof does not depend on them,
 because it bounds the residual d = p' - h f(p) of the polynomial itself. The error e = y - p obeys
 |e|' <= h mu |e| + |d|, where mu bounds the logarithmic norm of the Jacobian of f in a tube around p
-(Dahlquist 1958). The bound of |e| that follows holds while |e| is less than the radius of the tube.
+(Dahlquist 1958). The resulting bound of |e| holds while |e| is less than the radius of the tube.
 If the bound itself is less, it holds on the whole step, because |e| is continuous. At the time of a
 row, the solution therefore differs from the polynomial of a step by at most the radius of the step.
 
-A number y is stored as an integer, y times 2**bits. A time is stored as an integer over 2**clock.
-The norm of an error of omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
+A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
+omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
 """
 
 import json
@@ -42,7 +41,7 @@ class NotProvedError(ValueError):
 
 
 def over(numerator: int, denominator: int) -> int:
-    """Return a quotient of integers, rounded up; the denominator is positive."""
+    """Return the quotient of integers, rounded up; the denominator is positive."""
     return -(-numerator // denominator)
 
 
@@ -50,8 +49,8 @@ class System:
     """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
 
     They are D y_i' = P y_j y_k + C + R t + sum (S s_f + G c_f), with i, j, k in cyclic order. Each
-    frequency f of the torque has two further unknowns, with s_f' = f c_f and c_f' = -f s_f. A row
-    of `rows` is D and the list of P, C, R, and S, G of each frequency.
+    frequency f of the torque adds two unknowns, with s_f' = f c_f and c_f' = -f s_f. An entry of
+    `rows` is D and the list P, C, R, and S, G of each frequency.
     """
 
     def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
@@ -81,7 +80,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return polynomials and bounds of the residuals of omega and all waves, over 2**bits."""
+        """Return Taylor series, and bounds of the residuals of omega and waves, over 2**bits."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1. This changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -121,7 +120,7 @@ class System:
         return isqrt(sum(x * x for x in parts)) + 1
 
     def forced(self, h: int) -> int:
-        """Return a bound of h times the norm of the Jacobian of omega by the waves, over UNIT."""
+        """Return a bound of h times the norm of the Jacobian of omega' by the waves, over UNIT."""
         total = 0
         for (common, (_, _, _, *amplitudes)), scale in zip(self.rows, self.scales, strict=True):
             push = sum(map(abs, amplitudes)) * abs(h) << SCALE_BITS
@@ -129,10 +128,10 @@ class System:
         return total
 
     def growth(self, series: Sequence[Sequence[int]], tube: int, h: int) -> int:
-        """Return a bound of h mu, for the Jacobian of omega by itself, over UNIT."""
+        """Return a bound of h mu, for the Jacobian of omega' by omega, over UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
-            # The mean takes work, and matters for a factor that is not small.
+            # The mean is a sharper bound but costs time, which a small factor does not justify.
             size = mean(each) if factor * 1000 > max(self.factors) else sum(map(abs, each))
             most = abs(h) * factor.numerator * (size + over(tube * scale, 1 << SCALE_BITS))
             growth += over(most * UNIT, factor.denominator << self.bits + self.clock)
@@ -157,7 +156,7 @@ class System:
     def ball(
         self, series: Sequence[list[int]], place: Fraction, radius: int
     ) -> tuple[list[int], Fraction]:
-        """Return omega's middle and radius at a place of a step, from 0 to 1, over 2**bits."""
+        """Return middle and radius of omega at the fraction `place` of a step, over 2**bits."""
         middle, (n, d) = [0, 0, 0], place.as_integer_ratio()
         for i, each in enumerate(series[:3]):
             for x in reversed(each):
@@ -185,8 +184,8 @@ def exponential(x: int) -> int:
     return total + term  # the rest of the series is less than its last term
 
 
-# The parts of a certificate: a tuple for a list of this length, a list for one of any length, a set
-# of types. Numbers of which binary64 would not have all digits are texts.
+# The form of a certificate. A tuple stands for a list of its length, a list for one of any length,
+# and a set for the allowed types. Numbers that binary64 would round are texts.
 NUMBER = re.compile("-?[0-9]+([./][0-9]+)?")
 WHOLE, REAL, TEXT, EXACT = {int}, {int, float}, {str, NUMBER}, {int, float, NUMBER}
 THREE, WAVES = (REAL,) * 3, [((REAL,) * 3, REAL)]
@@ -198,7 +197,7 @@ FORM |= {"rows": [{"time": REAL, "omega": ({NUMBER},) * 3, "radius": REAL}]}
 
 
 def fits(value: Any, form: Any) -> bool:
-    """Return whether a part of a certificate has the keys, lengths and types of its form."""
+    """Return whether a part of a certificate has the keys, lengths and types of `form`."""
     if type(form) is dict:
         same = type(value) is dict and {*value} == {*form}
         return same and all(fits(value[key], form[key]) for key in form)
@@ -210,7 +209,7 @@ def fits(value: Any, form: Any) -> bool:
 
 
 def check(certificate: dict[str, Any]) -> int:
-    """Return a certificate's number of steps; raise NotProvedError if it does not hold."""
+    """Return the number of steps of a certificate; raise NotProvedError if it does not hold."""
     scene = certificate["scene"]
     body = "coefficients" if "coefficients" in scene else "moments"
     if not fits(certificate, {**FORM, "scene": {**SCENE, body: (EXACT,) * 3}}):
@@ -246,7 +245,7 @@ def check(certificate: dict[str, Any]) -> int:
 
 
 def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
-    """Return a certificate that holds, or None and why it fails."""
+    """Return a certificate and "", or if it does not hold, None and the reason."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}
@@ -263,7 +262,7 @@ def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
 
 
 def main(names: Sequence[str]) -> int:
-    """Check certificates in files, print what they prove; return 1 if one does not hold."""
+    """Check certificates in files and print what they prove; return 1 if any does not hold."""
     found = [(name, *check_file(name)) for name in names]
     for name, proved, why in found:
         lines = [f"not proved: {why}"]

@@ -1,4 +1,4 @@
-"""Sine, cosine, pi and products of series in the current decimal arithmetic."""
+"""Sine, cosine, pi and products of series in the current decimal context."""
 
 import decimal
 from decimal import Decimal
@@ -9,7 +9,7 @@ Row = list[Decimal]
 
 
 def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
-    """Return the sine and the cosine of any angle (rad).
+    """Return the sine and the cosine of an angle (rad) of any size.
 
     The angle is reduced modulo 2 pi and halved eight times before the power series.
     """
@@ -29,10 +29,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
 
 
 def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
-    """Return the sum of x**k / k! with alternating signs over k = n, n + 2, ...
-
-    `term` is x**n / n!, `square` x**2.
-    """
+    """Return term - term x**2/((n + 1) (n + 2)) + ..., where `square` is x**2."""
     total = term
     while abs(term) > Decimal(1).scaleb(-decimal.getcontext().prec):
         n += 2

@@ -1,6 +1,6 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-The list `coefficients` has the Taylor coefficients of each unknown.
+A list `coefficients` has the Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,19 +17,18 @@ from pyharness.truth.decimal_functions import product, sine_cosine
 from pyharness.truth.tape_series import TapeSeries, series_products
 
 _MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
-# Work limit in steps, some ten seconds, if the caller specifies `effort`, the factor on this limit.
-# A wave of the torque takes a fifth of the work of a step, as does a product of two series on the
-# tape of a torque that depends on the state.
+# Work limit in steps, some ten seconds, on which `effort` is a factor. A wave of the torque takes a
+# fifth of the work of a step, as does a product of two series on the tape of a recorded torque.
 _ORDINARY_STEPS = 20_000
-# After _FIRST_STEPS steps, a small part of a second, their mean length shows whether the limit will
-# be exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
+# The mean length of the first steps shows in a fraction of a second whether the limit will be
+# exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# Largest difference of a derivative and that of its series at the end of a step, times the step,
-# over the local tolerance. A series that converges as its last terms promise stays below.
+# Largest difference between a derivative and the derivative of its series at the end of a step,
+# times the step, over the local tolerance. A series that converges as its last terms do is below.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
-# If the number of steps grows with time to a higher power than this, the forecast uses that power.
+# If the number of steps grows with a higher power of time than this, the forecast uses that power.
 _GROWING = Decimal("1.3")
 
 
@@ -43,7 +42,7 @@ def taylor_series(
     effort: float | None,
     start: Row | None = None,
 ) -> list[Row]:
-    """Return a row of omega, velocity and attitude at each of `times` (s).
+    """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     Rows are missing from where omega grows without bound or the torque is singular. The quaternion
     has the norm of the scene's. `coefficients` are A, B, C; `order` is the degree, larger for high
@@ -52,7 +51,7 @@ def taylor_series(
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     if equations.least_order > order:
-        # Two integrations with different orders still have different orders.
+        # The caller compares integrations of different orders, which must remain different.
         order = equations.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
     at_end = _Equations(scene, coefficients, velocity) if is_recorded else equations
@@ -117,8 +116,8 @@ class _Limit:
     def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
         """Raise InputError if the number of steps, so far or by forecast, exceeds the limit.
 
-        `step` does not count the `stops` that ended early at a change of a table; `begin`, `length`
-        (of the next step) and `rest` are in s.
+        `stops` counts the steps that ended early at a change of a table, and `step` all others.
+        `begin`, `length` (of the next step) and `rest` are in s.
         """
         if step + stops >= self._most:
             self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
@@ -129,7 +128,7 @@ class _Limit:
         elif self._effort is not None and 2 * step >= self._next:
             if step >= self._next:
                 needed = self._forecast(step, abs(begin), rest)
-                # Steps become shorter where omega grows without bound. Their mean length is then
+                # Where omega grows without bound, steps become shorter, and their mean length is
                 # unsuitable for a forecast.
                 shrinks = 10 * abs(length) * step < abs(begin)
                 if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
@@ -141,9 +140,9 @@ class _Limit:
     def _forecast(self, step: int, begin: Decimal, rest: Decimal) -> Decimal:
         """Return the expected number of steps until the end.
 
-        `begin` (s) is the time after `step` steps, `rest` (s) the time left. The mean length is
-        assumed to remain; if the steps so far grew like time to a power above 1.3, that power, at
-        most 3.
+        `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
+        is assumed to remain. If the number of steps grew with a power of time above 1.3, this
+        power, at most 3, is extrapolated.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -165,7 +164,7 @@ class _Limit:
 
 
 def _torque_work(scene: Scene) -> int:
-    """Return the work for the torque in each step, in fifths of a step without torque."""
+    """Return the work for the torque, in fifths of a step without torque."""
     if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
         return series_products(scene.torque.tape)
     law = _law_of(scene)
@@ -179,10 +178,10 @@ def _law_of(scene: Scene) -> TorqueLaw:
 
 
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
-    """Return the length (s), at most `rest`, of the step with small last two Taylor terms.
+    """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
 
-    They are at most `tolerance` times the largest absolute value of the first `leading` unknowns
-    or, if these are 0, relative to the first Taylor terms that are not.
+    They are at most `tolerance` times the largest of the first `leading` unknowns or, if these are
+    0, of their first nonzero Taylor terms.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -201,7 +200,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest absolute Taylor coefficient k of the first `unknowns` unknowns, or all."""
+    """Return the largest absolute Taylor coefficient k of the first (or all) unknowns."""
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
@@ -229,7 +228,7 @@ def _is_continued(
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
-    A pulse of the torque within the step may be too small to be seen at its beginning.
+    A pulse of the torque within the step may be invisible at its beginning.
     """
     slopes = _derivatives(series, length)
 
@@ -252,16 +251,15 @@ def _is_continued(
 
 
 def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
-    """Return the exact moments of inertia (kg m2), or 1 for a body by coefficients."""
+    """Return the exact moments of inertia (kg m2), or 1 for a body with coefficients."""
     return scene.exact_moments or (Fraction(1), Fraction(1), Fraction(1))
 
 
 class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
-    With `velocity`, dV/dt = F/m - omega x V is added; with an attitude, dq/dt = q (0, omega)/2. For
-    an inertia that changes the equations are (I omega)' = N - omega x (I omega), and `coefficients`
-    (A, B, C) are not used.
+    `velocity` adds dV/dt = F/m - omega x V; an attitude adds dq/dt = q (0, omega)/2. For a changing
+    inertia the equations are (I omega)' = N - omega x (I omega), without `coefficients` (A, B, C).
     """
 
     def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
@@ -272,14 +270,14 @@ class _Equations:
         else:
             self._law = _law_of(scene)
         self._changing = scene.changing
-        # The equations of an inertia that changes take the torque itself.
+        # The equations of a changing inertia contain the torque, not divided by moments.
         exact = divisors(scene) if scene.changing is None else (Fraction(1),) * 3
         self._moments = [Decimal(x.numerator) / x.denominator for x in exact]
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
-        """Return the Taylor coefficients 0 ... order of every unknown around `time` (s).
+        """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
 
         Where a table changes, they hold after `time` if `forward`, else before.
         """
@@ -288,7 +286,7 @@ class _Equations:
         inertia = self._inertia_series(time)
         momentum: list[Row] = [[], [], []]
         for k in range(order):
-            # Cauchy products of the coefficients 0 ... k.
+            # Reversed once for all Cauchy products.
             backward = [list(reversed(each)) for each in series]
             if inertia:
                 for each, row in zip(momentum, inertia, strict=True):
@@ -312,7 +310,7 @@ class _Equations:
         return series
 
     def _inertia_series(self, time: Decimal) -> list[list[Row]]:
-        """Return Taylor coefficients of a changing inertia around `time` (s), else []."""
+        """Return the Taylor coefficients of a changing inertia around `time` (s), else []."""
         if self._changing is None:
             return []
         return [[_moved(each, time) for each in row] for row in self._changing.elements]
@@ -326,7 +324,7 @@ class _Equations:
         return length if self._tape is None else self._tape.reach(length)
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the next time (s) in the direction at which a table changes, or None."""
+        """Return the time (s) of a table's next change, or None; before `time` unless `forward`."""
         return None if self._tape is None else self._tape.next_change(time, forward)
 
     def is_singular_before(self, offset: Decimal) -> bool:
@@ -336,11 +334,7 @@ class _Equations:
     def _torque_series(
         self, time: Decimal, order: int, series: list[Row], forward: bool
     ) -> Callable[[int], Row]:
-        """Return a function for Taylor coefficient k of the torque over the moments.
-
-        Calls are with k = 0, 1 ... `order` - 1, when `series` has the coefficients 0 to k of the
-        unknowns.
-        """
+        """Return a function for coefficient k of torque over moments, called with k = 0, 1, ..."""
         if self._tape is not None:
             tape, moments = self._tape, self._moments
             tape.begin(time, series[:3], series[-4:] if self._attitude else [], forward)
@@ -393,8 +387,8 @@ def _rates_by_momentum(
 ) -> Row:
     """Return Taylor coefficient k of the derivative of omega, from L' = N - omega x L.
 
-    `torque` is coefficient k of N; `momentum`, `series` and `inertia` have 0 to k of L = I omega,
-    omega and I, and `backward` has omega's reversed.
+    `torque` is coefficient k of N. `momentum`, `series` and `inertia` have coefficients 0 to k of
+    L = I omega, omega and I; `backward` has those of omega reversed.
     """
     right = []
     for i in range(3):
@@ -409,7 +403,7 @@ def _rates_by_momentum(
         )
         right.append(push - len(backward[i]) * others)
     first, second, third = ([each[0] if each else Decimal(0) for each in row] for row in inertia)
-    # Cramer's rule; the digits that it loses are among those beyond binary64.
+    # Cramer's rule loses digits only beyond those of binary64.
     determinant = _triple(first, second, third)
     return [
         _triple(right, second, third) / determinant,
@@ -427,10 +421,7 @@ def _triple(x: Row, y: Row, z: Row) -> Decimal:
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
-    """Return Taylor coefficient k of q (0, omega)/2.
-
-    `q` has the coefficients 0 to k of its components, `omega` those from k to 0.
-    """
+    """Return coefficient k of q (0, omega)/2, from those of q, and of omega in reverse."""
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-product(b, x) - product(c, y) - product(d, z)) / 2,

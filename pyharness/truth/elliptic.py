@@ -1,7 +1,7 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike Taylor series, it loses no digits with time, and takes no more work for many flips near the
-separatrix. It shares no code with the closed form that it checks, and uses Landen's transformation.
+Unlike Taylor series, it loses no digits with time, and many flips near the separatrix take no more
+work. It uses Landen's transformation, and shares no code with the closed form that it checks.
 """
 
 import decimal
@@ -15,16 +15,16 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.decimal_series import Row
 
-# Digits of the arithmetic, in addition to the digits that the squares of small components need.
+# Digits of the arithmetic, beside those that the squares of small components need.
 _DIGITS = 90
 
 
 def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    Motions are bounded if A, B, C belong to moments, are all 0, or one is above and one below 0;
-    and in steady rotation. If `rounded`, A, B and C are rounded to binary64. Raise InputError if
-    the torque depends on the state, or an unsteady motion may be unbounded.
+    With `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on
+    the state, or an unsteady motion may be unbounded: it is bounded if A, B, C belong to moments,
+    or one is above and one below 0.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
@@ -46,8 +46,8 @@ def _decades(values: Sequence[Fraction]) -> int:
 
 def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) of a motion that is not steady."""
-    # Permute the axes so that the coefficient whose sign differs from the two others is the second.
-    # Make it negative by changing the signs of all coefficients and of all components of omega.
+    # The formulas need the coefficient whose sign differs from the others to be the second, and
+    # negative. Changing the signs of all coefficients and all components of omega is allowed.
     for first, sign in itertools.product(range(3), (1, -1)):
         axes = [first, (first + 1) % 3, (first + 2) % 3]
         a = [sign * coefficients[axis] for axis in axes]
@@ -72,8 +72,8 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
 
-    Multiplied by factors, x' = y z, y' = -z x, z' = x y. Fractions are compared of p = x**2 + y**2
-    and q = z**2 + y**2 (1/s**2), because on the separatrix, p = q, a rounding error would cause
+    Scaled components obey x' = y z, y' = -z x, z' = x y. Fractions p = x**2 + y**2 and q = z**2 +
+    y**2 (1/s**2) are compared, because on the separatrix, p = q, a rounding error would cause
     flips.
     """
     s1, s2, s3 = (abs(each) for each in a)
@@ -92,10 +92,7 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
 
 
 def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) if the first or third coefficient is 0.
-
-    That component is constant; the others move on an ellipse. The second coefficient is negative.
-    """
+    """Return omega (rad/s) at `time` (s) for a first or third coefficient 0, a negative second."""
     axis = 0 if not a[0] else 2
     other = 2 - axis
     # With u the component about the axis `other` and v the component about the second axis,
@@ -112,10 +109,10 @@ def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
 
 
 def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
-    """Return x, y, z at `time` (s), where x' = y z, y' = -z x, z' = x y.
+    """Return x, y, z (1/s) at `time` (s), where x' = y z, y' = -z x, z' = x y.
 
-    `start` is in 1/s, with z not 0. p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p.
-    The solution uses the addition theorems of sn, cn and dn.
+    In `start` z is not 0. p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p. The solution
+    uses the addition theorems of sn, cn and dn.
     """
     x, y, z = start
     sign = -1 if z < 0 else 1
@@ -150,7 +147,7 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         levels.append(k1)
         u = u / (1 + k1)
         complement = 2 * complement.sqrt() / (1 + complement)
-    # The remaining modulus is so small that its square, which alone has an effect, is negligible.
+    # Only the square of the remaining modulus has an effect, and it is negligible.
     sn, cn = sine_cosine(u / (1 + k1))
     dn = Decimal(1)
     levels.append(k1)

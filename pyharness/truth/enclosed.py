@@ -10,7 +10,7 @@ from pyharness.model.scene import Scene
 
 
 class Balls(NamedTuple):
-    """The middles of balls as exact fractions, and one radius for all."""
+    """Balls with exact middles and one common radius."""
 
     middle: tuple[Fraction, ...]
     radius: Fraction
@@ -18,16 +18,15 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the solution of one scene at requested times.
+    """Balls that contain the solution of one scene at requested times; None if not requested.
 
-    The attitude is a unit quaternion, scalar first. The transition matrix has the derivatives of
-    omega, and of the quaternion without normalisation, by omega at time 0, row by row. What was not
-    requested is None.
+    The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
+    derivatives of omega, and of the quaternion without normalisation, by omega at time 0.
     """
 
     time: tuple[float, ...]  # s
     omega: tuple[Balls, ...]  # rad/s
-    how: str  # a text that states how the balls were found
+    how: str  # names the method of the proof
     steps: int = 0  # 0 for a solution in closed form
     attitude: tuple[Balls, ...] | None = None
     velocity: tuple[Balls, ...] | None = None  # m/s
@@ -36,13 +35,13 @@ class Enclosure:
 
     @property
     def radius(self) -> float:
-        """A bound of the radius of all balls of omega (rad/s)."""
+        """The largest radius of the balls of omega (rad/s), rounded up."""
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a dictionary for JSON for each time, decimals as strings.
+        """Return a JSON dictionary for each time, with decimals as strings.
 
-        Each radius includes the rounding error.
+        Each radius includes the rounding error of the decimals.
         """
         rows = []
         for n, time in enumerate(self.time):
@@ -56,7 +55,7 @@ class Enclosure:
 
 
 def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
-    """Return an enclosure with the rotational energy, if the scene has moments."""
+    """Return the enclosure with the rotational energy (J), if the scene has moments."""
     if scene.moments is None:
         return found
     moments = scene.exact_moments or ()
@@ -70,21 +69,21 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
 
 
 def row_of(time: float, omega: Balls) -> dict[str, Any]:
-    """Return balls of omega at `time` (s) for JSON, rounded outward."""
+    """Return the balls of omega at `time` (s) as a JSON dictionary."""
     texts, radius = decimals(omega)
     return {"time": time, "omega": texts, "radius": radius}
 
 
 def decimals(balls: Balls) -> tuple[list[str], float]:
-    """Return middles as decimal strings, and a radius that includes their rounding."""
+    """Return middles as decimal strings, and a radius that includes their rounding errors."""
     digits = _digits(balls.radius)
     radius = rounded_up(balls.radius + Fraction(1, 2 * 10**digits))
     return [_decimal(x, digits) for x in balls.middle], radius
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits that is at least x >= 0."""
-    # One of the factors exceeds the rounding errors of the conversion to a decimal string.
+    """Return a binary64 number of four digits that is at least `x`, which is not negative."""
+    # One factor exceeds the rounding errors of the conversion to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
     above = math.nextafter(float(x), math.inf)
@@ -92,9 +91,10 @@ def rounded_up(x: Fraction) -> float:
 
 
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
-    """Return the largest radius over the one that is allowed.
+    """Return the largest ratio of a radius to the allowed radius.
 
-    The allowed radius is 10**-digits, times the largest component of omega if it exceeds 1 rad/s.
+    The allowed radius is 10**-digits rad/s, times the largest component of omega if that exceeds 1
+    rad/s.
     """
     largest = Fraction(0)
     for middle, radius in omega:

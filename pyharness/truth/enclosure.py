@@ -1,7 +1,7 @@
-"""Proved enclosures: balls that contain the true solution of a scene.
+"""Proved enclosures: balls that contain the solution of a scene.
 
-The provers are a closed form for torque-free motion (`enclosure_free`), Taylor steps in integers
-for torques of time alone (`certificate`), and in balls for all others (`enclosure_steps`). The
+Torque-free motion is proved in closed form (`enclosure_free`), torques of time alone by Taylor
+steps in integers (`certificate`), and all others by Taylor steps in balls (`enclosure_steps`). The
 first and the last need python-flint.
 """
 
@@ -20,7 +20,7 @@ MOST_DIGITS = 1000
 
 
 def can_enclose(scene: Scene) -> bool:
-    """Return whether the installed libraries suffice for a scene."""
+    """Return whether the installed libraries suffice to enclose a scene."""
     return _has_flint() or (has_certificate(scene) and scene.attitude is None)
 
 
@@ -34,15 +34,15 @@ def enclose(
     effort: float = 1.0,
     progress: Progress = no_progress,
 ) -> Enclosure:
-    """Return balls that contain the true solution of a scene at requested times.
+    """Return balls that contain the solution of a scene at requested times.
 
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
     10**-digits rad/s, times the largest component of omega (for a closed form, of the initial one)
-    if that exceeds 1 rad/s. `velocity` (m/s) and `transition` request more; the attitude and the
-    rotational energy are included if the scene has attitude and moments. `progress` gets the
-    percentage of the last time, 100, and the time. `effort` is a factor on the limit of the number
-    of steps. Raise InputError if the times are not in order, python-flint is missing, the torque is
-    opaque, the solution can't be enclosed up to the last time, or the limit is exceeded.
+    if that exceeds 1 rad/s. `velocity` (m/s) and `transition` request more; attitude and rotational
+    energy are included if the scene has attitude and moments. `progress` gets the percentage of the
+    last time, 100, and the time as text. `effort` is a factor on the limit of steps. Raise
+    InputError if the times are not in order, python-flint is missing, the torque is opaque, the
+    solution can't be enclosed up to the last time, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:
@@ -83,10 +83,7 @@ def _in_closed_form(scene: Scene, times: Sequence[float], digits: int) -> Enclos
 
 
 def _is_bounded(scene: Scene) -> bool:
-    """Return whether moments are constant, or coefficients allow only bounded motions.
-
-    A body with coefficients has no attitude in closed form.
-    """
+    """Return whether torque-free motion is bounded, and has a closed form with its attitude."""
     if scene.coefficients is not None:
         signs = {(a > 0.0) - (a < 0.0) for a in scene.coefficients}
         return scene.attitude is None and (signs == {0} or signs >= {1, -1})

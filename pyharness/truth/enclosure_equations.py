@@ -1,4 +1,4 @@
-"""The equations of motion of a scene, for any numbers of `balls`."""
+"""Equations of motion of a scene, for all number types of `balls`."""
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
@@ -19,16 +19,16 @@ from pyharness.truth.balls import ball, functions_at
 from pyharness.truth.integer_series import exact_body
 from pyharness.truth.scales import scales_of
 
-# The right-hand side f(t, y): the derivatives of all unknowns at a time (s) and a state.
+# The right-hand side f(t, y): derivatives of all unknowns at a time (s) and a state.
 Rates = Callable[[Any, Sequence[Any]], list[Any]]
 
 
 class Equations:
     """The equations of motion of a scene, with exact coefficients.
 
-    The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, for
+    The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
     `transition`, the derivatives of omega and attitude by omega at time 0, row by row. `blocks` are
-    the slices of present groups, `scales` the units of errors.
+    the slices of the present groups, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -68,7 +68,7 @@ class Equations:
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
-        """Return the right-hand side for a step from `begin` (s) on, or back."""
+        """Return the right-hand side for a step after (or before) `begin` (s)."""
         functions = functions_at(begin, forward)
 
         def rates(time: Any, state: Sequence[Any]) -> list[Any]:
@@ -124,11 +124,7 @@ class Equations:
 
 
 def _tapes(scene: Scene) -> list[Tape]:
-    """Return the tapes whose sum is the torque of a scene.
-
-    A law has a tape for each wave, because sums of the amplitudes of equal frequencies would be
-    rounded.
-    """
+    """Return tapes with the sum of the torque; a law has one per wave, to avoid rounded sums."""
     law = scene.torque
     if isinstance(law, TorqueLaw):
         laws = [TorqueLaw(law.constant, law.rate, frame=law.frame)]

@@ -1,8 +1,8 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
 Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
-1850; Whittaker, Analytical Dynamics, section 69). Decisions between formulas compare fractions,
-never balls: a scene's binary64 numbers are exact. Import this module only where python-flint is
+1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by comparing fractions, never
+balls: a scene's binary64 numbers are exact. Import this module only where python-flint is
 installed.
 """
 
@@ -35,9 +35,9 @@ def enclose_free(
 ) -> list[Balls]:
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
-    With `attitude`, four more contain the unit quaternion from body to space, scalar first,
-    continuous in time. Radii are at most 10**-`digits`, for omega times the largest initial
-    component if that exceeds 1 rad/s. Raise InputError if there is a torque, motions may be
+    With `attitude`, four more contain the unit quaternion from body to space, scalar first and
+    continuous in time. Radii are at most 10**-`digits`, for omega in rad/s and times the largest
+    initial component if that exceeds 1 rad/s. Raise InputError if there is a torque, motions may be
     unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
     """
     _check(scene, times, digits, attitude)
@@ -92,7 +92,7 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
         omega = omega_on_ellipse(axis, a, w, t)
         if moments is None:
             return omega
-        # The body rotates about the angular momentum, fixed in space, and about its own axis.
+        # The motion is a rotation about the angular momentum and one about the symmetry axis.
         about = list(w)
         about[axis] *= moments[axis] / moments[axis - 1]
         turned = _rotated(begin, [x * t / 2 for x in about])
@@ -104,13 +104,14 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn and n that of the angular momentum L in the body, T the
-    kinetic energy; n e = c dn(u) with c > 0. The attitude is a constant, the rotation by psi about
-    e, and the smallest rotation from n to e. Euler's equations give psi' = (2 T/L + omega e)/(1 + n
-    e). Like dn, psi' has the periods 2K and 4iK' in complex u; its poles, where dn(u) = -1/c, are
-    at u = 2iK' + iy and 2iK' - iy, and the residues of psi'/(2 rate) are 1/2i and -1/2i, or
-    opposite. The derivative of the phase of theta4((u - iy)/2K | 2 tau), or of its conjugate, has
-    the same periods, poles and residues; the difference is thus constant.
+    Let e be the direction of the axis of dn and n the direction of the angular momentum L, both in
+    the body, and T the kinetic energy; n e = c dn(u) with c > 0. The attitude is the product of a
+    constant, the rotation by psi about e, and the smallest rotation from n to e. Euler's equations
+    give psi' = (2 T/L + omega e)/(1 + n e). Like dn, psi' has the periods 2K and 4iK' in complex u;
+    its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy, and the residues of psi'/(2
+    rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of theta4((u - iy)/2K | 2
+    tau), or of its conjugate, has the same periods, poles and residues; the difference is thus
+    constant.
     """
 
     def __init__(
@@ -150,7 +151,7 @@ class _Attitude:
         return [*omega, *product(product(self.begin, about), self._tilt(omega))]
 
     def _turn(self, u: arb) -> acb:
-        """Return exp(i psi/2) without the part that is linear in time."""
+        """Return exp(i psi/2) without the part of psi that is linear in time."""
         if self.orbit.m == 1:
             return _direction(self.factor * (self.slope * (u / 2).tanh()).atan())
         z = u / self.orbit.period
@@ -158,10 +159,7 @@ class _Attitude:
         return value / abs(value)
 
     def _tilt(self, omega: Balls) -> Balls:
-        """Return the quaternion of the smallest rotation from n to e.
-
-        Its angle is less than a right angle, because n e is above 0.
-        """
+        """Return the quaternion of the smallest rotation from n to e, less than a right angle."""
         n = [x * y for x, y in zip(self.weights, omega, strict=True)]
         axis, sign = self.orbit.axes[2], self.orbit.sign
         row = [1 + sign * n[axis], arb(0), arb(0), arb(0)]
@@ -172,7 +170,7 @@ class _Attitude:
 
 
 def _rotated(q: Balls, half: list[Fraction]) -> Balls:
-    """Return `q` times the rotation by the vector 2 `half` (rad); empty if `q` is."""
+    """Return `q` times the rotation by the vector 2 `half` (rad), or [] if `q` is empty."""
     angle = ball(sum((x**2 for x in half), Fraction(0))).sqrt()
     vector = [ball(x) * angle.sinc() for x in half]
     return list(product(q, [angle.cos(), *vector])) if q else []

@@ -13,7 +13,7 @@ Balls = list[arb]
 
 
 def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
-    """Return omega (rad/s) at `t` (s) if the coefficient of `axis` is 0.
+    """Return omega (rad/s) at `t` (s), initially `w`, if the coefficient of `axis` is 0.
 
     That component is constant; the others move on an ellipse.
     """
@@ -27,10 +27,10 @@ def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fractio
 
 
 class Orbit:
-    """A motion that is not steady, with coefficients that are not 0.
+    """A torque-free motion that is not steady, with nonzero coefficients.
 
-    Omega about three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start` +
-    `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` = k**2, and `square` is the square of
+    Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start`
+    + `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` is k**2, and `square` the square of
     the size of dn. On the separatrix m = 1; cn and dn are then sech, and sn is tanh.
     """
 
@@ -86,7 +86,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; any would be right for a reduction."""
+    """Return an integer near the middle of `x`; a reduction is exact with any integer."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 

@@ -1,4 +1,4 @@
-"""The reports of the verb `prove`: enclosures and checked certificates."""
+"""Reports of the verb `prove`: enclosures and checked certificates."""
 
 import json
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _RADIUS = {"omega": "radius"}
 
 
 def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
-    """Return the report of an enclosure; `digits` were requested."""
+    """Return the report of an enclosure; `digits` is the requested number."""
     rows = found.rows()
     lines = [line for row in rows for line in _lines(row)]
     steps = f", {counted(found.steps, 'step')}" if found.steps else ""
@@ -73,7 +73,8 @@ def _lines(row: dict[str, Any]) -> list[list[Any]]:
 def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]]) -> Report:
     """Return the report of checked certificates.
 
-    Each of `found` has a file's name, the certificate or None if it does not hold, and why.
+    An entry of `found` has the file's name, the certificate or None if it does not hold, and the
+    reason.
     """
     verdicts = [
         [name, "not proved", None, why]

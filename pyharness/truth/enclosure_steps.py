@@ -1,12 +1,12 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step a polynomial p approximates the solution of y' = f(t, y), and its residual p' - f(t, p)
-is bounded, in ball arithmetic, on the whole step, however p was found. The vector r of the norms of
-blocks of y - p, such as omega and attitude, obeys r' <= M r + d, d the bounds of the residual. M
-has, on its diagonal, bounds of the logarithmic norms of the diagonal blocks of the Jacobian near p,
-or 0 if negative; elsewhere of the norms of the other blocks. Since M is not negative, r(h) is at
-most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993,
-Solving Ordinary Differential Equations I.
+In each step a polynomial p approximates the solution of y' = f(t, y). Its residual p' - f(t, p) is
+bounded on the whole step in ball arithmetic; the proof does not depend on how p was computed. The
+vector r of the norms of blocks of y - p, such as omega and attitude, obeys r' <= M r + d, where d
+bounds the residual. On its diagonal, M has bounds of the logarithmic norms of the diagonal blocks
+of the Jacobian near p, or 0 if negative; elsewhere, bounds of the norms of the other blocks. Since
+M is not negative, r(h) is at most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of
+Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I.
 """
 
 import math
@@ -27,10 +27,10 @@ from pyharness.truth.balls import ball, balls
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius
 from pyharness.truth.enclosure_equations import Equations, Rates
 
-# The circles, in steps, in which the rest of a power series is bounded by Cauchy's estimate.
+# Radii, in steps, of the circles on which Cauchy's estimate bounds the rest of a power series.
 _CIRCLES = (8, 4, 2)
 _SHORTEST = Fraction(1, 2**400)
-# The tube around p, in which the Jacobian is bounded, is at least this part of the solution thick.
+# Least ratio of the thickness of the tube around p, in which the Jacobian is bounded, to p.
 _TUBE = 2.0**-30
 _LEAST_TUBE = 2.0**-200
 _LENGTH_BITS = 24
@@ -103,7 +103,7 @@ class _NoStepError(Exception):
 
 @dataclass
 class _State:
-    """A middle and the radius of each block's ball in scaled units."""
+    """The middles of the unknowns, and the radius of each block's ball in scaled units."""
 
     time: Fraction
     middle: list[Any]  # exact balls
@@ -124,10 +124,7 @@ def _terms(x: Any, count: int) -> list[Any]:
 
 
 def _expanded(rates: Rates, begin: Any, middle: Sequence[Any], order: int) -> list[list[Any]]:
-    """Return approximate Taylor coefficients 0 to `order` of the solution, as exact balls.
-
-    Each of Picard's iterations adds one coefficient.
-    """
+    """Return Taylor coefficients 0 to `order` as exact balls, one per iteration of Picard."""
     found = [[x] for x in middle]
     for k in range(order):
         ctx.cap = k + 1
@@ -145,7 +142,7 @@ class _Proof:
         self.blocks = equations.blocks
         self.scales = [arb(x) for x in equations.scales]
         self.breaks = [Fraction(x) for x in equations.breaks]
-        # With few digits the precision is less than that of binary64, and the balls are not exact.
+        # With few digits, the precision is below binary64, and these balls are not exact.
         start = [ball(x) for x in equations.start]
         rounding = [x - x.mid() for x in start]
         radii = [self.norm(rounding, block) for block in self.blocks]
@@ -156,7 +153,7 @@ class _Proof:
         return _upper(sum((_upper(abs(x) / s) ** 2 for x, s in parts), arb(0)).sqrt())
 
     def balls(self, attitude: bool) -> list[Balls]:
-        """Return the balls of each group of unknowns, the attitude's normalised."""
+        """Return the balls of each group of unknowns, with the attitude normalised."""
         found = []
         for n, (block, radius) in enumerate(zip(self.blocks, self.state.radii, strict=True)):
             pairs = zip(self.state.middle[block], self.scales[block], strict=True)
@@ -168,7 +165,7 @@ class _Proof:
         return found
 
     def step(self, last: Fraction) -> None:
-        """Take a step, which does not lead beyond `last` (s)."""
+        """Take a step, at most to `last` (s)."""
         state, side = self.state, 1 if self.forward else -1
         rates = self.equations.at(state.time, self.forward)
         begin = ball(state.time)
@@ -193,7 +190,7 @@ class _Proof:
         raise InputError(f"prove: no enclosure is found beyond t = {float(state.time):.6g} s")
 
     def _length(self, terms: list[list[Any]]) -> Fraction:
-        """Return a step (s) with which the last terms are about the tolerance."""
+        """Return a step (s) at which the last Taylor terms are about the tolerance."""
         least = 40.0  # binary logarithm of the longest step
         for block in self.blocks:
             size = max(0.0, *(_log2(each[0]) for each in terms[block]))
@@ -206,7 +203,7 @@ class _Proof:
         return Fraction(mantissa, 2**_LENGTH_BITS) * Fraction(2) ** exponent
 
     def _radii(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
-        """Return bounds of the errors of each block during a step `h` (s)."""
+        """Return bounds of the error of each block during a step `h` (s)."""
         length, state = abs(ball(h)), self.state
         begin = ball(state.time)
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
@@ -249,7 +246,7 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds of the terms from number `count` on of the rates along the polynomials.
+        """Return bounds of the terms from number `count` of the rates along the polynomials.
 
         If the rates are at most M on a disc whose radius is c steps, term number k is at most M
         c**-k at the end of the step, by Cauchy's estimate. The bounds are geometric series.
@@ -262,7 +259,7 @@ class _Proof:
             for each in terms:
                 radius = _upper(_value([arb(0), *(abs(x) for x in each[1:])], around))
                 inputs.append(acb(arb(each[0], radius), arb(0, radius)))
-            # A square contains the circle.
+            # A square contains the disc.
             radius = _upper(around)
             centre = ball(self.state.time)
             found = rates(acb(centre + arb(0, radius), arb(0, radius)), inputs)
@@ -277,7 +274,7 @@ class _Proof:
         return best
 
     def _growth(self, rates: Rates, time: Any, inputs: list[Any]) -> Any:
-        """Return the matrix M of the module's docstring, which bounds the growth of radii (1/s)."""
+        """Return the matrix M of the module's docstring (1/s)."""
         count = len(inputs)
         unit = [[arb(int(i == j)) for j in range(count)] for i in range(count)]
         found = rates(time, [Dual(x, row) for x, row in zip(inputs, unit, strict=True)])

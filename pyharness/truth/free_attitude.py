@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle: a Taylor
-integration over one period suffices. Near the separatrix errors of omega grow exponentially;
-therefore segments start from omega of `elliptic.py`. No code is shared with the closed form that is
-checked.
+In each period of omega the body rotates about the angular momentum by the same angle; one period
+is therefore integrated by Taylor series. Near the separatrix errors of omega grow exponentially;
+segments therefore start from omega of `elliptic.py`. No code is shared with the closed form that
+this module checks.
 """
 
 import decimal
@@ -18,10 +18,10 @@ from pyharness.truth.decimal_series import Row, taylor_series
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import exact_coefficients
 
-# Digits of the arithmetic; thirty of them are correct after 1e6 periods.
+# Digits of the arithmetic; thirty are correct after 1e6 periods.
 _DIGITS = 50
 _ORDER, _TOLERANCE = 44, Decimal("1e-44")
-# Length of a segment in units of 1/rate, in which errors grow by a factor of some e**10 = 2e4.
+# Length of a segment in units of 1/rate; errors grow in it by a factor of some e**10 = 2e4.
 _SEGMENT = 10
 # On the separatrix omega counts as steady where sech(rate * time - u) is below some e**-_SETTLED.
 _SETTLED = 120
@@ -32,9 +32,9 @@ _MOST_RADIANS = 1e5
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    It is continuous in time. The scene must have moments and an attitude. On the separatrix,
-    without period, the motion is integrated until the rotation is steady to all digits. Raise
-    InputError if the integration takes too many steps, or if the torque depends on the state.
+    Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
+    where omega has no period, the motion is integrated until the rotation is steady to all digits.
+    Raise InputError if the integration takes too many steps, or if the torque depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -55,7 +55,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
         whole, rest = divmod(abs(end), period)
         period, rest = period.copy_sign(end), rest.copy_sign(end)
         after_rest, after_period = _followed(scene, [rest, period], rate)
-        # The rotation in space by which one period changes the attitude, whenever it begins.
+        # One period changes the attitude by this rotation in space, whenever it begins.
         turn = list(product(after_period, conjugate(begin)))
         return _unit(list(product(_power(turn, int(whole)), after_rest)))
 
@@ -68,16 +68,15 @@ def period_of(scene: Scene) -> Decimal | None:
 def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
     """Return the rate (1/s) of the elliptic functions, and omega's period (s) or None.
 
-    The period is None on the separatrix. On it and near it perturbations grow by at most some
-    exp(rate * time).
+    The period is None on the separatrix. Perturbations grow by at most some exp(rate * time).
     """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
     lower, upper, both = i[middle] - i[low], i[high] - i[middle], i[high] - i[low]
     gap = energies[low] * lower - energies[high] * upper
-    # With T the kinetic energy and L the angular momentum these are 2 T I_high - L**2 and
-    # L**2 - 2 T I_low; `gap` is 2 T I_middle - L**2.
+    # With kinetic energy T and angular momentum L, `gap` is 2 T I_middle - L**2, `stays` is
+    # 2 T I_high - L**2, and `turns` is L**2 - 2 T I_low.
     stays = energies[low] * both + energies[middle] * upper
     turns = energies[high] * both + energies[middle] * lower
     larger = lower * stays if gap > 0 else upper * turns
@@ -101,8 +100,8 @@ def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
-    # At u = 0, where omega has no component about the middle axis, the energy about the low axis is
-    # this part of the whole.
+    # At u = 0, where omega has no component about the middle axis, the low axis has this part of
+    # the energy.
     part = (i[high] - i[middle]) / (i[high] - i[low])
     return ((2 * _root(sum(energies) * part / energies[low])).ln() + _SETTLED) / rate
 
@@ -127,11 +126,7 @@ def conjugate(q: Row) -> Row:
 
 
 def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
-    """Return the attitude at each of `times` (s), which lead away from 0.
-
-    In a segment of length 1/`rate` errors grow by a factor of some e. Raise InputError beyond the
-    work limit.
-    """
+    """Return the attitude at each of `times` (s), away from 0; raise InputError above the limit."""
     angle = max(map(abs, scene.omega)) * float(abs(times[-1]))
     if angle > _MOST_RADIANS:
         raise InputError(

@@ -1,8 +1,8 @@
 """A second reference, by Taylor series in integer arithmetic.
 
-It shares no code with the first (`truth/reference.py`). Numbers are integers over 2**BITS, in units
-in which the last time is 1 and the largest omega about 1. Sines and cosines of the torque are
-unknowns too, so that no library function is needed.
+It shares no code with `truth/reference.py`. Numbers are integers over 2**BITS, in units in which
+the last time is 1 and the largest omega about 1. Sines and cosines of the torque are unknowns too,
+so that no library function is needed.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,8 @@ BITS = 160
 _ORDER = 36
 _LAST = 60  # most bits of the last Taylor terms of a step, so that they are below 2**-100 units
 _CLOCK = 64  # steps are multiples of 2**-64 of the last requested time
-_MOST_STEPS = 20_000  # the time of a step is a third of a millisecond
-# The unit of omega is guessed. It is accepted if the largest omega is at most 2**_ABOVE and at
-# least 2**-_BELOW units.
+_MOST_STEPS = 20_000  # a step takes a third of a millisecond
+# The guessed unit of omega is accepted if the largest omega is 2**-_BELOW to 2**_ABOVE units.
 _ABOVE, _BELOW = 8, 24
 _MOST_GUESSES = 16
 _LEAST_POWER = -1200  # numbers below 2**_LEAST_POWER are 0 in binary64
@@ -33,7 +32,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of one scene at the requested times, and at many between them."""
+    """The solution of one scene at the requested times, and at many times between."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -42,7 +41,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """The unit of omega must be 2**power times as large."""
+    """The unit of omega must be multiplied by 2**power."""
 
     def __init__(self, power: int) -> None:
         super().__init__()
@@ -50,9 +49,9 @@ class _OtherUnitError(Exception):
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
-    """Return the true solution of a scene at `times` (s).
+    """Return the solution of a scene at `times` (s).
 
-    Before rounding the error is some 1e-29 of the largest omega, times the error amplification.
+    Before rounding, its error is some 1e-29 of the largest omega, times the error amplification.
     """
     power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
     for _ in range(_MOST_GUESSES):
@@ -64,10 +63,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest omega (rad/s) up to `span` (s).
-
-    The larger of the initial omega and a bound of what the torque alone would cause.
-    """
+    """Return a guess of the largest omega (rad/s) up to `span` (s): initial, or by torque alone."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -82,10 +78,7 @@ def _power_of(size: Fraction) -> int:
 
 
 def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
-    """Return the solution, integrated with omega in units of 2**power rad/s.
-
-    Raise _OtherUnitError if the unit is too large or too small.
-    """
+    """Return the solution; raise _OtherUnitError if 2**power rad/s is an unsuitable unit."""
     span = Fraction(times[-1])
     wanted = [Fraction(t) / span for t in times]
     equations = _Equations(scene, span, Fraction(2) ** power)
@@ -135,10 +128,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _evaluate(terms: Series, part: Fraction) -> Fraction:
-    """Return a Taylor series at the fraction `part` of its step.
-
-    `terms` are at the end of the step, in units of 2**-160.
-    """
+    """Return a Taylor series at the fraction `part` of its step; `terms` are at the step's end."""
     fixed = _fixed(part)
     total = 0
     for term in reversed(terms):
@@ -154,7 +144,7 @@ def _fixed(value: Fraction) -> int:
 class _Wave:
     """All torque terms of one frequency, as two unknowns: a sine and a cosine.
 
-    If the angle up to the last time is below 1 rad, the first is the sine divided by this angle, so
+    If the angle at the last time is below 1 rad, the unknown is the sine divided by this angle, so
     that a sine of large amplitude has all its digits.
     """
 
@@ -167,7 +157,7 @@ class _Wave:
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
     """Return the exact divisors of torques, and A, B, C.
 
-    The divisors are the moments (kg m2), or 1 for a body specified by coefficients.
+    The divisors are the moments (kg m2), or 1 for a body with coefficients.
     """
     moments = list(scene.exact_moments or (Fraction(1),) * 3)
     if scene.coefficients is not None:
@@ -176,9 +166,9 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 
 
 class _Equations:
-    """Equations 13-15 of one scene, as recurrences of Taylor terms.
+    """Equations 13-15 of the thesis for one scene, as recurrences of Taylor terms.
 
-    The unit of time is `span`, the last time (s), and that of omega `unit` (rad/s).
+    The unit of time is `span`, the last time (s), that of omega `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:
@@ -214,8 +204,8 @@ class _Equations:
     def expand(self, state: Series, begin: int, length: int) -> list[Series]:
         """Return the Taylor terms of all unknowns at the end of a step.
 
-        `state` is at its beginning. Term k is coefficient k times power k of the step. `begin` and
-        `length` are in units of 2**-64 of the last time.
+        Term k is coefficient k times power k of the step. `state` has the unknowns at the
+        beginning; `begin` and `length` are in units of 2**-64 of the last time.
         """
 
         def stepped(x: int) -> int:

@@ -1,8 +1,8 @@
-"""The reference: the true solution of a scene, with a bound of its error.
+"""Reference solutions of scenes, with bounds of their errors.
 
 A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by the
-Taylor series of equations 13-15 in decimals. It shares no code with the methods that it checks, and
-uses exact Euler coefficients.
+Taylor series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. The
+module shares no code with the methods that it checks.
 """
 
 import decimal
@@ -28,14 +28,14 @@ DIGITS = 40
 _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _HALF_ULP = 2.0**-53
-# The precise integrations differ by little more than their rounding errors, and by chance by less
-# than the error: at most 2.5 times less in 1500 scenes (tests.campaigns.proved).
+# The precise integrations differ by little more than their rounding errors. Their difference may by
+# chance be less than the error, at most 2.5 times in 1500 scenes (tests.campaigns.proved).
 _BY_CHANCE = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The solution at requested times, rounded to binary64, with its error."""
+    """The solution at requested times, rounded to binary64, and its estimated error."""
 
     time: Array  # shape (n,), s; the requested times, up to the last one with finite omega
     omega: Array  # shape (n, 3), rad/s
@@ -52,12 +52,12 @@ class Reference:
 
     @property
     def angle_error(self) -> float:
-        """Return a bound of the attitude's error (rad), estimated plus rounding."""
+        """Return a bound of the attitude's error (rad): the estimate plus rounding."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return a bound of omega's error (rad/s), estimated plus rounding of the largest."""
+        """Return a bound of omega's error (rad/s): the estimate plus the largest rounding error."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 
@@ -69,15 +69,15 @@ def reference(
     precise: bool = False,
     effort: float | None = None,
 ) -> Reference:
-    """Return the true solution of `scene` at `times` (s).
+    """Return the reference solution of `scene` at `times` (s).
 
-    The times have one sign and lead away from 0; the first may be 0. If `precise`, the series is
-    accurate to 1e-25 before rounding, unless errors are amplified too much. The error is the
-    largest difference of two integrations with different order and steps; four times that if
-    `precise`. `effort` is a factor on a work limit of some ten seconds, judged by the pace of the
-    first steps; None means 100 000 steps. Attitudes are always by the series. Raise InputError if
-    the times are not in order, a changing moment reaches 0, or the series needs too many steps. A
-    torque that depends on the state must be recorded; the result ends before it is singular.
+    The times have one sign and lead away from 0; the first may be 0. The estimated error is the
+    largest difference of two integrations with different order and steps; with `precise`, four
+    times that. A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified
+    too much. `effort` is a factor on a work limit of some ten seconds, forecast from the first
+    steps; None means 100 000 steps. Attitudes always result from the series. A torque that depends
+    on the state must be recorded; the rows end before it is singular. Raise InputError if the times
+    are not in order, a changing moment reaches 0, or the series is impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -119,7 +119,6 @@ def reference(
 
 
 def _check_torque(scene: Scene) -> None:
-    """Raise InputError if the torque depends on the state without Taylor series."""
     if not isinstance(scene.torque, StateTorque):
         return
     if scene.torque.tape is None:
@@ -134,9 +133,9 @@ def _check_torque(scene: Scene) -> None:
 
 
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
-    """Return omega (rad/s) in closed form of a sphere or free symmetric body, else None.
+    """Return omega (rad/s) of a sphere or a torque-free symmetric body in closed form, else None.
 
-    It has as many digits after the decimal point as the current arithmetic has digits: an angle of
+    It has as many digits after the decimal point as the current arithmetic has digits; an angle of
     1e41 rad is computed with some 41 more.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
@@ -147,7 +146,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return a bound of the digits before the point of all numbers up to `time` (s)."""
+    """Return an upper bound of the digits before the point of all numbers up to `time` (s)."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega
@@ -170,8 +169,7 @@ def _known_rows(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
         return None
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
-        # The coefficients of the other two axes are opposite numbers. Therefore the components of
-        # omega about these axes move on a circle.
+        # With opposite coefficients, the two other components of omega move on a circle.
         if coefficients[axis] == 0 and coefficients[j] == -coefficients[k]:
             omega = [Decimal(w) for w in scene.omega]
             rate = coefficients[j] * omega[axis]
@@ -207,7 +205,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
 
 
 def exact_coefficients(scene: Scene) -> Row:
-    """Return A, B, C to all digits of the current decimal arithmetic."""
+    """Return A, B, C to all digits of the current decimal context."""
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)

@@ -1,4 +1,4 @@
-"""The units in which proofs measure errors of omega."""
+"""Units in which proofs measure errors of omega."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ _LEAST = 1e-4  # of the square of the largest unit
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units of the three components of omega, the largest of them 1.
 
-    They are the roots of abs(A), abs(B) and abs(C) over the largest, and at least 0.01. The
+    They are the square roots of abs(A), abs(B) and abs(C) over the largest, and at least 0.01. The
     logarithmic norm is then 0 for rotations about the axes of the largest and smallest moment,
     unless a unit is 0.01.
     """

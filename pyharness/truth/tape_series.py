@@ -12,21 +12,20 @@ from typing import NamedTuple
 from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
 from pyharness.truth.decimal_functions import Row, product, sine_cosine
 
-# An angle beyond the range of binary64 has no sine in any method. Its reduction would take as many
-# digits as the angle has.
+# A larger angle has no sine in any method; its reduction would take as many digits as it has.
 _LARGEST_ANGLE = Decimal("1e308")
 # An exponential below exp(-_INVISIBLE) affects no digit of a result, whatever its factor.
 _INVISIBLE = 400
-# Part of the distance of a divisor's zero that a step may be long.
+# Largest ratio of a step to the distance of a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
-# Products of at least so many factors are checked. Those of two show in any series.
+# Products of at least this many factors are checked; products of two show in any series.
 _MANY_FACTORS = 3
-# The order is this multiple of the number of factors, so that a product shows although its factors
-# and their derivatives are 0; but at most the following order.
+# The order is this multiple of the number of factors, but at most _MOST_ORDER, so that a product
+# shows in the series although its factors and their derivatives are 0.
 _ORDER_A_FACTOR = 4
 _MOST_ORDER = 100
-# Relative accuracy with which the square of a root's polynomial must agree with its operand, so
-# that a negative value of the polynomial is not merely its truncation error.
+# If the square of a root's polynomial agrees with the operand to this relative accuracy, a negative
+# value of the polynomial is not merely its truncation error.
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
@@ -36,7 +35,7 @@ class _Power(NamedTuple):
     """A product of many factors.
 
     `factors` counts how often each slot is a factor. `scale` is the decimal logarithm of the
-    product's largest coefficient. `divisors` are the slots beside which it is small or large.
+    product's largest coefficient. `divisors` are the slots relative to which it is small or large.
     """
 
     factors: Counter[int]
@@ -44,14 +43,15 @@ class _Power(NamedTuple):
     divisors: set[int]
 
 
-# A linear combination of slots: its constant, and pairs of a coefficient and a slot.
+# A linear combination of slots: the constant, and pairs of coefficient and slot.
 _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
 
 def series_products(tape: Tape) -> int:
     """Return the number of products of two series in each order of a tape.
 
-    A sine with its cosine, and a hyperbolic tangent with its derivative, take two; a table none.
+    A sine with its cosine, and a hyperbolic tangent with its derivative, take two; a table takes
+    none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}
@@ -63,19 +63,19 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the order that shows the tape's powers.
+    the lowest order at which the tape's powers show.
     """
 
     def __init__(self, tape: Tape) -> None:
         self._operations = [(each, _sum(each.linear)) for each in tape.operations]
         self._outputs = [_sum(each) for each in tape.outputs]
-        # Each table, by the slot of its operation, and the exact times at which its pieces begin.
+        # By slot: the table, and the exact times at which its pieces begin.
         self._breaks = {
             slot: (table, [Decimal(time) for time in table.breaks])
             for slot, (_, _, _, table) in enumerate(tape.operations, N_INPUTS)
             if table is not None
         }
-        # The times at which a table changes. Its first piece holds before its first break too.
+        # The first piece of a table also holds before its first break.
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
         self._powers, largest = _powers(tape)
@@ -87,8 +87,9 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        The caller extends `omega` and `attitude`, the unknowns' coefficients; the latter may be
-        empty. At a break of a table the later piece is expanded if `forward`, else the earlier one.
+        The caller extends `omega` and `attitude`, the Taylor coefficients of the unknowns;
+        `attitude` may be empty. At a break of a table the later piece is expanded if `forward`,
+        else the earlier one.
         """
         self._order = 0
         self._tables = {
@@ -96,17 +97,17 @@ class TapeSeries:
         }
         self._slots = [[time], *omega, *(attitude or [[] for _ in range(4)])]
         self._slots += [[] for _ in self._operations]
-        # For each operand of a sine or a cosine: the series of the sine, and of the cosine.
+        # By operand: the series of its sine and cosine.
         self._waves: dict[int, tuple[Row, Row]] = {}
-        # For each operand of a hyperbolic tangent: the series of 1 minus its square.
+        # By operand: the series of 1 minus the square of its hyperbolic tangent.
         self._bells: dict[int, Row] = {}
-        # For each operand of a transcendental function: coefficient j times j.
+        # By operand: coefficient j times j, from j = 1.
         self._slopes: dict[int, Row] = {}
 
     def next(self) -> Row:
-        """Return the next Taylor coefficients of the three outputs, from number 0.
+        """Return the next Taylor coefficient, from number 0, of each of the three outputs.
 
-        The unknowns must have the coefficients up to the same number. Raise ArithmeticError if an
+        The unknowns must have the coefficient of the same number. Raise ArithmeticError if an
         operation is singular.
         """
         k = self._order
@@ -123,7 +124,7 @@ class TapeSeries:
         return sum((factor * self._slots[slot][k] for factor, slot in terms), start)
 
     def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
-        """Return Taylor coefficient k of an operation, whose series has 0 to k - 1."""
+        """Return Taylor coefficient k of an operation; its series has 0 to k - 1."""
         kind, operands, _, table = operation
         if kind == "linear":
             return self._combined(linear, k)
@@ -175,19 +176,19 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return the coefficients 1 to k of a slot, each times its number."""
+        """Return coefficients 1 to k of a slot, each times its number."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
         return slope
 
     def reach(self, length: Decimal) -> Decimal:
-        """Return the step (s), reduced so that every operation's series converges.
+        """Return the step (s), reduced so that the series of every operation converges.
 
-        An exponential, or a hyperbolic tangent's derivative, may be invisible at the beginning of a
-        step and large a little later: its argument changes by at most half the order, unless it
-        stays invisible. So do the terms of a product of many factors, in the mean. A divisor has no
-        zero in the circle around the beginning.
+        An exponential, or the derivative of a hyperbolic tangent, may be invisible at the beginning
+        of a step and large a little later. Its argument therefore changes by at most half the
+        order, unless the function stays invisible; so do the terms of a product of many factors, in
+        the mean. A divisor has no zero in the circle around the beginning.
         """
         for operation, _ in self._operations:
             most = self._largest_change(operation)
@@ -204,9 +205,9 @@ class TapeSeries:
         return length
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
-        """Return whether a product is visible in a step, but perhaps not in the terms computed.
+        """Return whether a product is visible in a step, but perhaps not in the computed terms.
 
-        The mean order of a product's terms is the sum of those of its factors.
+        The mean order of a product's terms is the sum of the mean orders of its factors.
         """
         order, size = Decimal(0), power.scale
         for slot, count in power.factors.items():
@@ -221,7 +222,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return by how much an operation's last operand may change in a step, or None."""
+        """Return by how much an operation's last operand may change in a step; None is no limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -233,14 +234,15 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the next time (s) after (or before) `time` at which a table changes, or None."""
+        """Return the time (s) of a table's next change, or None; before `time` unless `forward`."""
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
         """Return whether a square root reaches 0 up to `offset` (s) from the expansion.
 
-        Beyond a double zero the series is the negative of the root: that of sqrt(x**2) is x or -x.
+        Beyond a double zero the series is the negative of the root: the series of sqrt(x**2) is x
+        or -x.
         """
         for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
             if operation.kind == "sqrt":
@@ -252,10 +254,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products that are no factors of larger ones, and the most factors.
-
-    A sum has as many factors as one of its terms.
-    """
+    """Return the products that are no factors of larger ones, and the most factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}
@@ -267,6 +266,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
         else:
             scales.update((each, max(1.0, scales.get(each, 0.0))) for each in operands)
             terms = linear.terms if linear else ()
+            # A sum counts as many factors as its longest term.
             numbers[slot] = max((numbers.get(each, 1) for each, _ in terms), default=1)
     sums = [each.linear for each in tape.operations if each.linear] + list(tape.outputs)
     for each, factor in (term for linear in sums for term in linear.terms):
@@ -281,7 +281,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return the divisors and arguments of roots of which each slot is a part."""
+    """Return by slot the divisors, and arguments of roots, that contain it."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -304,7 +304,7 @@ def _sum(linear: Linear | None) -> _Sum:
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
-    """Return coefficients 0 to 3 of the piece of a table from (or until) `time` (s)."""
+    """Return coefficients 0 to 3 of the piece of a table after (or before) `time` (s)."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece])
     s = time - breaks[piece]

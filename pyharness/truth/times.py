@@ -1,4 +1,4 @@
-"""The order of the times at which a reference or a proof is requested."""
+"""Order of the times at which a reference or a proof is requested."""
 
 import itertools
 import math
@@ -10,7 +10,7 @@ from pyharness.model.errors import InputError
 def check_order(times: Sequence[float], who: str) -> None:
     """Raise InputError unless times are finite, of one sign, and lead away from 0.
 
-    The first time may be 0. The text `who` names the computation in the message.
+    The first time may be 0. `who` names the computation in the message.
     """
     if not all(map(math.isfinite, times)):
         raise InputError(f"{who}: a time is not finite; allowed: finite numbers, in seconds")

@@ -10,14 +10,14 @@ SCHEMA = 1
 
 
 def write(report: Report) -> str:
-    """Return a report's data as one line of JSON, with the number of its schema."""
+    """Return a report's data as one line of JSON, with the schema number."""
     return json_text({"schema": SCHEMA, **report.record()})
 
 
 def json_text(record: dict[str, Any], indent: int | None = None) -> str:
     """Return strict JSON, in one line or indented.
 
-    Floats can be read back exactly; a number that is not finite becomes null.
+    Floats can be read back exactly; NaN and infinity become null.
     """
     try:
         return json.dumps(record, allow_nan=False, indent=indent) + "\n"

@@ -8,7 +8,7 @@ from pyharness.model.report import Report
 def write(report: Report) -> str:
     """Return a test suite with a case for each check.
 
-    A failed one has the reason, and the command that repeats it.
+    A failed case has the reason, and the command that repeats the check.
     """
     suite = xml.Element(
         "testsuite",

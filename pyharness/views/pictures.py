@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
-# Without a fixed salt, or with a date, a file would have different bytes in every run.
+# Without a fixed salt, or with a date, the bytes would differ in every run.
 _REPRODUCIBLE: dict[Any, str] = {"svg.hashsalt": "pyharness", "svg.fonttype": "path"}
 _DATES: dict[str, dict[Any, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 # Letters of a title in font size 10.
@@ -24,7 +24,7 @@ _MOST_LINES = 4
 
 
 def check_picture(path: str) -> None:
-    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is there."""
+    """Raise InputError unless `path` is .png, .svg or .pdf, and matplotlib is installed."""
     if _form(path) not in FORMATS:
         raise InputError(f"--plot '{path}': unknown picture format; allowed: {', '.join(FORMATS)}")
     check_matplotlib("--plot")
@@ -41,7 +41,7 @@ def numbers_beside(path: str) -> str:
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return images at `paths`, and one CSV beside the first, by path, unwritten."""
+    """Return, by path, the bytes of images at `paths` and of a CSV beside the first."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}

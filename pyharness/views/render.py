@@ -1,4 +1,4 @@
-"""Choice of the output format; each has a module of the same name here."""
+"""Choice of the output format; each has a module of the same name."""
 
 from importlib import import_module
 

@@ -24,13 +24,13 @@ def _lines(section: Section) -> list[str]:
 
 
 def paragraph(told: str | Field) -> list[str]:
-    """Return a paragraph's lines, wrapped unless it is a Line; a Field has a label."""
+    """Return the lines of a paragraph; a Line is not wrapped, a Field has a label."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Field):
         indent = " " * len(told.label)
         return textwrap.wrap(told.text, _WIDTH, initial_indent=told.label, subsequent_indent=indent)
-    # A name with a hyphen is not broken, because users may copy or type it.
+    # Users may copy names with hyphens, which must not be broken.
     lines = textwrap.wrap(told, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)
     return lines or [""]
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from pyharness.cli import say
 from pyharness.model.errors import InputError
+from pyharness.model.report import format_duration
 
 _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
@@ -29,11 +30,9 @@ def check_count(option: str, count: int, least: int, cost: Cost) -> None:
 
     Print a forecast if they take more than a minute.
     """
-    from pyharness.sweep.forecast import duration
-
     if not least <= count <= cost.most:
         shown = str(count) if abs(count) < 10**18 else "a number of more than 18 digits"
-        longest = duration(cost.most * cost.seconds)
+        longest = format_duration(cost.most * cost.seconds)
         raise InputError(
             f"{option}: {shown}; allowed: a whole number from {least} to {cost.most}, which takes "
             f"about {longest}"
@@ -42,6 +41,6 @@ def check_count(option: str, count: int, least: int, cost: Cost) -> None:
     if seconds > _WORTH_SAYING:
         memory = max(1.0, count * cost.n_bytes / 1e6)
         say(
-            f"pyharness: {count} {cost.what} take about {duration(seconds)} and {memory:.0f} MB of "
-            "memory\n"
+            f"pyharness: {count} {cost.what} take about {format_duration(seconds)} and "
+            f"{memory:.0f} MB of memory\n"
         )

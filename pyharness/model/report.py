@@ -49,6 +49,32 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
+def format_duration(seconds: float) -> str:
+    """Return a duration as text, in seconds to days."""
+    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return (
+                f"{seconds / unit:.2g} {name}"
+                if seconds < 100.0
+                else f"{seconds / unit:.0f} {name}"
+            )
+    return f"{seconds / 86400.0:.0f} days"
+
+
+def format_count(number: int) -> str:
+    """Return a count as text, with four digits from ten million on."""
+    return str(number) if number < 10**7 else f"{float(number):.4g}"
+
+
+def format_bytes(number: float) -> str:
+    """Return a number of bytes as text, as in 1.25 MB."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if number < 1000.0:
+            return f"{number:.3g} {unit}"
+        number /= 1000.0
+    return f"{float(number):.3g} PB"
+
+
 class Column(NamedTuple):
     """A column of a table: `head` and `write` for rounded numbers, `name` and `full` for CSV."""
 

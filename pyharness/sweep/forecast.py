@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pyharness.model.report import format_bytes, format_count, format_duration
 from pyharness.sweep.batches import looped_fields
 from pyharness.sweep.chunk import solve_chunk, solve_points
 from pyharness.sweep.executors import Engine
@@ -152,35 +153,9 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 def format_estimate(estimate: Estimate) -> str:
     """Return numbers of scenes and chunks, time, disk space and memory as a line of text."""
     missing = estimate.n_missing
-    rest = "" if missing == estimate.n_chunks else f", {short_count(missing)} of them missing"
+    rest = "" if missing == estimate.n_chunks else f", {format_count(missing)} of them missing"
     return (
-        f"{short_count(estimate.n_scenes)} scenes in {short_count(estimate.n_chunks)} chunks"
-        f"{rest}: about {duration(estimate.seconds)}, up to {byte_count(estimate.n_bytes)} on "
-        f"disk, {byte_count(estimate.memory)} of memory"
+        f"{format_count(estimate.n_scenes)} scenes in {format_count(estimate.n_chunks)} chunks"
+        f"{rest}: about {format_duration(estimate.seconds)}, up to "
+        f"{format_bytes(estimate.n_bytes)} on disk, {format_bytes(estimate.memory)} of memory"
     )
-
-
-def duration(seconds: float) -> str:
-    """Return a duration as text, in seconds to days."""
-    for limit, unit, name in ((120.0, 1.0, "s"), (7200.0, 60.0, "min"), (172800.0, 3600.0, "h")):
-        if seconds < limit:
-            return (
-                f"{seconds / unit:.2g} {name}"
-                if seconds < 100.0
-                else f"{seconds / unit:.0f} {name}"
-            )
-    return f"{seconds / 86400.0:.0f} days"
-
-
-def short_count(number: int) -> str:
-    """Return a count as text, with four digits from ten million on."""
-    return str(number) if number < 10**7 else f"{float(number):.4g}"
-
-
-def byte_count(number: float) -> str:
-    """Return a number of bytes as text, as in 1.25 MB."""
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if number < 1000.0:
-            return f"{number:.3g} {unit}"
-        number /= 1000.0
-    return f"{float(number):.3g} PB"

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.model.report import Column, Report, Table, digits, words
+from pyharness.model.report import Column, Report, Table, digits, format_duration, words
 from pyharness.sweep.fields import units_of
-from pyharness.sweep.forecast import duration, format_estimate
+from pyharness.sweep.forecast import format_estimate
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.run import Outcome
 from pyharness.sweep.store import Store
@@ -130,7 +130,7 @@ def _did(outcome: Outcome) -> str:
         return f"all {total} chunks were there"
     there = f", {outcome.before} were there" if outcome.before else ""
     repaired = f", {outcome.repaired} of them damaged before" if outcome.repaired else ""
-    return f"{outcome.computed} chunks in {duration(outcome.seconds)}{repaired}{there}"
+    return f"{outcome.computed} chunks in {format_duration(outcome.seconds)}{repaired}{there}"
 
 
 def _axis_row(sweep: Sweep, number: int) -> tuple[Any, ...]:

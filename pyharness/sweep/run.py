@@ -10,8 +10,9 @@ from pathlib import Path
 
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, progress_of
+from pyharness.model.report import format_bytes, format_count
 from pyharness.sweep.executors import Engine, engine
-from pyharness.sweep.forecast import Estimate, byte_count, forecast, short_count
+from pyharness.sweep.forecast import Estimate, forecast
 from pyharness.sweep.reductions import empty, needs_attitudes
 from pyharness.sweep.store import Store, check_store, opened
 from pyharness.sweep.sweep import Sweep
@@ -57,11 +58,11 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     """
     disk = os.statvfs(Path(path).absolute().parent)
     n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
-    shown = f"{short_count(sweep.n_scenes)} scenes in {short_count(sweep.n_chunks)} chunks"
+    shown = f"{format_count(sweep.n_scenes)} scenes in {format_count(sweep.n_chunks)} chunks"
     free = disk.f_bavail * disk.f_frsize
     if n_bytes > free:
         raise InputError(
-            f"{shown} take up to {byte_count(n_bytes)}, and {byte_count(free)} are free where "
+            f"{shown} take up to {format_bytes(n_bytes)}, and {format_bytes(free)} are free where "
             f"'{path}' is; use a smaller grid, or fewer reductions"
         )
     n_files = missing * (len(sweep.reductions) + 1)
@@ -81,8 +82,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:
         raise InputError(
-            f"{shown} take {byte_count(needed)} of memory at once, and at most half of this "
-            f"machine's memory, {byte_count(memory // 2)}, is used; use smaller chunks, "
+            f"{shown} take {format_bytes(needed)} of memory at once, and at most half of this "
+            f"machine's memory, {format_bytes(memory // 2)}, is used; use smaller chunks, "
             "fewer workers or samples"
         )
     return n_bytes, needed

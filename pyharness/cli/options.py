@@ -36,16 +36,16 @@ SCENE = {
     "--steps N": "Number of integration steps from time 0, at least 1 (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "Version of the program: original (all its defects active) or corrected (none "
-    "active) (default: original).",
+    "--listing L": "Version of the program: original, with all its defects (default), or "
+    "corrected, without any.",
     "--fix NAME,...": "Correct only these faults of the original program: defects, doubtful "
-    "readings or conjectures (`pyharness defects` lists and explains the names).",
+    "readings or conjectures (names: `pyharness defects`).",
     "--keep NAME,...": "Keep only these faults of the original program, and correct all others "
-    "(`pyharness defects` lists and explains the names).",
-    "--reading NAME,...": "Read these ambiguous statements of the printed program in the way that "
-    "this edition does not adopt (`pyharness defects --kind reading` explains the names).",
-    "--conjecture NAME,...": "Assume these statements, which are missing from the printed program; "
-    "none: assume nothing (`pyharness defects --kind conjecture` explains the names).",
+    "(names: `pyharness defects`).",
+    "--reading NAME,...": "Use the alternative reading of these ambiguous statements of the "
+    "printed program (names: `pyharness defects --kind reading`).",
+    "--conjecture NAME,...": "Assume these statements, which are missing from the printed program, "
+    "or none (names: `pyharness defects --kind conjecture`).",
     "--lipschitz L": "Stop the Runge-Kutta program when the slopes change by more than L times the "
     "change of the variables, L in 1/s (default 500, as printed).",
     "--no-stop": "Run the Runge-Kutta program to its last step, without the test that stops a "

@@ -145,7 +145,7 @@ def disagreeing() -> list[ReadCard]:
 
 
 def second_reading_report() -> Report:
-    """Return the report on the two readings and the estimated misreadings."""
+    """Return the report on two readings of sampled cards, with the estimated misreadings."""
     found, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

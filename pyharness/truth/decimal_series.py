@@ -4,7 +4,7 @@ A list `coefficients` has the Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
-from decimal import Decimal
+from decimal import Decimal, getcontext
 from fractions import Fraction
 
 from pyharness.model.effort import advice, checked_effort
@@ -30,6 +30,7 @@ _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
 # If the number of steps grows with a higher power of time than this, the forecast uses that power.
 _GROWING = Decimal("1.3")
+_LEAST = Decimal("1e-330")  # s, below all floats
 
 
 def taylor_series(
@@ -54,7 +55,11 @@ def taylor_series(
         # The caller compares integrations of different orders, which must remain different.
         order = equations.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
-    at_end = _Equations(scene, coefficients, velocity) if is_recorded else equations
+    at_end = [equations]
+    if is_recorded:
+        # Sums of the torque that cancel may be rounded to 0, as those beside a saturated tanh are.
+        changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
+        at_end = [_Equations(scene, coefficients, velocity, each) for each in changes]
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]
@@ -86,7 +91,7 @@ def taylor_series(
         while is_recorded and not _is_continued(at_end, series, state, end, length, tolerance):
             length /= 2
             end = begin + length
-            if end == begin:
+            if end == begin or abs(length) < _LEAST:
                 return rows
             state = _evaluate(series, length)
         if end == stop:
@@ -219,7 +224,7 @@ def _derivatives(coefficients: list[Row], t: Decimal) -> Row:
 
 
 def _is_continued(
-    equations: "_Equations",
+    equations: Sequence["_Equations"],
     series: list[Row],
     state: Row,
     end: Decimal,
@@ -228,24 +233,25 @@ def _is_continued(
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
-    A pulse of the torque within the step may be invisible at its beginning.
+    A pulse of the torque within the step may be invisible at its beginning. The last of the
+    equations shows what rounding changes.
     """
     slopes = _derivatives(series, length)
 
-    def rates(factor: Decimal) -> Row:
+    def rates(which: _Equations, factor: Decimal) -> Row:
         # Where a table changes at the end of the step, its earlier piece is meant.
         moved = [factor * x for x in state]
-        return [row[1] for row in equations.expand(factor * end, moved, 1, length < 0)[:3]]
+        return [row[1] for row in which.expand(factor * end, moved, 1, length < 0)[:3]]
 
     def largest_difference(first: Row, second: Row) -> Decimal:
         return max(abs(length * (x - y)) for x, y in zip(first, second, strict=True))
 
     scale = max(abs(x) for x in (*state[:3], *(row[0] for row in series[:3])))
     try:
-        found = rates(Decimal(1))
+        found = rates(equations[0], Decimal(1))
         defect = largest_difference(found, slopes[:3]) - _MOST_DEFECT * tolerance * scale
-        # Rounding errors of the time and of the state are no defect.
-        return defect <= 0 or defect <= largest_difference(found, rates(_NEARLY_1))
+        # Rounding errors of the time, of the state and of the torque are no defect.
+        return defect <= 0 or defect <= largest_difference(found, rates(equations[-1], _NEARLY_1))
     except ArithmeticError:
         return False
 
@@ -262,11 +268,13 @@ class _Equations:
     inertia the equations are (I omega)' = N - omega x (I omega), without `coefficients` (A, B, C).
     """
 
-    def __init__(self, scene: Scene, coefficients: Row, velocity: bool) -> None:
+    def __init__(
+        self, scene: Scene, coefficients: Row, velocity: bool, change: Decimal = Decimal(0)
+    ) -> None:
         self._abc = coefficients
         self._tape = self._law = None
         if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
-            self._tape = TapeSeries(scene.torque.tape)
+            self._tape = TapeSeries(scene.torque.tape, change)
         else:
             self._law = _law_of(scene)
         self._changing = scene.changing

@@ -66,9 +66,10 @@ class TapeSeries:
     the lowest order at which the tape's powers show.
     """
 
-    def __init__(self, tape: Tape) -> None:
-        self._operations = [(each, _sum(each.linear)) for each in tape.operations]
-        self._outputs = [_sum(each) for each in tape.outputs]
+    def __init__(self, tape: Tape, change: Decimal = Decimal(0)) -> None:
+        """Store the operations; `change` is relative, of the terms of sums with changing sign."""
+        self._operations = [(each, _sum(each.linear, change)) for each in tape.operations]
+        self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
         self._breaks = {
             slot: (table, [Decimal(time) for time in table.breaks])
@@ -296,11 +297,14 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
     return found
 
 
-def _sum(linear: Linear | None) -> _Sum:
+def _sum(linear: Linear | None, change: Decimal) -> _Sum:
     """Return a linear combination, rounded, so that equal numbers have the difference 0."""
     if linear is None:
         return Decimal(0), []
-    return +Decimal(linear.constant), [(+Decimal(factor), slot) for slot, factor in linear.terms]
+    constant, terms = +Decimal(linear.constant), []
+    for k, (slot, factor) in enumerate(linear.terms):
+        terms.append(((1 + (change if k % 2 else -change)) * Decimal(factor), slot))
+    return constant * (1 + change), terms
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:

@@ -14,6 +14,7 @@ from pyharness import solve
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.torques import recorded
 from pyharness.truth import reference as room
 from pyharness.truth.decimal_functions import sine_cosine
 from pyharness.truth.integer_series import integer_series
@@ -213,3 +214,10 @@ def test_known_solution_ends_where_binary64_does() -> None:
     assert found.time.tolist() == [1.0, 1e150]
     assert np.isfinite(found.omega).all()
     assert solve(scene, [1.0, 1e160], "reference").ended == "overflow"
+
+
+def test_a_torque_that_rounding_makes_0_does_not_shorten_steps_for_ever() -> None:
+    """Regression test: the steps of a body at rest were halved without an end."""
+    torque = recorded(lambda t, w: [0.0, 0.0, 1.0 + np.tanh((t - 10.0) / 0.2)])
+    switched = Scene("", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 1.0), torque=torque)
+    assert reference(switched, [20.0]).omega[-1] == pytest.approx([0.0, 0.0, 20.0], abs=1e-14)

@@ -133,9 +133,9 @@ def _velocity(trajectory: Trajectory) -> Array:
 
 
 def ulps(x: Array, y: Array) -> float:
-    """Return the largest number of floats from an element of `x` to the same element of `y`.
+    """Return the largest distance, in floats, between corresponding elements of `x` and `y`.
 
-    Two NaNs have the distance 0, a NaN and a number an infinite distance.
+    Two NaNs are at distance 0, a NaN and a number at infinite distance.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)

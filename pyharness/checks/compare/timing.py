@@ -64,9 +64,9 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 
 @contextlib.contextmanager
 def ended_after(limit: float) -> Iterator[None]:
-    """Raise RuntimeError in a ``with`` block of Python code that takes longer than `limit` (s).
+    """Raise RuntimeError if the Python code of a ``with`` block takes longer than `limit` (s).
 
-    It works in the main thread only, which receives signals.
+    Signals arrive in the main thread only.
     """
 
     def end(*_: object) -> None:

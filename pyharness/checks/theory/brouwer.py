@@ -220,7 +220,7 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return the fitted power of the number of steps (columns) with which errors grow."""
+    """Return p of the fit error ~ steps**p; column j of `found` has the errors after steps[j]."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 

@@ -26,16 +26,16 @@ _TERM_BODIES = 1000
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, s, up to 1000 (default: 3; also 100 in Cases 3 "
-    "and 4, or with --attitude in all cases but 6).",
+    "--horizon T": "End time of each integration, s, up to 1000 (default: 3, and a second run to "
+    "100 in Cases 3 and 4; with --attitude in all cases except 6).",
     "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, instead "
     "of the cases of the thesis.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per body "
     "against the number of bodies, and memory.",
-    "--terms": "Measure scenes whose torque depends on omega, time and attitude, made of ready "
-    "terms or of Python functions, for one body and for many.",
-    "--bodies N": "Number of bodies in a call that solves many, with --ensemble or --terms, 1 to "
-    f"{_MOST_BODIES} (default {_BODIES} and {_TERM_BODIES}).",
+    "--terms": "Measure scenes whose torque depends on omega, time and attitude, written as "
+    "ready terms or as Python functions, for one body and for many.",
+    "--bodies N": f"Number of bodies in a call that solves many, 1 to {_MOST_BODIES} (default "
+    f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
     "(default: the present year and week, as in 2026-W47).",
     "--attitude": "Compute and measure the attitude (orientation) of the body together with its "
@@ -44,8 +44,8 @@ OPTIONS = {
     "none: leave them out.",
     "--peers X,Y": "Measure only these third-party solvers, by name or package (default: all that "
     "are installed); none: leave them out.",
-    "--plan": "Measure the time saved by each part of a computation that `pyharness plan` leaves "
-    "out, instead of the solvers.",
+    "--plan": "Instead of the solvers, measure the time that each part of a computation would take "
+    "which `pyharness plan` leaves out.",
     "--growth": "Measure how the error of the Taylor method grows with the integration time, up to "
     "1e5 s, in Cases 3 and 4.",
     **shared.outputs(),

@@ -28,8 +28,8 @@ OPTIONS = {
     "suggests about the origin of a fault.",
     "--second-reading": "Compare our text of a random sample of cards with a second reading of the "
     "scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with the text that was "
-    "recognised in a scan of the thesis, in this file.",
+    "--scan FILE": "Compare our text of the cards, character by character, with the OCR text of a "
+    "scan of the thesis in this file.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "cards runge-kutta:860"

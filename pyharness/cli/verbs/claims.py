@@ -11,17 +11,17 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     "--explain ID": "Explain the verdict on the claim with this identifier, as in "
     "abstract-superior, with the numbers behind it.",
-    "--assignments": "Show, for each case whose initial angular velocity the thesis omits, with "
-    "which assumed values all claims hold.",
+    "--assignments": "Show the assumed values with which all claims hold, for each case whose "
+    "initial angular velocity the thesis omits.",
     "--word W": "Floating-point arithmetic in which the programs run for the verdicts: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--evidence": "Score every combination of initial conditions, readings of ambiguous "
-    "statements, conjectured statements and numbers of steps by the number of claims that hold.",
-    "--atlas STORE": "Report for which initial angular velocities the claims hold, from the "
-    "results of a sweep in this folder; needs --sweep.",
+    "--evidence": "Count the claims that hold for every combination of initial conditions, "
+    "readings of ambiguous program statements, conjectured statements and numbers of steps.",
+    "--atlas STORE": "Report for which initial angular velocities the claims hold; STORE is the "
+    "folder of a sweep's results; needs --sweep.",
     "--sweep FILE.toml": "Sweep file (TOML) from which `pyharness sweep` made the folder of "
     "--atlas.",
-    **shared.outputs(plot="the verdicts, with --evidence or --atlas,"),
+    **shared.outputs(plot="the counts of --evidence, or of the map of --atlas,"),
 }
 EXAMPLE = "claims --explain abstract-superior"
 

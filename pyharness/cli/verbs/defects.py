@@ -8,8 +8,8 @@ from pyharness.history.apparatus_report import apparatus_report, entry_report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Show this defect, reading or other entry, and its effect in every case, by name "
-    "or by card, as in 1660 or two-term:1660 (default: list all entries).",
+    "name NAME": "Show this entry and its effect in every case; give its name or its card, as in "
+    "1660 or two-term:1660 (default: list all entries).",
     "--kind K": "List only the entries of this kind, such as defect, reading or conjecture "
     "(default: all kinds).",
     **shared.outputs(FORMATS, plot=""),

@@ -13,14 +13,14 @@ _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
     "--weighting W": "Measure one method, with this weighting of its residual: "
-    f"{', '.join(WEIGHTINGS)} (default: several methods; with --terms, --points or --corrections "
-    "collocation).",
+    f"{', '.join(WEIGHTINGS)} (default: several methods, or collocation if --terms, --points or "
+    "--corrections is given).",
     "--terms N": "Number of terms of the trial solution, 1 to 12 (default 2).",
     "--points P": "Collocation points: thesis (equally spaced, "
     "default), gauss, or fractions of the step as in 0.3,0.6.",
     "--corrections K": "Number of corrections of the estimate in each step, 0 to 100 (default 1).",
-    "--lost": "Rank conjectured mistakes by the number of programs that fail with them, of the "
-    "three unpublished ones of section IV.2 of the thesis.",
+    "--lost": "Rank conjectured mistakes by how many of the three unpublished programs of section "
+    "IV.2 of the thesis fail with them.",
     "--word W": "Floating-point arithmetic of the programs that --lost runs: "
     f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
     **shared.outputs(plot=""),

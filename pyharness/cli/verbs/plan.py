@@ -14,8 +14,7 @@ OPTIONS = {
     "--tolerance E": "Relative tolerance of the angular velocity, at most 1 (default: the method's "
     "own, 1e-12 for auto).",
     "--velocity": "Plan to compute the translational velocity in addition to the angular velocity.",
-    "--rows": "Plan to compute results at intermediate times too, as `pyharness run --times` "
-    "requests them.",
+    "--rows": "Plan to compute results at intermediate times too, as with `pyharness run --times`.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "plan --case 5 --tolerance 1e-9"

@@ -27,7 +27,7 @@ OPTIONS = {
     **shared.SCENE,
     "--program P": f"Run this program of the thesis's appendix: {', '.join(PROGRAMS)} (needed "
     "unless --method is given).",
-    "--implementation I": "Language of the program that runs: fortran or python (default fortran, "
+    "--implementation I": "Language of the program: fortran or python (default fortran, "
     "but python with --word other than binary64).",
     "--word W": f"Run the program in this arithmetic: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). Fortran has {', '.join(COMPILED_WORDS)}; the others run in Python.",
@@ -37,7 +37,7 @@ OPTIONS = {
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
-    f"{', '.join(FORMS)} (numbers: the axes of Euler angles).",
+    f"{', '.join(FORMS)} (3-1-3, 3-2-1: Euler angles about these axes).",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); needs "
     "--method and --attitude.",
     "--tolerance E": "Largest allowed error of the angular velocity from --method, relative to its "

@@ -38,11 +38,11 @@ step_size = 0.01                    # s
 steps = 100
 """
 OPTIONS = {
-    "action ACTION": "What to do: new (write a scene file to begin with), check (check a scene "
+    "action ACTION": "What to do: new (write a sample scene file), check (check a scene "
     "file) or schema (print the JSON Schema of scene files, for an editor).",
     "file FILE": "The scene file to check.",
-    "--case N": "With new, write this case of Table 1 of the thesis, 1 to 7 (default: a brick, an "
-    "example of every section of a scene file).",
+    "--case N": "With new, write this case of Table 1 of the thesis, 1 to 7 (default: a brick, "
+    "with every section of a scene file).",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "scene new --out brick.toml"

@@ -29,7 +29,7 @@ OPTIONS = {
     "metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in several) "
     "or dask (in a Dask cluster).",
-    "--workers N": "Number of processes of the executors processes and dask, "
+    "--workers N": "Number of worker processes of --executor processes or dask, "
     f"1 to {_MOST_WORKERS} (default: one for each processor).",
     "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "
     "(default: start a cluster on this machine); needs --executor dask.",

@@ -104,9 +104,9 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with adopted values for choices that do not affect a claim.
+    """Return `chosen` with the defaults for assumptions on which a claim does not depend.
 
-    Equal results share one test of the claim.
+    Assumptions that become equal need one test of the claim.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

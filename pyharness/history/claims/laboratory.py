@@ -131,7 +131,7 @@ def distance(first: Array, second: Array) -> float:
 
 
 def ranges(truth: Reference) -> Array:
-    """Return the range, largest minus smallest, of each reference omega (rad/s), shape (3,)."""
+    """Return the range, largest minus smallest, of each component of omega (rad/s), (3,)."""
     return spread_of(truth.omega)
 
 

@@ -125,9 +125,9 @@ def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the code of a claim for each start in a sweep's batch, shape (n,).
+    """Return the code of the verdict on a claim for each initial omega of a batch, shape (n,).
 
-    It is SILENT if the claims do not apply to the sweep. The claim determines the cases to run.
+    Every code is SILENT if the claims do not apply to the sweep. Only cases of the claim are run.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))

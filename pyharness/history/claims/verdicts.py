@@ -132,7 +132,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers list the subsets of defects with which it ends there.
+    The numbers of the verdict name the subsets of defects with which the run stops at that step.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)

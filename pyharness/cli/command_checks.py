@@ -52,7 +52,7 @@ def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
         refuse_integrator(command)
     title = [f"{command}: faults planted in its answers"]
     again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
-    return tell(options, found, title, again, port=command)
+    return show_outcomes(options, found, title, again, port=command)
 
 
 def requested_cells(
@@ -138,7 +138,7 @@ def _integrator_self_test(
     if not found[0].passed:
         refuse_port(command)
     title = [f"{command}: faults planted in its requests and answers"]
-    return tell(options, found, title, again, integrator=command)
+    return show_outcomes(options, found, title, again, integrator=command)
 
 
 def collect(outcomes: Iterable[Outcome], count: int) -> list[Outcome]:
@@ -150,7 +150,7 @@ def collect(outcomes: Iterable[Outcome], count: int) -> list[Outcome]:
     return found
 
 
-def tell(
+def show_outcomes(
     options: argparse.Namespace, found: Sequence[Outcome], title: Sequence[str], again: str,
     **extra: Any,
 ) -> int:  # fmt: skip

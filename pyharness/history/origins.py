@@ -59,10 +59,7 @@ def unexplained_defects() -> dict[str, str]:
 
 
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements shared by each pair of programs.
-
-    If `scanned_names`, names are as in the scan; else they are uniform.
-    """
+    """Return the number of statements that each pair shares, with uniform or `scanned_names`."""
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 

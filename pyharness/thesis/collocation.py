@@ -77,10 +77,7 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return the coefficients c1, c2, ... of each unknown, and IER.
-
-    `rates` has a row for each of `points` (s).
-    """
+    """Return c1, c2, ... of each unknown, and IER, from a row of `rates` at each point (s)."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 

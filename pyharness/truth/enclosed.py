@@ -93,8 +93,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a radius to the allowed radius.
 
-    The allowed radius is 10**-digits rad/s, times the largest component of omega if that exceeds 1
-    rad/s.
+    Allowed is 10**-digits times the largest component of omega, or 1 rad/s if that is smaller.
     """
     largest = Fraction(0)
     for middle, radius in omega:

@@ -50,8 +50,7 @@ _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 def series_products(tape: Tape) -> int:
     """Return the number of products of two series in each order of a tape.
 
-    A sine with its cosine, and a hyperbolic tangent with its derivative, take two; a table takes
-    none.
+    A sine with its cosine, and a tanh with its derivative, take two; a table takes none.
     """
     waves = ("sine", "cosine")
     angles = {each.operands for each in tape.operations if each.kind in waves}

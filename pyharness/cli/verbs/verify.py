@@ -123,11 +123,11 @@ def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], l
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     from pyharness.checks.plants.plants import PLANTS
     from pyharness.checks.plants.program_self_test import self_test
-    from pyharness.cli.command_checks import collect, tell
+    from pyharness.cli.command_checks import collect, show_outcomes
 
     found = collect(self_test(chosen.seed, chosen.record), len(PLANTS))
     again = "python -m pyharness verify --self-test"
-    return tell(options, found, _title(chosen), again, seed=chosen.seed)
+    return show_outcomes(options, found, _title(chosen), again, seed=chosen.seed)
 
 
 def _selection(options: argparse.Namespace) -> Selection:

@@ -115,8 +115,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The counterexample is the square root on (0, 1), with quotients for x down to 10**-decades and y
-    = 2 x.
+    The counterexample is the square root at x and 2 x, with x from .01 down to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points

@@ -104,10 +104,7 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order p of the global error O(h**p), which each correction raises by one.
-
-    Its limit is `converged_order`.
-    """
+    """Return the order of the global error: one more per correction, up to `converged_order`."""
     return min(member.corrections + 1, converged_order(member))
 
 

@@ -29,7 +29,7 @@ contains
     status = NEEDS_FALLBACK
     equations = tape_of(packed(WAVES:))
     if (size(many%attitude0, 2) == 0 .neqv. equations%n_unknowns == 3) return
-    bodies%tape = arrays_of(equations, c_null_ptr, c_null_ptr)
+    bodies%tape = arrays_of(equations, c_null_ptr, c_null_ptr, c_null_ptr)
     bodies%table_starts = c_loc(equations%table_starts)
     bodies%breaks = c_loc(equations%breaks)
     bodies%pieces = c_loc(equations%pieces)

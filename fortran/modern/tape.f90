@@ -34,7 +34,7 @@ module tape
   ! What C reads of a tape, and the terms that it computes.
   type, bind(c), public :: tape_arrays_t
     integer(c_int) :: n_unknowns, n_operations, n_combinations
-    type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v
+    type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v, work
   end type tape_arrays_t
 
   ! Many bodies under one torque, as tape_lanes.c reads them.
@@ -102,14 +102,15 @@ contains
 
   end function tape_of
 
-  type(tape_arrays_t) function arrays_of(tape, a, v)
+  type(tape_arrays_t) function arrays_of(tape, a, v, work)
     !! Return what C reads of a tape.
     type(tape_t), intent(in) :: tape
     type(c_ptr), intent(in) :: a, v  !! the terms of the slots and of perturbations, as in series_t
+    type(c_ptr), intent(in) :: work  !! storage, as begin_work of tape_terms.c divides it
 
     arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), &
                               c_loc(tape%operations), c_loc(tape%starts), c_loc(tape%slots), &
-                              c_loc(tape%coefficients), c_loc(tape%constants), a, v)
+                              c_loc(tape%coefficients), c_loc(tape%constants), a, v, work)
   end function arrays_of
 
   pure integer function piece_at(tape, table, t, forward)

@@ -16,8 +16,9 @@ struct tape {
   const int (*operations)[4]; /* kind, two operands and result */
   const int *starts, *slots;
   const double *coefficients, *constants;
-  void *a; /* terms of each slot */
-  void *v; /* terms of the perturbations of each slot */
+  void *a;    /* terms of each slot */
+  void *v;    /* terms of the perturbations of each slot */
+  void *work; /* working storage of expand_tape, and of perturb_tape by the Jacobian */
 };
 
 #endif

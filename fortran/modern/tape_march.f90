@@ -94,7 +94,7 @@ contains
     solution%n_rows = 0
     sum_of_noise = 0.0_dp
     s%a = 0.0_dp
-    s%v(:, :, TIME_SLOT) = 0.0_dp
+    s%v(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     scale = maxval(abs(request%omega))

@@ -1,7 +1,8 @@
 module tape_series
   !! Taylor series of all slots of a tape (Jorba and Zou 2005, section 2), and of perturbations of
   !! the unknowns. A term includes its power of the step.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_intptr_t, c_loc, c_null_ptr, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_intptr_t, c_loc, c_null_ptr, &
+                                         c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
@@ -60,6 +61,22 @@ module tape_series
   end type block_t
 
   interface
+    pure integer(c_int64_t) function size_of_work(n_operations, n_slots) &
+      bind(c, name="size_of_work_level")
+      !! Return the size of the working storage, in numbers.
+      import :: c_int, c_int64_t
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: n_operations, n_slots
+    end function size_of_work
+
+    subroutine begin_work(tape, n_slots) bind(c, name="begin_work_level")
+      !! Divide the working storage, and find the products of the tape.
+      import :: c_int, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      integer(c_int), intent(in), value :: n_slots
+    end subroutine begin_work
+
     subroutine expand_tape(tape, h, order) bind(c, name="expand_tape_level")
       !! Compute all terms of all slots from their terms 0, and from the time and the tables.
       import :: c_int, dp, tape_arrays_t
@@ -120,23 +137,27 @@ contains
     real(dp), allocatable, intent(inout), target :: memory(:) !! of the terms
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
-    type(c_ptr) :: perturbations
+    type(c_ptr) :: perturbations, work
     integer(c_intptr_t) :: address ! in numbers
-    integer(int64) :: at, n_terms, n_perturbations
+    integer(int64) :: at, n_terms, n_perturbations, n_work
     integer :: failed
 
     n_terms = (LAST_TERM + 1)*int(tape%n_slots, int64)
     n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(tape%n_slots, int64)*n_blocks
+    n_work = size_of_work(tape%n_operations, tape%n_slots)
     fits = .false.
-    allocate (memory(n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
+    allocate (memory(n_work + n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
     if (failed /= 0) return
     allocate (s%noise(tape%n_slots), stat=failed)
     if (failed /= 0) return
     call find_powers(tape, s%powers, failed)
     if (failed /= 0) return
-    ! Perturbations begin a line of the cache, and so does term 1 of each slot.
+    ! The working storage and the perturbations begin a line of the cache, and so does term 1 of
+    ! each slot.
     address = transfer(c_loc(memory), address)/BYTES
     at = 1 + modulo(-address, int(SIDE_BY_SIDE, c_intptr_t))
+    work = c_loc(memory(at))
+    at = at + n_work
     perturbations = c_null_ptr
     if (n_blocks > 0) then
       s%blocks(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots, 1:n_blocks) => &
@@ -146,7 +167,8 @@ contains
     end if
     at = at + n_perturbations + SIDE_BY_SIDE - 1
     s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - 1)
-    s%arrays = arrays_of(tape, c_loc(s%a), perturbations)
+    s%arrays = arrays_of(tape, c_loc(s%a), perturbations, work)
+    call begin_work(s%arrays, tape%n_slots)
     fits = .true.
   end subroutine allocate_series
 

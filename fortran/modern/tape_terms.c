@@ -1,6 +1,7 @@
 /* Taylor series of all slots of a tape, order by order, and those of eight perturbations side by
    side. A term includes its power of the step. This is C because no Fortran compiler keeps eight
    sums in registers. Registers of fewer than eight numbers work too: the compiler divides them. */
+#include <stdint.h>
 #include <string.h>
 
 #include "tape.h"
@@ -33,53 +34,123 @@ static inline lanes loaded(const double *from) { return *(const lanes_anywhere *
 
 static inline void store(double *to, lanes x) { *(lanes_anywhere *)to = x; }
 
-/* Return a mask of the first n numbers. */
-static inline bits first_of(int n)
-{
-  static const long long ones[2 * SIDE_BY_SIDE] = {-1, -1, -1, -1, -1, -1, -1, -1};
-  bits mask;
-  n = n < 0 ? 0 : n < SIDE_BY_SIDE ? n : SIDE_BY_SIDE;
-  memcpy(&mask, ones + SIDE_BY_SIDE - n, sizeof mask);
-  return mask;
-}
+/* A register: the compiler takes comparisons of longer vectors apart number by number. */
+#if defined(__AVX512F__)
+enum { IN_REGISTER = 8 };
+#elif defined(__AVX__)
+enum { IN_REGISTER = 4 };
+#else
+enum { IN_REGISTER = 2 };
+#endif
+typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
+typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
+typedef reg reg_anywhere __attribute__((aligned(8)));
+typedef double row[SIDE_BY_SIDE];
+#define ALWAYS_INLINE inline __attribute__((always_inline))
 
-/* The terms of two factors, from term 1 on, that add_products takes: at most two registers. */
-struct range {
-  int k, registers;
-  bits of_a[2], of_b[2];
+/* The Jacobian is computed at three nodes of a step, from as many terms as the least order has. */
+enum { NODES = 3, TERMS_AMID = 8 };
+
+/* Sums of products of the terms of two slots, for as many pairs of slots as a register holds: all
+   products of terms that are not 0 nor the newest are known before any operation of an order. */
+enum { ABREAST = 4 };
+typedef double abreast __attribute__((vector_size(8 * ABREAST)));
+struct pairs {
+  int x[ABREAST], y[ABREAST]; /* places of the slots in the terms */
+  abreast of_x[TERMS_OF_PERTURBATION], of_y[TERMS_OF_PERTURBATION]; /* terms from 1 on */
 };
 
-static inline struct range range_of(int k, int order)
+/* The working storage. */
+struct work {
+  int n_pairs, n_slots;
+  struct pairs *pairs;
+  abreast *sums;
+  row *tangents; /* of each slot: derivatives by the unknowns */
+  double *middle; /* of each slot: value amid the step */
+};
+
+static inline size_t rounded_up(size_t bytes) { return (bytes + 63) / 64 * 64; }
+
+/* Return the size of the working storage, in numbers. An operation has at most two pairs. */
+int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_slots)
 {
-  const int last = k - 1 < order - k ? k - 1 : order - k; /* at most 14 */
-  struct range range = {k, (last + SIDE_BY_SIDE - 1) / SIDE_BY_SIDE};
-  for (int i = 0; i < 2; i++) {
-    range.of_a[i] = first_of(k - 2 - i * SIDE_BY_SIDE);
-    range.of_b[i] = first_of(k - 1 - i * SIDE_BY_SIDE);
-  }
-  return range;
+  const size_t groups = (2 * (size_t)n_operations + ABREAST - 1) / ABREAST;
+  const size_t of_slots = n_slots * (sizeof(row) + sizeof(double));
+  return (rounded_up(sizeof(struct work)) + rounded_up(groups * sizeof(struct pairs))
+          + rounded_up(groups * sizeof(abreast)) + rounded_up(of_slots)) / sizeof(double);
 }
 
-/* Add to the terms of a sum, from term k on, all products of which one factor is term k - 1 and the
-   other a term from 1 to k - 1 (relaxed multiplication: van der Hoeven 2002, section 4). Return term
-   k, which then lacks the products with terms 0 alone. The factors were stored one order before:
-   a load would have to wait for a store that it overlaps. */
-static inline double add_products(double *sum, const double *a, const double *b, double sign,
-                                  const struct range *range)
+static void add_pair(const struct tape *tape, int x, int y)
 {
-  const int k = range->k;
-  const double x = sign * a[k - 1], y = sign * b[k - 1];
-  double newest = 0.0;
-  for (int i = 0; i < range->registers; i++) {
-    const int from = 1 + i * SIDE_BY_SIDE;
-    lanes u = (lanes)((bits)loaded(b + from) & range->of_b[i]);
-    lanes v = (lanes)((bits)loaded(a + from) & range->of_a[i]);
-    double *to = sum + k - 1 + from;
-    lanes total = loaded(to) + (x * u + y * v);
-    store(to, total);
-    if (i == 0) newest = total[0];
+  struct work *work = tape->work;
+  struct pairs *pairs = work->pairs + work->n_pairs / ABREAST;
+  pairs->x[work->n_pairs % ABREAST] = x * TERMS;
+  pairs->y[work->n_pairs % ABREAST] = y * TERMS;
+  work->n_pairs++;
+}
+
+/* Divide the working storage, and find the pairs of slots whose products are needed, in the order in
+   which expand_tape needs them. */
+void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
+{
+  struct work *work = tape->work;
+  const size_t groups = (2 * (size_t)tape->n_operations + ABREAST - 1) / ABREAST;
+  char *at = (char *)work + rounded_up(sizeof *work);
+  work->n_pairs = 0;
+  work->n_slots = n_slots;
+  work->pairs = (struct pairs *)at;
+  at += rounded_up(groups * sizeof(struct pairs));
+  work->sums = (abreast *)at;
+  at += rounded_up(groups * sizeof(abreast));
+  work->tangents = (row *)at;
+  work->middle = (double *)(work->tangents + n_slots);
+  memset(work->pairs, 0, groups * sizeof(struct pairs));
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
+    switch (operation[0]) {
+    case PRODUCT: add_pair(tape, first, second); break;
+    case QUOTIENT: add_pair(tape, second, out); break;
+    case SQRT: add_pair(tape, out, out); break;
+    case EXP: add_pair(tape, out + 1, out); break;
+    case SINE_COSINE:
+      add_pair(tape, out + 2, out + 1);
+      add_pair(tape, out + 2, out);
+      break;
+    case TANH:
+      add_pair(tape, out + 2, out + 1);
+      add_pair(tape, out, out);
+      break;
+    default: break;
+    }
   }
-  return newest;
+}
+
+static inline abreast gathered(const double *terms, const int *places, int k)
+{
+  return (abreast){terms[places[0] + k], terms[places[1] + k], terms[places[2] + k],
+                   terms[places[3] + k]};
+}
+
+/* Compute for each pair the sum of x(j) y(k - j), j = 1 to k - 1. The newest terms are not loaded
+   again: a load would have to wait for their store. */
+static inline void add_products(const struct work *work, const double *terms, int k)
+{
+  for (int i = 0; i * ABREAST < work->n_pairs; i++) {
+    struct pairs *pairs = work->pairs + i;
+    const abreast x = gathered(terms, pairs->x, k - 1), y = gathered(terms, pairs->y, k - 1);
+    pairs->of_x[k - 1] = x;
+    pairs->of_y[k - 1] = y;
+    abreast one = x * (k > 2 ? pairs->of_y[1] : y), two = {0.0};
+    if (k > 2) two = pairs->of_x[1] * y;
+    int j = 2;
+    for (; j < k - 2; j += 2) {
+      one += pairs->of_x[j] * pairs->of_y[k - j];
+      two += pairs->of_x[j + 1] * pairs->of_y[k - j - 1];
+    }
+    if (j < k - 1) one += pairs->of_x[j] * pairs->of_y[k - j];
+    work->sums[i] = one + two;
+  }
 }
 
 static inline double combined(const struct tape *tape, int n, int k, const series *a)
@@ -95,57 +166,41 @@ static inline double combined(const struct tape *tape, int n, int k, const serie
 void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
 {
   series *const a = tape->a;
+  const struct work *work = tape->work;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
 
-  for (int n = 0; n < tape->n_operations; n++) {
-    double *out = a[tape->operations[n][3] - 1];
-    if (tape->operations[n][0] == TABLE) continue;
-    /* Terms beyond the order are zeroed too: sums in the other places of a register must not grow
-       from step to step. */
-    memset(out + 1, 0, (TERMS - 1) * sizeof *out);
-    if (tape->operations[n][0] == SINE_COSINE || tape->operations[n][0] == TANH)
-      memset(out + TERMS + 1, 0, (TERMS - 1) * sizeof *out);
-  }
+  memset(work->sums, 0, (work->n_pairs + ABREAST - 1) / ABREAST * sizeof(abreast));
   for (int k = 0; k < order; k++) {
-    const struct range range = range_of(k, order);
+    const double *sum = (const double *)work->sums;
+    if (k > 1) add_products(work, a[0], k);
     for (int n = 0; k > 0 && n < tape->n_operations; n++) {
       const int *operation = tape->operations[n];
       const double *x = a[operation[1] - 1], *y = a[operation[2] - 1];
-      double *out = a[operation[3] - 1], *angle, sum;
+      double *out = a[operation[3] - 1], *angle;
       switch (operation[0]) {
-      case LINEAR:
-        out[k] = combined(tape, operation[1] - 1, k, a);
-        break;
-      case PRODUCT:
-        out[k] = add_products(out, x, y, 1.0, &range) + (x[k] * y[0] + x[0] * y[k]);
-        break;
-      case QUOTIENT:
-        sum = add_products(out, y, out, -1.0, &range);
-        out[k] = (x[k] + sum - y[k] * out[0]) / y[0];
-        break;
-      case SQRT:
-        out[k] = (x[k] + add_products(out, out, out, -1.0, &range)) / (2.0 * out[0]);
-        break;
+      case LINEAR: out[k] = combined(tape, operation[1] - 1, k, a); break;
+      case PRODUCT: out[k] = *sum++ + (x[k] * y[0] + x[0] * y[k]); break;
+      case QUOTIENT: out[k] = (x[k] - *sum++ - y[k] * out[0]) / y[0]; break;
+      case SQRT: out[k] = (x[k] - *sum++) / (2.0 * out[0]); break;
       case EXP:
-        /* The second slot has k times the terms of the argument. */
+        /* The second slot has k times the terms of the argument. It is constant, because it is
+           large, where term 0 of that slot says so. */
         angle = out + TERMS;
-        if (angle[0]) break; /* It is constant, because it is large. */
-        angle[k] = k * x[k];
-        out[k] = (add_products(out, angle, out, 1.0, &range) + angle[k] * out[0]) / k;
+        angle[k] = angle[0] ? 0.0 : k * x[k];
+        out[k] = (*sum++ + angle[k] * out[0]) / k;
         break;
       case SINE_COSINE:
         angle = out + 2 * TERMS;
         angle[k] = k * x[k];
-        sum = add_products(out, angle, out + TERMS, 1.0, &range);
-        out[TERMS + k] = (add_products(out + TERMS, angle, out, -1.0, &range) - angle[k] * out[0]) / k;
-        out[k] = (sum + angle[k] * out[TERMS]) / k;
+        out[k] = (*sum++ + angle[k] * out[TERMS]) / k;
+        out[TERMS + k] = -(*sum++ + angle[k] * out[0]) / k;
         break;
       case TANH:
         /* The second slot is 1 minus the square, the derivative. */
         angle = out + 2 * TERMS;
         angle[k] = k * x[k];
-        out[k] = (add_products(out, angle, out + TERMS, 1.0, &range) + angle[k] * out[TERMS]) / k;
-        out[TERMS + k] = add_products(out + TERMS, out, out, -1.0, &range) - 2.0 * out[k] * out[0];
+        out[k] = (*sum++ + angle[k] * out[TERMS]) / k;
+        out[TERMS + k] = -*sum++ - 2.0 * out[k] * out[0];
         break;
       default: /* a table */
         break;
@@ -202,10 +257,9 @@ static inline lanes perturbed(const struct tape *tape, int n, int k, const pertu
   return sum;
 }
 
-/* Compute term k of eight perturbations of all slots, and term k + 1 of those of the unknowns. Where
-   they are forced, the terms of the unknowns have a part of their own already. */
-static inline __attribute__((always_inline)) void perturb(const struct tape *tape, double h, int k,
-                                                          int is_forced)
+/* Compute term k of eight perturbations of all slots, and add the part that depends on them to term
+   k + 1 of those of the unknowns. */
+static void perturb(const struct tape *tape, double h, int k)
 {
   const series *const a = (const series *)tape->a;
   perturbations *const v = tape->v;
@@ -220,13 +274,11 @@ static inline __attribute__((always_inline)) void perturb(const struct tape *tap
       x = perturbed(tape, first, k, (const perturbations *)v);
       break;
     case PRODUCT:
-      x = is_forced ? convolved_many(v[first], a[second], v[second], a[first], k)
-                    : convolved(v[first], a[second], v[second], a[first], k);
+      x = convolved_many(v[first], a[second], v[second], a[first], k);
       x += loaded(v[first][k]) * a[second][0] + loaded(v[second][k]) * a[first][0];
       break;
     case QUOTIENT:
-      x = is_forced ? convolved_many(v[second], a[out], v[out], a[second], k)
-                    : convolved(v[second], a[out], v[out], a[second], k);
+      x = convolved_many(v[second], a[out], v[out], a[second], k);
       x = (loaded(v[first][k]) - loaded(v[second][k]) * a[out][0] - x) / a[second][0];
       break;
     case SQRT:
@@ -252,7 +304,7 @@ static inline __attribute__((always_inline)) void perturb(const struct tape *tap
   for (int i = 0; i < tape->n_unknowns; i++) {
     double *to = v[FIRST_UNKNOWN + i][k + 1];
     x = h / (k + 1) * perturbed(tape, derivatives + i, k, (const perturbations *)v);
-    store(to, is_forced ? loaded(to) + x : x);
+    store(to, loaded(to) + x);
   }
 }
 
@@ -285,13 +337,119 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
 }
 
 /* Return the largest term k of all perturbations but the error. */
-static inline double largest(const struct tape *tape, int k, const double *weights, lanes units)
+static inline double largest(const struct tape *tape, int k, const double *weights,
+                             const double *units)
 {
-  const lanes most = largest_terms(tape, k, weights, units);
+  const reg_bits magnitude = ~(reg_bits)(-(reg){0.0});
   double found = 0.0;
-  for (int lane = 1; lane < SIDE_BY_SIDE; lane++)
-    if (most[lane] > found) found = most[lane];
+  for (int p = 0; p <= tape->n_unknowns; p += IN_REGISTER) {
+    reg most = {0.0};
+    for (int i = 0; i < tape->n_unknowns; i++) {
+      const reg term = *(const reg *)(perturbations_of(tape)[FIRST_UNKNOWN + i][k] + p);
+      const reg x = weights[i] * (reg)((reg_bits)term & magnitude);
+      const reg_bits is_larger = x > most;
+      most = (reg)(((reg_bits)x & is_larger) | ((reg_bits)most & ~is_larger));
+    }
+    most *= *(const reg_anywhere *)(units + p);
+    for (int lane = 0; lane < IN_REGISTER; lane++)
+      if (most[lane] > found) found = most[lane];
+  }
   return found;
+}
+
+/* Compute the derivatives of the rates by the unknowns at the time `part` of the step, times the
+   step: element [i][j] is that of rate i by unknown j. */
+static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int columns, double h,
+                                       double part, row *jacobian)
+{
+  const series *const a = tape->a;
+  const struct work *work = tape->work;
+  double *const m = work->middle;
+  row *const v = work->tangents;
+  const int derivatives = tape->n_combinations - tape->n_unknowns;
+
+  for (int n = 0; n < work->n_slots; n++) {
+    double sum = a[n][TERMS_AMID - 1];
+    for (int k = TERMS_AMID - 2; k >= 0; k--) sum = a[n][k] + part * sum;
+    m[n] = sum;
+  }
+  memset(v, 0, (FIRST_UNKNOWN + tape->n_unknowns) * sizeof *v);
+  for (int j = 0; j < tape->n_unknowns; j++) v[FIRST_UNKNOWN + j][j] = 1.0;
+  for (int n = 0; n < tape->n_operations + tape->n_unknowns; n++) {
+    const int is_rate = n >= tape->n_operations;
+    const int *operation = tape->operations[is_rate ? 0 : n];
+    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
+    if (is_rate || operation[0] == LINEAR) {
+      const int c = is_rate ? derivatives + n - tape->n_operations : first;
+      double *to = is_rate ? jacobian[n - tape->n_operations] : v[out];
+      for (int p = 0; p < columns; p += IN_REGISTER) {
+        reg sum = {0.0};
+        for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++)
+          sum += tape->coefficients[i] * *(reg *)(v[tape->slots[i] - 1] + p);
+        *(reg *)(to + p) = is_rate ? h * sum : sum;
+      }
+      continue;
+    }
+    /* The derivatives of the first slot by the operands, and of the second by the first operand. */
+    double by_first = 0.0, by_second = 0.0, of_second = 0.0;
+    int other = 0;
+    switch (operation[0]) {
+    case PRODUCT: by_first = m[second], by_second = m[first], other = second; break;
+    case QUOTIENT:
+      by_first = 1.0 / m[second], by_second = -m[out] * by_first, other = second;
+      break;
+    case SQRT: by_first = 0.5 / m[out]; break;
+    case EXP: by_first = m[out]; break;
+    case SINE_COSINE: by_first = m[out + 1], of_second = -m[out]; break;
+    case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first; break;
+    default: break; /* a table depends on the time alone */
+    }
+    const int from = operation[0] == TABLE ? 0 : first;
+    for (int p = 0; p < columns; p += IN_REGISTER) {
+      const reg x = *(reg *)(v[from] + p);
+      *(reg *)(v[out] + p) = by_first * x + by_second * *(reg *)(v[other] + p);
+      if (of_second) *(reg *)(v[out + 1] + p) = of_second * x;
+    }
+  }
+}
+
+/* Compute term k + 1 of the perturbations of the unknowns, with the Jacobian as a polynomial of the
+   part of the step. */
+static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbations *v,
+                                       const row (*jacobian)[MOST_UNKNOWNS], int k)
+{
+  const double part = 1.0 / (k + 1);
+  const int degree = k < NODES - 1 ? k : NODES - 1;
+  for (int i = 0; i < n; i++) {
+    for (int p = 0; p < columns; p += IN_REGISTER) {
+      reg sum = {0.0}, other = {0.0};
+      for (int j = 0; j < n; j++) sum += jacobian[0][i][j] * *(reg *)(v[j][k] + p);
+      for (int d = 1; d <= degree; d++)
+        for (int j = 0; j < n; j++) other += jacobian[d][i][j] * *(reg *)(v[j][k - d] + p);
+      *(reg *)(v[i][k + 1] + p) = part * (sum + other);
+    }
+  }
+}
+
+/* Compute the coefficients of the Jacobian as a polynomial of the part of the step, through its
+   values at the nodes of Gauss: the error of the perturbations is of order 2 NODES + 1. */
+static ALWAYS_INLINE void set_jacobians(const struct tape *tape, const int columns, double h,
+                                        double factor, row (*jacobian)[MOST_UNKNOWNS])
+{
+  const double distance = 0.38729833462074170 * factor, middle = 0.5 * factor;
+  set_jacobian(tape, columns, h, middle - distance, jacobian[0]);
+  set_jacobian(tape, columns, h, middle, jacobian[1]);
+  set_jacobian(tape, columns, h, middle + distance, jacobian[2]);
+  for (int i = 0; i < tape->n_unknowns; i++) {
+    for (int j = 0; j < tape->n_unknowns; j++) {
+      const double before = jacobian[0][i][j], at = jacobian[1][i][j], after = jacobian[2][i][j];
+      const double slope = (after - before) / (2.0 * distance);
+      const double curve = ((after - at) + (before - at)) / (2.0 * distance * distance);
+      jacobian[0][i][j] = at - middle * (slope - middle * curve);
+      jacobian[1][i][j] = slope - 2.0 * middle * curve;
+      jacobian[2][i][j] = curve;
+    }
+  }
 }
 
 /* Expand the perturbations, whose values are terms 0 of the unknowns, to as many terms as they need
@@ -300,15 +458,21 @@ static inline double largest(const struct tape *tape, int k, const double *weigh
 int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, double h, int order, double factor,
                                   const double *weights, double tolerance, int *is_short)
 {
+  row jacobian[NODES][MOST_UNKNOWNS] __attribute__((aligned(64)));
+  perturbations *const v = (perturbations *)tape->v + FIRST_UNKNOWN;
+  const int n = tape->n_unknowns;
   /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, does not count,
      because it may be zero. */
-  lanes units = {0.0};
-  for (int i = 0; i < tape->n_unknowns; i++) units[i + 1] = 1.0 / weights[i];
+  double units[SIDE_BY_SIDE] = {0.0};
+  for (int i = 0; i < n; i++) units[i + 1] = 1.0 / weights[i];
   const double first = largest(tape, 0, weights, units);
   double before = first, power = 1.0;
   int k = 0;
+  if (n == 3) set_jacobians(tape, 4, h, factor, jacobian);
+  else set_jacobians(tape, SIDE_BY_SIDE, h, factor, jacobian);
   do {
-    perturb(tape, h, k++, 0);
+    if (n == 3) perturb_with(3, 4, v, jacobian, k++);
+    else perturb_with(MOST_UNKNOWNS, SIDE_BY_SIDE, v, jacobian, k++);
     power *= factor;
     const double size = power * largest(tape, k, weights, units);
     /* Every other term may be zero. */
@@ -378,7 +542,7 @@ double OF_LEVEL(vary_tape, LEVEL)(struct block *block, double h, int order, doub
   for (int j = order; j > 0; j--)
     beyond[j] = larger(beyond[j + 1], powers[j] * largest_terms(tape, j, weights, one));
   for (;; k++) {
-    if (k > 0) perturb(tape, h, k - 1, 1);
+    if (k > 0) perturb(tape, h, k - 1);
     sizes[k] = largest_terms(tape, k, weights, one);
     const lanes term = powers[k] * sizes[k];
     size = begun(size, term);
@@ -400,8 +564,11 @@ void OF_LEVEL(sum_perturbations, LEVEL)(const struct tape *tape, int last, doubl
                                         double (*sums)[SIDE_BY_SIDE])
 {
   for (int i = 0; i < tape->n_unknowns; i++) {
-    lanes sum = loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][last]);
-    for (int k = last - 1; k >= 0; k--) sum = factor * sum + loaded(perturbations_of(tape)[FIRST_UNKNOWN + i][k]);
-    store(sums[i], sum);
+    const row *terms = perturbations_of(tape)[FIRST_UNKNOWN + i];
+    for (int p = 0; p < SIDE_BY_SIDE; p += IN_REGISTER) {
+      reg sum = *(const reg *)(terms[last] + p);
+      for (int k = last - 1; k >= 0; k--) sum = factor * sum + *(const reg *)(terms[k] + p);
+      *(reg_anywhere *)(sums[i] + p) = sum;
+    }
   }
 }

@@ -105,7 +105,7 @@ contains
           lanes(:, :, block) = 0.0_dp
           b%forcings = 0
           b%sizes = 0.0_dp
-          b%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%blocks(1, 0, 1, block)))
+          b%arrays = arrays_of(tape, c_loc(s%a), c_loc(s%blocks(1, 0, 1, block)), s%arrays%work)
           do column = SIDE_BY_SIDE*(block - 1) + 1, min(n_columns, SIDE_BY_SIDE*block)
             lane = column - SIDE_BY_SIDE*(block - 1)
             lanes(lane, :n, block) = request%starts(:, column)

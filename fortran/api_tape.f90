@@ -1,9 +1,10 @@
 ! The interface that f2py reads for scenes whose equations of motion are a tape.
 
 subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_attitudes, &
-                     attitudes, effort, rows, n_rows, status, steps)
+                     attitudes, effort, n_nodes, nodes, n, most, ends, at_nodes, rows, n_rows, &
+                     status, steps, n_steps)
   ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
-  ! have one sign and are ordered away from 0.
+  ! have one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
   !f2py threadsafe
   use levels, only: tape_solve
   use problem, only: request_t, solution_t
@@ -19,18 +20,32 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
   real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
   ! (3) estimated error, (4) error amplification, (5) steps of all integrations
+  integer(4), intent(in) :: n_nodes
+  real(8), intent(in), target :: nodes(n_nodes) ! in parts of a step
+  integer(4), intent(in) :: n                   ! number of unknowns
+  integer(4), intent(in) :: most                ! number of steps with nodes
+  real(8), intent(inout), target :: ends(most + 1) ! 0 and the ends of the steps, s
+  real(8), intent(inout), target :: at_nodes(n, n_nodes, most + 1)
   real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
+  integer(4), intent(out) :: n_steps            ! of the last integration; may be above `most`
   type(solution_t) :: solution
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
+  if (most > 0) then
+    solution%nodes => nodes
+    ends(1) = 0.0d0
+    solution%ends => ends
+    solution%at_nodes => at_nodes
+  end if
   call tape_solve(tape_of(numbers), request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows
   status = solution%status
   steps = solution%steps
+  n_steps = solution%n_steps
   effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine tape_rows
 

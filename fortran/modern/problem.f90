@@ -64,6 +64,11 @@ module problem
     real(dp), pointer, contiguous :: rows(:, :)    !! omega at the first n_rows times, rad/s
     !! (4, 0:n): column 0 is the attitude at time 0, by the caller; null if not requested
     real(dp), pointer, contiguous :: attitudes(:, :) => null()
+    ! The unknowns at nodes of each step; null if not requested.
+    real(dp), pointer, contiguous :: nodes(:) => null()          !! in parts of a step, 0 to 1
+    real(dp), pointer, contiguous :: at_nodes(:, :, :) => null() !! (unknowns, nodes, steps)
+    real(dp), pointer, contiguous :: ends(:) => null()           !! 0 and the ends of steps, s
+    integer :: n_steps = 0                                       !! may exceed the room for them
     integer :: n_rows                              !! number of rows that hold a result
     integer :: status                              !! of the module statuses
     integer(int64) :: steps = 0                    !! of the last integration

@@ -92,6 +92,7 @@ contains
     rest = t_end
     solution%status = COMPLETE
     solution%n_rows = 0
+    solution%n_steps = 0
     sum_of_noise = 0.0_dp
     s%a = 0.0_dp
     s%v(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1) = 0.0_dp
@@ -176,6 +177,7 @@ contains
       n_before = solution%n_rows
       call add_rows()
       if (solution%status /= COMPLETE) exit
+      if (associated(solution%nodes)) call add_nodes()
       do i = 1, n
         sum_of_noise(i) = sum_of_noise(i) + (noise(i)*factor*s%h)**2
       end do
@@ -408,28 +410,37 @@ contains
       end do
     end subroutine take_step
 
+    subroutine evaluate(part, change, error)
+      !! Compute the change of the unknowns since the beginning of the step, and their error.
+      real(dp), intent(in) :: part !! of the step that was expanded
+      real(dp), intent(out) :: change(:), error(:)
+      integer :: i, k
+
+      do i = 1, n
+        change(i) = 0.0_dp
+        do k = s%order, 1, -1
+          change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
+        end do
+        error(i) = s%v(1, last_term, FIRST_UNKNOWN - 1 + i)
+        do k = last_term - 1, 0, -1
+          error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i)
+        end do
+      end do
+      error = error - (part/factor)**(s%order + 1)*left
+    end subroutine evaluate
+
     subroutine add_rows()
       !! Compute the rows within the step, except the last row of all.
       real(dp) :: part, change(tape%n_unknowns), error(tape%n_unknowns)
-      integer :: i, k, last_row
+      integer :: last_row
 
       last_row = size(request%times)
       if (at_end) last_row = last_row - 1
       do while (solution%n_rows < last_row)
         part = ((request%times(solution%n_rows + 1) - t(1)) - t(2))/s%h
         if (abs(part) > factor) return
-        do i = 1, n
-          change(i) = 0.0_dp
-          do k = s%order, 1, -1
-            change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
-          end do
-          error(i) = s%v(1, last_term, FIRST_UNKNOWN - 1 + i)
-          do k = last_term - 1, 0, -1
-            error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i)
-          end do
-        end do
-        call add_row(y, y_low + change, error - (part/factor)**(s%order + 1)*left, &
-                     solution%n_rows + 1)
+        call evaluate(part, change, error)
+        call add_row(y, y_low + change, error, solution%n_rows + 1)
         if (solution%status /= COMPLETE) return
         if (mod(solution%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
           if (interrupt_raised() /= 0) then
@@ -441,19 +452,12 @@ contains
     end subroutine add_rows
 
     subroutine add_row(high, low, error, row)
-      !! Compute a row. Its error is subtracted if it is small enough to be known: a wrong estimate
-      !! then costs no more than the tolerance.
+      !! Store a row.
       real(dp), intent(in) :: high(:), low(:), error(:)
       integer, intent(in) :: row
-      real(dp) :: z(tape%n_unknowns), size_of_error
+      real(dp) :: z(tape%n_unknowns)
 
-      size_of_error = maxval(weights*abs(error))
-      if (.not. size_of_error <= found%error) found%error = size_of_error
-      if (size_of_error <= min(LINEAR_RANGE, request%tolerance)) then
-        z = high + (low - error)
-      else
-        z = high + low
-      end if
+      call correct(high, low, error, z)
       if (.not. maxval(abs(z)) <= huge(s%h)) then
         solution%status = OVERFLOW
         return
@@ -462,6 +466,33 @@ contains
       if (associated(solution%attitudes)) solution%attitudes(:, row) = z(4:7)/norm2(z(4:7))
       solution%n_rows = row
     end subroutine add_row
+
+    subroutine correct(high, low, error, z)
+      !! Subtract the error if it is small enough to be known: a wrong estimate then costs no more
+      !! than the tolerance.
+      real(dp), intent(in) :: high(:), low(:), error(:)
+      real(dp), intent(out) :: z(:)
+      real(dp) :: size_of_error
+
+      size_of_error = maxval(weights*abs(error))
+      if (.not. size_of_error <= found%error) found%error = size_of_error
+      z = high + low
+      if (size_of_error <= min(LINEAR_RANGE, request%tolerance)) z = high + (low - error)
+    end subroutine correct
+
+    subroutine add_nodes()
+      !! Compute the unknowns at the nodes of the step.
+      real(dp) :: change(tape%n_unknowns), error(tape%n_unknowns)
+      integer :: k
+
+      solution%n_steps = solution%n_steps + 1
+      if (solution%n_steps >= size(solution%ends)) return
+      solution%ends(solution%n_steps + 1) = t_next(1)
+      do k = 1, size(solution%nodes)
+        call evaluate(factor*solution%nodes(k), change, error)
+        call correct(y, y_low + change, error, solution%at_nodes(:, k, solution%n_steps))
+      end do
+    end subroutine add_nodes
 
   end subroutine march
 

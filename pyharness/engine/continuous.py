@@ -30,6 +30,7 @@ def solution_of(
 def with_events(
     scene: Scene,
     found: Trajectory,
+    sol: DenseOutput,
     functions: list[EventFunction],
     ends: tuple[float, float],
     rows: dense.Rows,
@@ -38,9 +39,9 @@ def with_events(
 ) -> Trajectory:
     """Return a trajectory with its events, and without rows beyond a terminal event.
 
-    `ends` are the first and last requested times (s); `rows` returns further rows.
+    `sol` is the solution as a function of time, `ends` are the first and last requested times (s),
+    and `rows` returns further rows.
     """
-    sol = found.sol or solution_of(scene, found, rows, method, tolerance)
     events = no_events(len(functions), 3 if found.attitude is None else 7)
     if sol.t_min < sol.t_max:
         pieces, period = sol.states, 0.0

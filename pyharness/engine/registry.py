@@ -41,6 +41,8 @@ class Method:
     default: float
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
     gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
+    # Takes a fifth argument, whether `sol` has the steps, which it has under a recorded torque.
+    gives_steps: bool = False
     order: int = 0  # of the global error in the step size; 0 if it varies
     evaluations: int = 0  # right-hand sides per step; 0 if the number varies
     any_scale: bool = False  # rescales the scene itself, or forms no products in binary64
@@ -140,6 +142,7 @@ REGISTRY = {
             1e-15,
             _DEFAULT,
             _from("solve", "by_plan"),
+            gives_steps=True,
             attitude=True,
             space_torque=True,
             state_torque=True,
@@ -155,6 +158,7 @@ REGISTRY = {
             1e-15,
             _DEFAULT,
             _from("taylor", "taylor"),
+            gives_steps=True,
             attitude=True,
             space_torque=True,
             state_torque=True,

@@ -13,6 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from pyharness.engine.scaled_tape import MULTIPLE, scaled_tape
+from pyharness.engine.steps import transformed_steps
+from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
@@ -162,8 +164,13 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
     time = np.array(times[:count], dtype=float)
     attitude = trajectory.attitude if trajectory.attitude is None else trajectory.attitude[:count]
     found = replace(
-        trajectory, time=time, recorded_time=time, omega=omega[:count], attitude=attitude
-    )
+        trajectory, time=time, recorded_time=time, omega=omega[:count], attitude=attitude,
+        sol=transformed_steps(trajectory.sol, lambda states: _slower(states, factor), factor),
+    )  # fmt: skip
     if count == len(trajectory.omega):
         return found
-    return replace(found, ended="overflow", error=None, growth=None)
+    return replace(found, ended="overflow", error=None, growth=None, sol=None)
+
+
+def _slower(states: Array, factor: float) -> Array:
+    return np.column_stack([states[:, :3] / factor, states[:, 3:]])

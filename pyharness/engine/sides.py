@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.engine.steps import joined_steps
 from pyharness.model.trajectory import Trajectory
 
 _ROWS = ("time", "recorded_time", "omega")
@@ -39,6 +40,7 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
         growth=_larger(before.growth, after.growth),
         steps=before.steps + after.steps,
         evaluations=before.evaluations + after.evaluations,
+        sol=joined_steps(before.sol, after.sol),
     )
 
 

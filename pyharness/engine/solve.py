@@ -34,12 +34,14 @@ from pyharness.engine.rescaled import (
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
+from pyharness.engine.steps import steps_output, transformed_steps
 from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.dense_output import Pieces
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
-from pyharness.model.principal import in_scene_axes, principal
+from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
@@ -161,8 +163,9 @@ def solve(
     below = [t for t in values if t < 0.0]
     # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
+    given_more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
     parts = [
-        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort), each[-1])
+        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort, *given_more), each[-1])
         for each in sides
         if each
     ]
@@ -172,18 +175,23 @@ def solve(
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=moments, tolerance=reported, scene=given)
     if axes is not None:
-        found = in_scene_axes(found, axes)
+        steps = transformed_steps(found.sol, partial(states_in_scene_axes, axes=axes))
+        found = replace(in_scene_axes(found, axes), sol=steps)
     if found.ended == "unchecked" and (dense_output or functions is not None):
         raise InputError(
             f"dense output and events of {method} need the series of a recorded torque, which ends "
             "before the last time; allowed: a smooth torque, or opaque(function)"
         )
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
-    if dense_output:
-        found = replace(found, sol=solution_of(given, found, rows, method, tolerance))
+    if dense_output or functions is not None:
+        if found.sol is not None and isinstance(found.sol.states, Pieces):
+            sol = steps_output(given, found.sol.states)
+        else:
+            sol = solution_of(given, found, rows, method, tolerance)
+        found = replace(found, sol=sol if dense_output else None)
     if functions is not None:
         ends = values[0], values[-1]
-        found = with_events(given, found, functions, ends, rows, method, tolerance)
+        found = with_events(given, found, sol, functions, ends, rows, method, tolerance)
         if turned or (len(values) == 1 and values[0] < 0.0):
             found = with_events_reversed(found)
     found = in_reverse(found) if turned else found
@@ -214,14 +222,15 @@ def finest(method: str, scene: Scene, time: float) -> float:
 
 
 def by_plan(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
 ) -> Trajectory:
     """Return the trajectory at `times` (s) by the method of the plan, or by its fallback."""
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
+    more = more if method.gives_steps else ()
     try:
         # A closed form, which has only rounding errors, is used below its smallest tolerance too.
-        return method.solve(scene, times, tolerance, effort)
+        return method.solve(scene, times, tolerance, effort, *more)
     except InputError as refusal:
         if not chosen.fallback:
             raise
@@ -232,7 +241,7 @@ def by_plan(
 
 
 def _integrate(
-    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float
+    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
 ) -> Trajectory:
     """Return the trajectory on one side of 0, computed in a suitable unit of time."""
     if not chosen.is_fixed_step and not is_ordinary(scene.omega):
@@ -240,15 +249,15 @@ def _integrate(
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
     if factor == 1.0:
-        return chosen.solve(scene, times, tolerance, effort)
+        return chosen.solve(scene, times, tolerance, effort, *more)
     faster = [t / factor for t in times]
     try:
-        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort)
+        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort, *more)
     except TimedError as refusal:
         raise refusal.slower(factor) from refusal.__cause__
     if isinstance(scene.torque, StateTorque) and not has_ordinary_rows(found):
         # The torque causes a larger omega than estimated.
-        return chosen.solve(scene, times, tolerance, effort)
+        return chosen.solve(scene, times, tolerance, effort, *more)
     return unscaled(found, times, factor)
 
 

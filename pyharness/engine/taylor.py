@@ -1,6 +1,8 @@
 """Integration by Taylor series, with adapted order and step size."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,9 @@ from pyharness.engine.problem import (
     trajectory_of,
 )
 from pyharness.engine.recorded import kernel_tape, system
+from pyharness.engine.steps import steps_output
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.dense_output import NODES, POINTS, Pieces
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
@@ -20,14 +24,24 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
 
+# Nodes of a step, in parts of it, and the steps for which there is room at first.
+_NODES = 0.5 + 0.5 * POINTS
+_ROOM = 100
+
+
 def taylor(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+    scene: Scene,
+    times: Sequence[float],
+    tolerance: float,
+    effort: float = 1.0,
+    with_steps: bool = False,
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
     Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
-    is None. Raise InputError for an opaque torque, and if the work limit is exceeded.
+    is None. With `with_steps`, `sol` has the steps under a recorded torque. Raise InputError for an
+    opaque torque, and if the work limit is exceeded.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
@@ -35,10 +49,20 @@ def taylor(
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     kernel, given = series_kernel(scene)
-    rows, n_rows, status, steps = getattr(extension(), kernel)(
-        *given, scene.omega, times, tolerance,
-        n_attitudes=n_attitudes, attitudes=joint, effort=work,
-    )  # fmt: skip
+    recorded: dict[str, Any] = {}
+    room, n_steps = 0, [_ROOM if with_steps else 0]
+    while True:
+        if kernel == "tape_rows":
+            room = n_steps[0]
+            shape = (7 if n_attitudes else 3, NODES, room + 1)
+            ends, at_nodes = np.empty(room + 1), np.empty(shape, order="F")
+            recorded = {"nodes": _NODES, "most": room, "ends": ends, "at_nodes": at_nodes}
+        rows, n_rows, status, steps, *n_steps = getattr(extension(), kernel)(
+            *given, scene.omega, times, tolerance,
+            n_attitudes=n_attitudes, attitudes=joint, effort=work, **recorded,
+        )  # fmt: skip
+        if not room or n_steps[0] <= room:
+            break
     if status == GAVE_UP:
         # After one step the kernel forecasts the work.
         how = "would exceed" if steps == 1 else "exceeded"
@@ -50,7 +74,15 @@ def taylor(
         )
     error, growth = map(estimate_or_none, work[2:4])
     attitudes = joint[:, 1:] if n_attitudes else None
-    return trajectory_of(times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes)
+    found = trajectory_of(
+        times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
+    )
+    if not room or not n_steps[0] or not found.has_all_rows:
+        return found
+    edges, values = ends[: n_steps[0] + 1], at_nodes[:, :, : n_steps[0]].T
+    if times[-1] < 0.0:
+        edges, values = edges[::-1], values[::-1, ::-1]
+    return replace(found, sol=steps_output(scene, Pieces(edges, values)))
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:

@@ -111,9 +111,19 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     """Return a trajectory transformed from principal `axes` (columns) back to the body's own."""
     attitude = found.attitude
     if attitude is not None:
-        w, x, y, z = quaternion_of_axes(axes)
-        attitude = np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
+        attitude = _attitude_in_scene_axes(attitude, axes)
     return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
+
+
+def states_in_scene_axes(states: Array, axes: Array) -> Array:
+    """Return rows of omega, with the attitude if there is one, transformed from principal axes."""
+    turned = _attitude_in_scene_axes(states[:, 3:], axes) if states.shape[1] > 3 else states[:, 3:]
+    return np.column_stack([states[:, :3] @ axes.T, turned])
+
+
+def _attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
+    w, x, y, z = quaternion_of_axes(axes)
+    return np.array(product(tuple(attitude.T), (w, -x, -y, -z))).T
 
 
 def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:

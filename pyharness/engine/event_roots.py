@@ -39,6 +39,7 @@ def _transforms() -> tuple[Array, Array, Array]:
 
 
 _DERIVATIVE, _LEFT, _RIGHT = _transforms()
+_ORDERS = np.arange(NODES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +99,9 @@ def joined(parts: list[Roots]) -> Roots:
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
-    """Return the value of polynomial k at x[k], for all k (Clenshaw)."""
-    first = second = np.zeros(len(x))
-    for k in range(NODES - 1, 0, -1):
-        first, second = 2.0 * x * first - second + coefficients[:, k], first
-    return np.asarray(x * first - second + coefficients[:, 0])
+    """Return the value of polynomial k at x[k], for all k."""
+    angles = _ORDERS * np.arccos(x)[:, None]
+    return np.asarray(np.einsum("nk,nk->n", coefficients, np.cos(angles)))
 
 
 def may_vanish(fits: Fits) -> Array:
@@ -118,9 +117,8 @@ def isolated(fits: Fits) -> Roots:
     """Return all roots of polynomials, and their extrema that may be 0, ascending in time."""
     near = np.maximum(fits.noise, FIT_ERROR * fits.sizes)
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
-    found = [
-        _describe_roots(fits, np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int), near)
-    ]
+    # Points from -1 to 1, sign changes and numbers of polynomials.
+    found: list[tuple[Array, Index, Index]] = []
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))
     first, last, c = fits.first, fits.last, fits.coefficients
@@ -140,18 +138,16 @@ def isolated(fits: Fits) -> Roots:
         is_monotone = ~is_tiny & _has_no_root(slopes)
         is_bent = ~is_tiny & ~is_monotone & _has_no_root(bends)
         middle = 0.5 * (low + high)
-        tiny = is_tiny & changes
-        found.append(_describe_roots(fits, middle[tiny], sign[tiny], number[tiny], near))
-        tiny = is_tiny & ~changes
-        found.append(_describe_roots(fits, middle[tiny], 0 * sign[tiny], number[tiny], near))
+        found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
         one = is_monotone & changes
         x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
         x = middle[one] + 0.5 * (high - low)[one] * x
-        found.append(_describe_roots(fits, x, sign[one], number[one], near))
-        for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent], slopes[is_bent],
-                                      near[number[is_bent]]):  # fmt: skip
-            inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
-            found.append(_describe_roots(fits, inner, change, number[is_bent][which], near))
+        found.append((x, sign[one], number[one]))
+        if is_bent.any():
+            for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent],
+                                          slopes[is_bent], near[number[is_bent]]):  # fmt: skip
+                inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
+                found.append((inner, change, number[is_bent][which]))
         split = ~(is_tiny | is_monotone | is_bent)
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
@@ -160,7 +156,10 @@ def isolated(fits: Fits) -> Roots:
         values = np.column_stack([first[split], centre, centre, last[split]])
         first, last = values.reshape(-1, 2).T
         c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
-    return joined(found)
+    if not found:
+        found = [(np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int))]
+    x, change, which = map(np.concatenate, zip(*found, strict=True))
+    return joined([_describe_roots(fits, x, change, which, near)])
 
 
 def _has_no_root(coefficients: Array) -> Array:
@@ -184,7 +183,7 @@ def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Ar
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
     slopes = c @ _DERIVATIVE.T
     x = 0.5 * (low + high)
-    for _ in range(80):
+    for _ in range(80 if len(x) else 0):
         value = values_at(c, x)
         is_beyond = sign * value > 0.0
         low, high = np.where(is_beyond, low, x), np.where(is_beyond, x, high)

@@ -19,7 +19,8 @@ module tape_march
 
   integer, parameter :: FITTED = 4   ! last terms from which the truncation error is estimated
   integer, parameter :: FEW = 3      ! terms whose decay bounds the truncation error
-  real(dp), parameter :: SHORTER = 0.5_dp  ! least factor on the first step that was tried
+  ! Least factor on the first step that was tried, from rest and otherwise.
+  real(dp), parameter :: SHORTER = 0.5_dp, MUCH_SHORTER = 0.05_dp
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
   ! Largest error for which the linearised equations hold.
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
@@ -80,7 +81,8 @@ contains
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     integer :: is_short
-    integer :: i, n, n_before, tries, last_term
+    logical :: is_low                         ! whether the order must be raised
+    integer :: i, n, n_before, order, tries, last_term
     type(step_limit_t) :: limit
 
     n = tape%n_unknowns
@@ -100,8 +102,9 @@ contains
     call begin_lanes()
     scale = maxval(abs(request%omega))
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
-    s%order = order_for(local_tolerance, s%powers)
-    s%h = t_end
+    ! The first step is a guess: a radian. From rest it is the whole time.
+    s%h = sign(min(abs(t_end), 1.0_dp/max(scale, LEAST_SCALE)), t_end)
+    s%order = order_for(local_tolerance_of(attempt%tolerance, t_end/s%h), s%powers)
     limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
     is_rejected = .false.
@@ -130,8 +133,8 @@ contains
         cycle
       end if
       if ((found%steps == 0 .or. from_rest) .and. tries < MOST_TRIES) then
-        ! The first step is a guess, and so is the omega that a body at rest is about to reach.
-        if (factor < SHORTER) then
+        ! The omega that a body at rest is about to reach is a guess too.
+        if (factor < merge(SHORTER, MUCH_SHORTER, from_rest)) then
           tries = tries + 1
           s%h = factor*s%h
           cycle
@@ -139,9 +142,12 @@ contains
         if (.not. has_guess) then
           has_guess = .true.
           local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*s%h))
-          s%order = order_for(local_tolerance, s%powers)
           found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
-          cycle
+          order = order_for(local_tolerance, s%powers)
+          is_low = order > s%order
+          s%order = order
+          if (is_low .or. from_rest) cycle
+          factor = fitting(tape, s%order, local_tolerance, weights, s%a)
         end if
       end if
       if (is_rejected) factor = min(1.0_dp, factor)

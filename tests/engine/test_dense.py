@@ -253,3 +253,26 @@ def test_changing_inertia_has_steps_too() -> None:
     scene = Scene("", (0.1, 0.2, 0.5), moments=moments, torque=torque)
     found: Any = solve(scene, [10.0], tolerance=1e-9, dense_output=True)
     assert found.sol(5.0)[2] == pytest.approx(solve(scene, [5.0]).omega[0, 2], abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["damping", "table", "changing", "full", "fast", "many steps"])
+def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded = {
+        "full": replace(SCENES["full"], torque=torques.damping([0.1, 0.2, 0.3])),
+        # In another unit of time.
+        "fast": Scene("fast", (1e200, 2e200, 1e199), MOMENTS, torque=torques.damping(1e199)),
+    }
+    scene = {**SCENES, **recorded, "many steps": SCENES["damping"]}[name]
+    ends = {"fast": [-1e-200, 4e-200], "many steps": [300.0]}.get(name, [-2.0, 9.0])
+    times = np.random.default_rng(54).uniform(min(0.0, ends[0]), ends[-1], 50)
+    times.sort()
+    truth = solve(scene, times, tolerance=1e-14, attitude=True)
+    monkeypatch.setattr("pyharness.engine.solve._more_rows", lambda *given: pytest.fail())
+    sol = sol_of(solve(scene, ends, tolerance=1e-10, attitude=True, dense_output=True))
+    assert isinstance(sol.states, Pieces)
+    assert (sol.t_min, sol.t_max) == (min(0.0, ends[0]), ends[-1])
+    assert largest_error(sol, truth) <= 1e-10
+    assert (len(sol.states.edges) > 100) == (name == "many steps")
+    assert solve(scene, ends, events=lambda t, w: w[1] - 1.0).t_events is not None

@@ -68,7 +68,7 @@ module problem
     real(dp), pointer, contiguous :: nodes(:) => null()          !! in parts of a step, 0 to 1
     real(dp), pointer, contiguous :: at_nodes(:, :, :) => null() !! (unknowns, nodes, steps)
     real(dp), pointer, contiguous :: ends(:) => null()           !! 0 and the ends of steps, s
-    integer :: n_steps = 0                                       !! may exceed the room for them
+    integer :: n_steps = 0                                       !! may exceed the number of `ends`
     integer :: n_rows                              !! number of rows that hold a result
     integer :: status                              !! of the module statuses
     integer(int64) :: steps = 0                    !! of the last integration

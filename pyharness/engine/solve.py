@@ -163,9 +163,9 @@ def solve(
     below = [t for t in values if t < 0.0]
     # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
-    given_more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
+    more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
     parts = [
-        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort, *given_more), each[-1])
+        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort, *more), each[-1])
         for each in sides
         if each
     ]

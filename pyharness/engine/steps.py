@@ -39,7 +39,8 @@ def joined_steps(before: DenseOutput | None, after: DenseOutput | None) -> Dense
     if before is None or after is None:
         return None
     parts = before.states, after.states
-    assert isinstance(parts[0], Pieces) and isinstance(parts[1], Pieces)
+    assert isinstance(parts[0], Pieces)
+    assert isinstance(parts[1], Pieces)
     edges = np.concatenate([parts[0].edges, parts[1].edges[1:]])
     values = np.concatenate([parts[0].values, parts[1].values])
     return replace(after, t_min=before.t_min, states=Pieces(edges, values))

@@ -23,10 +23,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
-
-# Nodes of a step, in parts of it, and the steps for which there is room at first.
+# Nodes of a step, in parts of it, and the number of steps that are expected.
 _NODES = 0.5 + 0.5 * POINTS
-_ROOM = 100
+_EXPECTED = 100
 
 
 def taylor(
@@ -50,18 +49,18 @@ def taylor(
     joint[:, 0] = scene.attitude or IDENTITY
     kernel, given = series_kernel(scene)
     recorded: dict[str, Any] = {}
-    room, n_steps = 0, [_ROOM if with_steps else 0]
+    most, n_steps = 0, [_EXPECTED if with_steps else 0]
     while True:
         if kernel == "tape_rows":
-            room = n_steps[0]
-            shape = (7 if n_attitudes else 3, NODES, room + 1)
-            ends, at_nodes = np.empty(room + 1), np.empty(shape, order="F")
-            recorded = {"nodes": _NODES, "most": room, "ends": ends, "at_nodes": at_nodes}
+            most = n_steps[0]
+            shape = (7 if n_attitudes else 3, NODES, most + 1)
+            ends, at_nodes = np.empty(most + 1), np.empty(shape, order="F")
+            recorded = {"nodes": _NODES, "most": most, "ends": ends, "at_nodes": at_nodes}
         rows, n_rows, status, steps, *n_steps = getattr(extension(), kernel)(
             *given, scene.omega, times, tolerance,
             n_attitudes=n_attitudes, attitudes=joint, effort=work, **recorded,
         )  # fmt: skip
-        if not room or n_steps[0] <= room:
+        if not most or n_steps[0] <= most:
             break
     if status == GAVE_UP:
         # After one step the kernel forecasts the work.
@@ -77,7 +76,7 @@ def taylor(
     found = trajectory_of(
         times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
     )
-    if not room or not n_steps[0] or not found.has_all_rows:
+    if not most or not n_steps[0] or not found.has_all_rows:
         return found
     edges, values = ends[: n_steps[0] + 1], at_nodes[:, :, : n_steps[0]].T
     if times[-1] < 0.0:

@@ -269,7 +269,9 @@ def test_the_steps_of_a_recorded_torque_are_read_and_nothing_is_solved_again(
     times = np.random.default_rng(54).uniform(min(0.0, ends[0]), ends[-1], 50)
     times.sort()
     truth = solve(scene, times, tolerance=1e-14, attitude=True)
-    monkeypatch.setattr("pyharness.engine.solve._more_rows", lambda *given: pytest.fail())
+    monkeypatch.setattr(
+        "pyharness.engine.solve._more_rows", lambda *given: pytest.fail("solved again")
+    )
     sol = sol_of(solve(scene, ends, tolerance=1e-10, attitude=True, dense_output=True))
     assert isinstance(sol.states, Pieces)
     assert (sol.t_min, sol.t_max) == (min(0.0, ends[0]), ends[-1])

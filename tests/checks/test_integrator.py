@@ -257,6 +257,12 @@ def test_the_sign_of_one_gyroscopic_term_is_named_where_the_motion_is_finite(axi
     assert campaign.named(found) == {wrong.fault}
 
 
+def test_a_method_of_first_order_is_named() -> None:
+    euler = Drawn("", solve_of((METHODS[0][1], METHODS[-1][1])), "first-order", 1.0)
+    chosen = problems("named", 1, ["constant"])
+    assert "first-order" in campaign.named(campaign.judged(euler, chosen))
+
+
 @pytest.mark.campaign
 def test_an_explicit_method_of_order_1_may_drift() -> None:
     """With steps of 1/32 s, it overflows in this scene within 512 s."""

@@ -95,6 +95,14 @@ def test_limit_is_lifted_as_far_as_it_says(name: str) -> None:
     assert _advised(_refusal(run, advised / 8.0)) == pytest.approx(advised, rel=1.0)
 
 
+@pytest.mark.parametrize("name", ["radau", "four-term-waves"])
+def test_refusal_names_what_exceeds_its_limit(name: str) -> None:
+    (run, who), effort = LIMITED[name]
+    message = _refusal(run, effort)
+    assert re.match(f"(?i){who}[: ]", message)
+    assert "None" not in message
+
+
 @pytest.mark.parametrize(("count", "span"), [(0, 1000.0), (50, 50.0)])
 def test_waves_count(count: int, span: float) -> None:
     """Sines of negligible size make each step more expensive, so that fewer steps are allowed."""

@@ -172,7 +172,6 @@ def test_cards_are_told_in_100_columns(asked: str, printed: Printed) -> None:
     assert max(map(len, printed(f"cards {asked}").splitlines())) <= 100
 
 
-@pytest.mark.campaign
 def test_record_of_a_card(printed: Printed) -> None:
     first, second = json.loads(printed("cards two-term:1650-1660 --format json"))["cards"]
     assert (first["card"], first["scan"]) == (1650, "1650-U3(1)=U3(4)")

@@ -202,8 +202,19 @@ def is_for(entry: str, kind: str, scene: Scene) -> bool:
     return True
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("entry", ENTRIES)
+# SciPy's methods are slow; of their kinds of scenes three are enough for every edit.
+_OF_SCIPY = ("steady", "turning", "timed")
+_ROWS = [
+    pytest.param(
+        entry, kind,
+        marks=[pytest.mark.campaign] * (entry == "methods of SciPy" and kind not in _OF_SCIPY),
+    )
+    for entry in ENTRIES
+    for kind in KINDS
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("entry", "kind"), _ROWS)
 def test_errors_are_within_the_tolerance(entry: str, kind: str) -> None:
     check, methods, attitudes = ENTRIES[entry]
     checked = 0

@@ -21,7 +21,7 @@ RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of a numba kernel for "rk4" or "dop8" (order 8 of DOP853)."""
+    """Return a maker of a numba kernel for "rk4", or "dop8" (the method of order 8 in DOP853)."""
     import numba
 
     formula: Formula = RK4
@@ -50,7 +50,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
 
 def compiled_function(source: str) -> Any:
-    """Return the Python function `function` that a source text defines."""
+    """Return the function named `function` that a Python source defines."""
     names: dict[str, Any] = {}
     exec(compile(source, "<bench>", "exec"), {"sin": np.sin, "cos": np.cos}, names)
     return names["function"]
@@ -95,7 +95,7 @@ def rates(
 
 
 def state_names(scene: Scene) -> str:
-    """Return the names of the unknowns, a letter each, with any quaternion."""
+    """Return the names of omega and any quaternion in the source, a letter each."""
     return "xyz" if scene.attitude is None else "xyzabcd"
 
 
@@ -107,7 +107,7 @@ def end_of(state: Array, evaluations: int | None = None) -> End:
 
 
 def steps_source(scene: Scene, formula: Formula) -> str:
-    """Return the Python source of a Runge-Kutta integration without loops.
+    """Return the Python source of a Runge-Kutta integration with unrolled stages.
 
     Its function takes the initial omega, the end time (s), the number of steps, and the array for
     omega at the end.

@@ -1,6 +1,6 @@
 """Solvers that numba compiles at their first call, for `bench --ensemble`.
 
-Each returns a function that computes omega at the end time `HORIZON` (rad/s), shape (n, 3).
+Each returns a function that computes omega (rad/s) at the end time `HORIZON`, shape (n, 3).
 """
 
 from collections.abc import Callable

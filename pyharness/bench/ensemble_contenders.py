@@ -57,7 +57,7 @@ class EnsembleLoad:
 
     @property
     def acceleration(self) -> Array:
-        """Return torques over moments, shape (n, 3), in rad/s2."""
+        """Return torques divided by moments, shape (n, 3), in rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
         found: Array = self.torque / np.array(MOMENTS)
@@ -111,12 +111,12 @@ class EnsembleContender(Contender):
 
     @property
     def ways(self) -> Mapping[str, EnsembleMaker]:
-        """Return all ways to prepare the solver, by note; the note of a single way is empty."""
+        """Return all ways to prepare the solver, by note; a single way has an empty note."""
         return self.variants or {"": self.prepare}
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return two loads of n random bodies with the same omegas: without and with torques."""
+    """Return two loads of n random bodies with equal omegas, without and with torques."""
     source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)

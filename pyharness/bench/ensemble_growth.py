@@ -50,8 +50,8 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    The closed form is measured without torque, by `solve_many` and by a prepared solver; all others
-    with torque.
+    All methods are measured with torque except the closed form, which is measured both by
+    `solve_many` and by a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -94,7 +94,7 @@ def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> l
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of a call's arrays, and the increase of peak memory by the call (bytes)."""
+    """Print the bytes of a call's arrays, and the bytes by which the call increases peak memory."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()

@@ -193,7 +193,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return enough bodies for timing, at least `least` or all, and the function solving them."""
+    """Return a load of at least `least` or all bodies, long enough to time, and its solver."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))

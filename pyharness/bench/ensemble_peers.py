@@ -1,6 +1,6 @@
 """Third-party solvers for `bench --ensemble`: NumPy, SciPy, heyoka, and a list of all.
 
-Each returns a function that computes omega at the end time (rad/s), shape (n, 3).
+Each returns a function that computes omega (rad/s) at the end time, shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -57,7 +57,7 @@ def ensemble_peers() -> list[EnsembleContender]:
 def heyoka_batch(
     load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
 ) -> Callable[[], Array]:
-    """Return an integration by one heyoka batch integrator, for `size` bodies at a time.
+    """Return an integration by one heyoka batch integrator, `size` bodies at a time.
 
     It returns attitudes, shape (n, 4), if the load requests them. `threads` has no effect.
     """
@@ -136,7 +136,7 @@ def _integrator(
 
 
 def _batches(rows: Array, size: int) -> Array:
-    """Return `rows`, shape (n, k), as batches, shape (batches, k, size), padded by the last row."""
+    """Return `rows`, shape (n, k), as (batches, k, size), padded with copies of the last row."""
     lacking = -len(rows) % size
     filled = np.concatenate([rows, np.repeat(rows[-1:], lacking, axis=0)])
     return np.ascontiguousarray(filled.reshape(-1, size, rows.shape[1]).transpose(0, 2, 1))

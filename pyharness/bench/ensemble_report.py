@@ -35,7 +35,7 @@ class Ensembles:
 
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
-    """Return tables of speeds, of time per body, and of memory."""
+    """Return the report: tables of speeds, of time per body, and of memory."""
     return measured_report(
         "## Ensembles",
         _DRIFT,
@@ -50,7 +50,7 @@ def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> 
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:
-    """Return our fastest speed divided by the speed in `row`, for equal threads, or None."""
+    """Return our fastest speed divided by that in `row`, for equal threads, or None."""
     rates = [each.rate for each in rows if each.method in _STYLES and each.threads == row.threads]
     return max(rates) / row.rate if rates else None
 
@@ -152,7 +152,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:
-    """Return time per body (ns) against the number of bodies."""
+    """Draw the time per body (ns) against the number of bodies."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")

@@ -19,8 +19,8 @@ Formula = Callable[..., Sequence[Any]]
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
     """Return pairs of an unknown and its derivative, for omega and any attitude of the scene.
 
-    `formula`, or else the tape, gives a torque that depends on the state. Raise InputError for an
-    opaque torque or a table.
+    `formula`, or else the tape of recorded operations, gives a torque that depends on the state.
+    Raise InputError for an opaque torque or a table.
     """
     import heyoka
 

@@ -76,8 +76,7 @@ class Workload:
     def group(self) -> str:
         """Return the name of the group over which ratios are averaged.
 
-        The scenes of a group share the end time. With attitudes or at 3 s, torque-free scenes form
-        a separate group.
+        Groups differ in end time and, at 3 s or with attitudes, in whether there is a torque.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -138,9 +137,9 @@ def workloads(
 ) -> list[Workload]:
     """Return cases of Table 1, each with an end time T.
 
-    By default these are Cases 2 to 7 to 3 s, and 3 and 4 also to 100 s. With `attitude`, which is
-    initially that of the axes of space, they are 1 to 7 to 3 s, and all but 6 also to 100 s. `case`
-    and `horizon` (s) select one.
+    By default T is 3 s in Cases 2 to 7, and also 100 s in Cases 3 and 4. With `attitude`, T is 3 s
+    in Cases 1 to 7, and also 100 s in all but Case 6; the bodies are initially aligned with the
+    axes of space. `case` and `horizon` (s) select one case and one time.
     """
     usual, long = (_TURNING_CASES, _LONG_TURNING_CASES) if attitude else (_CASES, _LONG_CASES)
     cases = usual if case is None else (case,)
@@ -207,7 +206,7 @@ def measure(
 
 
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the relative error of omega, or the attitude's (rad) if larger.
+    """Return the larger of the errors of omega (relative) and of the attitude (rad).
 
     Return None if the result is not finite or a required attitude is missing.
     """
@@ -244,7 +243,7 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
     """Yield a contender's settings, from coarse to fine.
 
-    Numbers of steps grow by 3/2 and 4/3 in turn, or by 2 for methods of order 2 or less.
+    Numbers of steps grow by factors of 3/2 and 4/3 in turn, or of 2 for orders of 2 or less.
     """
     if contender.settings:
         yield from contender.settings

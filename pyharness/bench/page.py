@@ -23,8 +23,8 @@ def measured_report(
 
     `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers, and
     `parts` are titled tables. `record` returns the JSON, `data` is the table with full precision,
-    `pictures` are functions by name. The versions of `packages` are listed; `command` repeats the
-    report.
+    `pictures` are functions by name. The versions of `packages` are listed. `command` repeats the
+    benchmark.
     """
     here, built = machine(packages), build()
     versions = [

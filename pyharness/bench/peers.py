@@ -89,7 +89,7 @@ def _right_hand_side(scene: Scene) -> RightHandSide:
 
 
 def _absolute(scene: Scene) -> Any:
-    """Return the absolute over the relative tolerance: a number, or one for each unknown."""
+    """Return the ratio of absolute to relative tolerance: a number, or one for each unknown."""
     largest = max(map(abs, scene.omega)) or 1.0
     return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
 

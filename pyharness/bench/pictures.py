@@ -29,7 +29,7 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Return error against run time and evaluations, a row for each workload, with its `data`."""
+    """Draw error against run time and evaluations, a row for each workload."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -124,7 +124,7 @@ def draw_slopes(axes: "Axes") -> None:
 
 
 def growth_picture(found: "Mapping[int, Sequence[Growth]]") -> Picture:
-    """Return the Taylor method's error and the effect of rounding the time, by case."""
+    """Draw the Taylor method's error and the effect of rounding the time, by case."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.5 * len(found), 4.0), dpi=110, layout="constrained")

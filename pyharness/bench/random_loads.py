@@ -28,8 +28,8 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
 
     Kinds of torque alternate with the number. A scene is drawn again if its error amplification is
     `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
-    `attitude` it is initially aligned with the axes of space, and has no `truth`, because
-    `integer_series` propagates no attitude.
+    `attitude`, the body is initially aligned with the axes of space, and the workload has no
+    `truth`, because `integer_series` propagates no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

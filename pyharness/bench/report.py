@@ -1,6 +1,6 @@
 """The reports of `bench`.
 
-A ratio is the run time of the baseline solver divided by the run time of another, at equal error.
+A ratio is the run time of the baseline solver divided by that of another, at equal error.
 """
 
 import math
@@ -34,7 +34,7 @@ _DRIFT = (
 
 
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
-    """Return a table for each workload, mean ratios, and the machine.
+    """Return the report: a table for each workload, mean ratios, and the machine.
 
     For random scenes, tables of the distribution of ratios replace the others.
     """
@@ -167,7 +167,7 @@ def _settings_of(each: Row | Refusal) -> dict[str, Any]:
 
 
 def microseconds(seconds: float | None) -> str:
-    """Return a time (s) as microseconds, such as 12.3; "-" for None."""
+    """Return a time (s) as text in microseconds, such as 12.3; "-" for None."""
     if seconds is None:
         return "-"
     value = seconds * 1e6
@@ -175,7 +175,7 @@ def microseconds(seconds: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio as about three digits; "-" for None."""
+    """Return a ratio as text with about three digits; "-" for None."""
     if value is None:
         return "-"
     if value >= 99.95:

@@ -73,7 +73,7 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 
 
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
-    """Return each contender's geometric mean ratios, one for each target error.
+    """Return each contender's geometric mean ratios over `loads`, one for each target error.
 
     A mean is None if the contender or the baseline misses the error on a workload.
     """

@@ -40,7 +40,7 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene of the `kind` READY or EXPRESSION.
+    """A scene of the `kind` READY (library term) or EXPRESSION (traced function).
 
     `formula` is an independent implementation of a ready term's torque; None for an expression.
     """
@@ -52,7 +52,7 @@ class TermScene:
 
 @dataclass(frozen=True, eq=False)
 class TermBodies(EnsembleLoad):
-    """Bodies that share a torque which depends on the state, and differ in their initial omega."""
+    """Bodies with different initial omegas that share a torque, which depends on the state."""
 
     body: Scene  # the body, its torque, and the initial attitude of all
 

@@ -1,6 +1,6 @@
 """The report of `bench --terms`.
 
-A ratio is the run time of heyoka divided by our run time, at equal error.
+A ratio is heyoka's run time divided by our run time, at equal error.
 """
 
 import statistics
@@ -56,7 +56,7 @@ class Summary:
 
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
-    """Return tables for single bodies, for many bodies, and of mean ratios."""
+    """Return the report: tables for single bodies, for many bodies, and of mean ratios."""
     return measured_report(
         "# Torques that depend on the state",
         _WORTH,
@@ -71,7 +71,7 @@ def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
 
 
 def summaries(found: Terms) -> list[Summary]:
-    """Return mean and smallest ratios by kind and error; none without heyoka."""
+    """Return mean and smallest ratios by kind and error; empty without heyoka."""
     result = []
     for kind in _TITLES:
         loads = [load for load in found.single.workloads if kind in load.kinds]

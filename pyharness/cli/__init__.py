@@ -17,7 +17,7 @@ def shown(text: str) -> str:
 
 
 def write_text(stream: TextIO, text: str) -> None:
-    """Write a text, escaping characters that the stream's encoding lacks."""
+    """Write a text, escaping characters that the stream can't encode."""
     encoding = stream.encoding or "utf-8"
     stream.write(shown(text).encode(encoding, "backslashreplace").decode(encoding))
 

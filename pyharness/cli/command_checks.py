@@ -1,4 +1,4 @@
-"""The checks of `verify --port` and `verify --integrator`, and the self-tests of all checks."""
+"""The checks of `verify --port` and `verify --integrator`, and reports of self-tests."""
 
 import argparse
 import re
@@ -24,7 +24,7 @@ _HIGHEST = 40.0
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
-    """Check a port, started by `options.port`; return 0 if all checks pass, else 1."""
+    """Check the port that `options.port` starts; return 0 if all checks pass, or 1."""
     shared.refuse(options, "--port", _OF_THE_CHECKS)
     cells, seed = requested_cells(
         shared.names(options.cell), programs, cases, options.draws, shared.chosen_seed(options)
@@ -62,10 +62,10 @@ def requested_cells(
     draws: str | None,
     seed: str | None,
 ) -> tuple[list[Cell], str]:
-    """Return the runs, those of Table 1 first, and the seed of random scenes.
+    """Return the runs to check, those of Table 1 first, and the seed of random scenes.
 
-    `names` are leading parts of names, such as ``two-term/case-3`` or ``random/7``, or empty for
-    all. `draws` is the number of random scenes as text. The seed is by default the present year and
+    `names` are beginnings of names, such as ``two-term/case-3`` or ``random/7``, or empty for all.
+    `draws` is the number of random scenes as text. The seed is by default the present year and
     week, and empty without random scenes.
     """
     count = 0 if draws is None else shared.whole(draws, "--draws")
@@ -83,7 +83,7 @@ def requested_cells(
 
 
 def check_integrator(options: argparse.Namespace) -> int:
-    """Check an integrator, started by `options.integrator`; return 0 if all checks pass, else 1."""
+    """Check the integrator that `options.integrator` starts; return 0 if all checks pass, or 1."""
     shared.refuse(options, "--integrator", (*_OF_THE_CHECKS, "port", "program", "case"))
     command = options.integrator
     due = shared.positive(options.order, "--order", 1.0)

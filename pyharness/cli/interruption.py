@@ -1,6 +1,6 @@
 """Interruption: at any time Ctrl-C ends a command with one line and exit status 130.
 
-KeyboardInterrupt can be raised between any two instructions; an import may replace it, and a
+KeyboardInterrupt can be raised between any two instructions. An import may replace it, and a
 finalizer or a callback may drop it. The signal is therefore recorded, and a dropped exception is
 raised again.
 """
@@ -37,7 +37,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """End the process with status 130, after its line is printed, without cleanup."""
+        """Print the line, unless printed before, and end the process with 130, without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -75,7 +75,7 @@ def came() -> bool:
 def leave_when_interrupted() -> bool:
     """Make Ctrl-C end the process at once; return False if SIGINT is ignored.
 
-    It is for periods without cleanup: during imports, and after the results are written.
+    It serves while nothing needs cleanup: during imports, and after the results are written.
     """
     # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -165,7 +165,7 @@ def _show_warning(
 
 
 def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a hook for unraisable exceptions, without KeyboardInterrupt after Ctrl-C."""
+    """Return a hook for unraisable exceptions that ignores KeyboardInterrupt after Ctrl-C."""
 
     def report_unraisable(unraisable: Any) -> None:
         if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):

@@ -47,8 +47,13 @@ VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.item
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line, by default this process's, and return its exit status.
 
-    The status is 0 for expected results, 1 for an unexpected result such as a failed check, 2 for
-    wrong usage or input, 3 without the Fortran extension, and 130 after an interrupt.
+    The status is
+
+    - 0 for expected results;
+    - 1 for an unexpected result, such as a failed check;
+    - 2 for wrong usage or input;
+    - 3 without the Fortran extension;
+    - 130 after an interrupt.
     """
     # Garbage collection during the imports takes 4 % of the time of a command and frees nothing.
     gc.set_threshold(100_000)

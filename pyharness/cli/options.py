@@ -70,8 +70,8 @@ _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
     """Return --format, --plot and --out with their help texts.
 
-    The first of `formats` is the default. `plot` says what the picture shows; if empty, there is no
-    --plot.
+    The first of `formats` is the default. `plot` names the content of the picture; if empty, there
+    is no --plot.
     """
     first, *others = formats
     form = {"--format F": f"Output format of the result: {first} (default), {', '.join(others)}."}
@@ -112,7 +112,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, leading parts of ids, as in ``cells/two-term``.
+    """Return the names in --only, which are beginnings of ids, as in ``cells/two-term``.
 
     Raise InputError if the part before the first slash is not in `allowed`.
     """
@@ -213,7 +213,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the stop test's constant (1/s), by default 500 as on the cards."""
+    """Return the stop test's limit (1/s), by default 500 as on the cards."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -222,7 +222,7 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if an option of `names`, as in "no_stop", is set despite `chosen`."""
+    """Raise InputError if an option of `names`, such as "no_stop", is given besides `chosen`."""
     for name in names:
         if getattr(options, name):
             raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")
@@ -290,7 +290,7 @@ def also_files(options: argparse.Namespace) -> dict[str, str]:
 def check_outputs(options: argparse.Namespace) -> None:
     """Raise InputError if a file of --out, --plot or --also can't be written.
 
-    It is called before any computation.
+    Verbs call it before any computation.
     """
     more = also_files(options)
     if more:
@@ -321,7 +321,7 @@ def show(
     options: argparse.Namespace,
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
 ) -> None:
-    """Write a report in the format of --format, and the picture of --plot.
+    """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
     `own` maps formats of this report alone, such as "tape5", to functions that return the content.
     """

@@ -1,6 +1,6 @@
 """Functions that write output folders, completely or not at all.
 
-Messages name `option`, the source of the path. The checks precede any computation.
+Messages name `option`, the source of the path. Verbs call the checks before any computation.
 """
 
 import json
@@ -19,7 +19,7 @@ _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a v
 
 
 def check_apart(picture: str, out: str) -> None:
-    """Raise InputError if --out is one of the files of --plot, the picture or its CSV."""
+    """Raise InputError if --out is the picture of --plot or its CSV file."""
     for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
         if os.path.realpath(path) == os.path.realpath(out):
             raise InputError(
@@ -43,7 +43,7 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return the reason why a folder can't be made, after a colon, or an empty text.
+    """Return the reason why a folder can't be made, after a colon, or "".
 
     The folder is made and removed: permissions do not show that a name is too long, or that a file
     system accepts no folder.
@@ -102,7 +102,7 @@ def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None
 
 
 def _why_not_anew(folder: Path, mark: str, kind: str) -> str:
-    """Return the reason why a folder may not be replaced, or an empty text."""
+    """Return the reason why a folder may not be replaced, or ""."""
     if Path.cwd().is_relative_to(folder):
         return "is the folder that you are in, or one above it"
     if not os.access(folder.parent, os.W_OK) or os.path.ismount(folder):
@@ -135,8 +135,8 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    A temporary folder is renamed before the old one is removed; a failure, InputError, leaves the
-    old one unchanged.
+    The new folder is complete before the old one is removed. On failure raise InputError and leave
+    the old one unchanged.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

@@ -33,7 +33,7 @@ print(found.attitude.round(6))
 AGREEMENT = 2e-15
 """The largest difference between the page's closed form and the Fortran method.
 
-It bounds each component of the attitude, and omega relative to its largest component.
+It bounds each component of the attitude, and the error of omega relative to its largest component.
 """
 
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
@@ -86,7 +86,7 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return the moments (kg m2) of a homogeneous box (m, kg), rounded only once."""
+    """Return the moments (kg m2) of a homogeneous box (in m and kg), rounded only once."""
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
     return [float(twelfth * (sum(squares) - square)) for square in squares]

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
-Browsers do not import modules into a page opened from a file. In the script every module is a
-function that returns its exports, after the modules that it imports. Only the project's forms of
-import and export are supported.
+Browsers do not import modules into a page opened from a file. In the script, every module is a
+function that returns its exports, and follows the modules that it imports. Only the project's forms
+of import and export are supported.
 """
 
 import re
@@ -20,7 +20,7 @@ _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
 def bundle(entry: Path) -> str:
-    """Return a classic script of the module in `entry` with all its imports.
+    """Return a classic script of the module in the file `entry` with all its imports.
 
     The script defines no global names. Raise ValueError, with file and line, for an unsupported
     form, a missing file or name, or circular imports.

@@ -1,4 +1,4 @@
-"""The description of the data package by RO-Crate 1.1."""
+"""The RO-Crate 1.1 description of the data package."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

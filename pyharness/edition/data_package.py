@@ -164,7 +164,7 @@ def _readme(parts: list[Part]) -> Part:
 
 
 def _manifest(content: Mapping[str, bytes]) -> bytes:
-    """Return checksums in the form of `sha256sum -c`."""
+    """Return checksums in the form that `sha256sum -c` reads."""
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
     return "".join(lines).encode()
 

@@ -58,8 +58,8 @@ class Note(NamedTuple):
 class PortLine(NamedTuple):
     """A line of the Fortran port, and the defect or reading on which it depends.
 
-    `switch` is None if it depends on none; `active` is whether the line is executed with the switch
-    on or off.
+    `switch` is None if it depends on none; `active` is whether it is executed with the switch on
+    or off.
     """
 
     place: Place
@@ -104,9 +104,9 @@ class CardView(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A printed page: its number from 1, its cards, and its place in the scan.
+    """A printed page: its number from 1 and its cards.
 
-    `moved` explains an unexpected place, else it is None.
+    `moved` explains an unexpected place in the scan, or is None.
     """
 
     number: int
@@ -221,7 +221,7 @@ def _scan(card: Card) -> list[Run] | None:
 
 
 def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
-    """Return runs with the blanks that `line`, of the same characters, has."""
+    """Return runs with the blanks of `line`, which has the same characters."""
     found, at = [], 0
     for run in runs:
         begin, missing = at, len(run.text)

@@ -1,7 +1,7 @@
 """Figures 6 to 12 of the thesis for the web site, drawn from computed curves.
 
-Another picture shows Figure 7 with the function to which omega of its original program converges as
-the step size goes to 0.
+Another picture shows Figure 7 with the limit of omega of its original program as the step size goes
+to 0.
 """
 
 from collections.abc import Mapping
@@ -46,9 +46,9 @@ def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
 
 
 class Printed(NamedTuple):
-    """A figure of the thesis, with our drawings of it, by file name without suffix.
+    """A figure of the thesis, with our drawings of it by file name without suffix.
 
-    `says` has each sentence of the thesis on the figure with its anchor, which is empty for
+    `says` has the thesis's sentences on the figure, each with its anchor, which is empty for
     sections I to IV. `ours` is the text for a figure that is not drawn, else empty.
     """
 
@@ -61,7 +61,7 @@ class Printed(NamedTuple):
 
     @property
     def anchor(self) -> str:
-        """Return the anchor of a figure that is not drawn, else an empty text."""
+        """Return the anchor of a figure that is not drawn, else ""."""
         return "" if self.drawn else f"figure-{self.number:02d}"
 
 

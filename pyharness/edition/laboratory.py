@@ -23,7 +23,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 
 DEFAULTS: dict[str, Any] = {"case": 2, "program": "runge-kutta", "listing": "original"}
-"""The run shown if the page's address specifies none."""
+"""The run that the page shows if its address specifies none."""
 MOST_STEPS = 3000
 """The largest number of steps of a run on the page, drawn without noticeable delay.
 
@@ -60,7 +60,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the values with which the script runs any program on any case."""
+    """Return the values that the script needs to run any program on any case."""
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
@@ -125,7 +125,6 @@ def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
 
 
 def _described(scene: Scene) -> list[str]:
-    """Return lines on the body, the torque and remarks of a case."""
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
     return [f"{body}; {torque}", *lines[2:]]

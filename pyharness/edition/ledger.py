@@ -25,7 +25,7 @@ from pyharness.views import html
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis, with the judgements of its claims and its anchor."""
+    """A sentence of the thesis, with its anchor and the judgements of its claims."""
 
     sentence: Sentence
     judged: list[Judgement]

@@ -82,7 +82,7 @@ def outcomes_table() -> str:
 
 
 def _pages(program: str, case: int) -> dict[tuple[str, str], str]:
-    """Return a program's pages by listing and word, the machine's words first."""
+    """Return a program's pages by listing and arithmetic, the machine's first."""
     words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
     return {
         (name, word): our_page(listing, case, card_steps(program), word)
@@ -99,7 +99,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 def _stored(texts: dict[str, str], name: str, text: str) -> str:
     """Return the name under which a page is stored: its own, or an equal page's.
 
-    Pages in the machine's words are always stored under their own names.
+    Pages in the machine's arithmetics are always stored under their own names.
     """
     program = name.partition("-case-")[0]
     same = [known for known in texts if known.startswith(program) and texts[known] == text]
@@ -110,7 +110,7 @@ def _stored(texts: dict[str, str], name: str, text: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield the jobs; if rounding changes a program's page, also with rounding."""
+    """Yield the jobs, also with rounding if it changes the program's page."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:

@@ -127,7 +127,7 @@ def _anchor(tokens: Sequence["Token"]) -> None:
 
 
 def slug(title: str) -> str:
-    """Return GitHub's anchor of a heading."""
+    """Return the anchor that GitHub gives a heading."""
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 

@@ -18,7 +18,7 @@ def origins_of_step(what: str) -> list[tuple[str, str]]:
 
 
 def anchor_of(disagreement: Disagreement) -> str:
-    """Return the anchor of a disagreement in its page."""
+    """Return the anchor of a disagreement on its page."""
     return slug(disagreement.title)
 
 

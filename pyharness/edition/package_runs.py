@@ -18,7 +18,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.views.csv import csv_text
 
 FAULTS_CASE = 5
-"""The case for the effects of single faults; the cards give its initial omega."""
+"""The case for the effects of single faults; its initial omega is on the cards."""
 
 _ENDS = "case program listing steps ended stop_step stop_variable"
 _ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"

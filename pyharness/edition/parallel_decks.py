@@ -35,7 +35,7 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row; the `entry` of a marked run is a kind of difference."""
+    """A card in an aligned row; the `entry` of a marked run is the kind of its difference."""
 
     card: Card
     runs: list[Run]
@@ -64,7 +64,7 @@ class Operation(NamedTuple):
 
 
 def operations() -> list[Operation]:
-    """Return all operations on cards, without comments."""
+    """Return all operations that have cards, without comments."""
     return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
 
 
@@ -114,7 +114,7 @@ def _likeness(one: Card, other: Card) -> float:
 
 
 def _compared(row: dict[str, Card]) -> AlignedRow:
-    """Return a row with the parts that differ between any two cards."""
+    """Return a row with marks on the parts that differ between any two cards."""
     marks: dict[str, dict[int, str]] = {program: {} for program in row}
     parts = {program: _split_card(card) for program, card in row.items()}
     for one, other in combinations(row, 2):

@@ -31,7 +31,7 @@ def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
 
 
 def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
-    """Return the report on the package's files, with its identifiers."""
+    """Return the report on the package's files and identifiers."""
     identifiers = {
         "package": directory_identifier(content), "data": data_identifier(), "text": text_digest(),
     }  # fmt: skip

@@ -80,7 +80,7 @@ MENU = {
 
 
 class Found(NamedTuple):
-    """A search entry for a place in a page; `kind` is as in ``claim``."""
+    """A place in a page that the search finds; `kind` is as in ``claim``."""
 
     href: str
     title: str
@@ -89,10 +89,7 @@ class Found(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page before rendering.
-
-    `found` has its search entries.
-    """
+    """A page before rendering, with the places that the search finds."""
 
     path: str
     title: str
@@ -282,7 +279,7 @@ def script(name: str, value: Any) -> bytes:
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the entries of `vendor.toml`, the third-party JavaScript."""
+    """Return the entries of `vendor.toml`, which lists the third-party JavaScript."""
     with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
         packages: list[dict[str, Any]] = tomllib.load(file)["package"]
     return packages

@@ -42,8 +42,8 @@ class Curve(NamedTuple):
 class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
-    `x` and `y` are ranges; a logarithmic `y` has exponents of ten. Ticks are pairs of position and
-    label. If `is_marked`, points are marks without lines.
+    `x` and `y` are ranges, in exponents of ten for a logarithmic `y`. Ticks are pairs of position
+    and label. If `is_marked`, points are marks without lines.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Chart(NamedTuple):
 
 
 def data() -> dict[str, Any]:
-    """Return the values with which the script runs the programs."""
+    """Return the values that the script needs to run the programs."""
     return {
         "scenes": {number: requested_scene(case_scene(number)) for number in _cases()},
         "original": {name: list(switches(name)) for name in PROGRAMS},
@@ -156,7 +156,7 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return each corrected collocation error over the corrected Runge-Kutta error."""
+    """Return the errors of the corrected collocation programs over that of Runge-Kutta."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}

@@ -1,4 +1,4 @@
-"""The effects of the programs' defects on the errors against the reference."""
+"""The effects of apparatus entries, such as defects, on the errors of the programs."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ from pyharness.truth.reference import Reference, reference
 class Effect:
     """The outcome of one listing on one scene.
 
-    Errors of `omega` (rad/s) and `velocity` (m/s) are the largest over the completed `steps`.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`.
     """
 
     listing: Listing
@@ -36,7 +36,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The effect of one apparatus entry in one program and case, from four listings."""
+    """The outcomes of four listings in one program and case, which show the effect of one entry.
+
+    In `corrected_alone` only this entry is corrected; in `kept_alone` only this one is kept.
+    """
 
     program: str
     case: int
@@ -64,7 +67,7 @@ def entry(name: str) -> dict[str, Any]:
 
 
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
-    """Return the errors of a listing's run against `truth`, and its ending."""
+    """Return the outcome of a listing on a scene, with errors against `truth`."""
     run = run_program(scene, listing, effort=effort)
     found = accuracy(scene, run, truth)
     velocity = math.nan if found.velocity is None else found.velocity
@@ -79,7 +82,7 @@ def case_truth(case: int) -> Reference:
 
 
 def effects_of(name: str) -> Iterator[CaseEffects]:
-    """Yield the effect of the apparatus entry `name`, by program and case.
+    """Yield the effect of an apparatus entry in each of its programs and every case.
 
     For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
     and without it; `kept_alone` and `corrected` are the corrected listing with and without it.
@@ -110,8 +113,8 @@ def lattice(
 ) -> list[Effect]:
     """Return a program's outcomes with every subset of its defects, largest error first.
 
-    Readings and applicable conjectures vary too. A reading has no effect if a defect of its
-    statement is corrected.
+    The `readings` and, under a varying torque, the conjectures vary too. A reading has no effect if
+    a defect in the same statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)

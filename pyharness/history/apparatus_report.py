@@ -55,7 +55,7 @@ def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
 def entry_report(
     entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
 ) -> Report:
-    """Return the report of one entry with the fields `names`, and of any effects."""
+    """Return the report of one entry: the fields `names`, and a table of its `effects`, if any."""
     cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
     what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
     grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
@@ -84,7 +84,7 @@ def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
-    """Return a legend, and a table for each program: errors of the four listings by case."""
+    """Return a legend and, for each program, a table of errors by case and listing."""
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
@@ -107,7 +107,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report of each program's defect subsets, which are written as letters."""
+    """Return the report of the outcomes with every subset of defects, which letters stand for."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

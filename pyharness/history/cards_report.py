@@ -23,7 +23,7 @@ _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Return the report of `cards`, each with its scan line, Fortran, twin and entries."""
+    """Return the report of `cards`, each with its lines in scan, port and twin, and its entries."""
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
@@ -39,7 +39,7 @@ def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null if the scan agrees, and empty if it lacks the card.
+    `scan` is null where the scan agrees with our text, and empty where it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -92,7 +92,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the numbers of apparatus entries, and of the cards that they name, by kind."""
+    """Return the report of the numbers of apparatus entries and of their cards, by kind."""
     entries = facts("apparatus")["entry"]
     rows = []
     for kind in dict.fromkeys(each["kind"] for each in entries):

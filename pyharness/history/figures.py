@@ -1,4 +1,4 @@
-"""Figures 6 to 12 of the thesis: curves of omega and the reference, as pictures and a report.
+"""Figures 6 to 12 of the thesis, redrawn: omega of the programs against the reference.
 
 One set has the curves of the original programs, another those of the corrected programs.
 """
@@ -62,7 +62,7 @@ class FigurePlan:
 
     @property
     def stem(self) -> str:
-        """Return the name of the figure's files without endings, as in `figure-10a`."""
+        """Return the name of the figure's files without suffix, as in `figure-10a`."""
         of_set = "-corrected" if self.set == "corrected" else ""
         return f"figure-{self.number:02d}{self.part.lower()}{of_set}"
 
@@ -86,7 +86,7 @@ class Curve:
 
     @property
     def ending(self) -> str:
-        """Return the step and reason of an early end, or an empty text."""
+        """Return the step and reason of an early end, or ""."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -199,7 +199,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Return a picture of each omega over time, in front of the reference solution."""
+    """Return a picture of each omega component over time, in front of the reference solution."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -289,7 +289,7 @@ def _draw(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the plot of one omega component.
 
-    A curve farther from the reference's range than the largest |omega| may leave the plot.
+    A curve may leave the plot where it exceeds the reference's range by more than max |omega|.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

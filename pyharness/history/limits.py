@@ -57,8 +57,8 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the convergence.
 
-    `order` is from the last two halvings. It is None if one is only rounding or overflows, without
-    a limit, or if the limit is unbounded at `blow_up` (s).
+    `order` is from the last two halvings. It is None if one of them overflows or has only rounding
+    errors, and if there is no limit or the limit is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -139,16 +139,11 @@ def _limit_solution(
 def _extrapolated(scene: Scene) -> Rate:
     """Return the right-hand side of the two-term program's limit equation.
 
-    The original program adds the step size h to DT in every step, so that in step n the collocation
-    points are t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the right-hand
-    side of Euler's equations at omega = w, F' its Jacobian, and Q its quadratic part. The slope
-    along the first estimate is
-
-    g(s) = F(w + s F) = F + s F' F + s^2 Q(F).
-
-    The line through g(t/3) and g(2t/3), extrapolated to s = 0, is
-
-    2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
+    The original program adds the step size h to DT in every step. In step n the collocation points
+    are therefore t/3 and 2t/3 after the beginning of the step, with t = n h. Let F be the
+    right-hand side of Euler's equations at omega = w, F' its Jacobian, and Q its quadratic part.
+    The slope along the first estimate is g(s) = F(w + s F) = F + s F' F + s^2 Q(F). The line
+    through g(t/3) and g(2t/3) has at s = 0 the value 2 g(t/3) - g(2t/3) = F - (2/9) t^2 Q(F).
     """
     right_hand_side = scene.right_hand_side()
     a, b, c = scene.euler_coefficients

@@ -49,11 +49,11 @@ def fits(
     cases: Sequence[int],
     progress: Progress = no_progress,
 ) -> list[Fit]:
-    """Compare a page from another machine with our pages of the same form.
+    """Return the comparisons of a page with our pages of the same form, nearest first.
 
     The form is the moments and torques in the heading and the number of columns. Our runs have as
-    many steps as in the text of the thesis or, for a longer page, on the cards. The nearest page is
-    first. Raise InputError if no page has the form.
+    many steps as in the text of the thesis or, for a longer page, on the cards. Raise InputError if
+    no page has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}

@@ -1,11 +1,12 @@
 """The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
 
-The thesis does not print its programs for subdomain, Galerkin and least squares. According to IV.2
-they gave no meaningful results in Cases 1 and 2, where the solution is known. Each entry of
-`data/lost.toml` is a conjecture: a mistake that such a program may have had. The method is from
-IV.2: a trial function of two terms, the products written out as polynomials, one solution for a
-constant right-hand side, and one correction. It fails if its error exceeds a tenth of the largest
-omega.
+The thesis does not print its programs for the subdomain, Galerkin and least-squares methods.
+According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
+Each entry of `data/lost.toml` is a conjecture: a mistake that such a program may have had.
+
+The method is that of IV.2: a trial function of two terms, the products written out as polynomials,
+one solution for a constant right-hand side, and one correction. It fails if its error exceeds a
+tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ TERMS = 2
 class Attempt:
     """The result of one method with one mistake on Cases 1 and 2.
 
-    `shares` has the error over the largest omega by case, `failed` the cases above the limit.
+    `shares` is the error divided by the largest omega, by case; `failed` has the failing cases.
     """
 
     mistake: str
@@ -65,7 +66,7 @@ class Ranked:
 
 
 def ranked(word: str = BINARY64) -> list[Ranked]:
-    """Return the mistakes with the results of each method, by failures in both cases."""
+    """Return the mistakes with the results of all methods, most failures in both cases first."""
     limit = facts("lost")["limit"]
     found = []
     for entry in facts("lost")["mistake"]:
@@ -90,10 +91,9 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 
 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
-    """Return omega by a method with one mistake, under constant torque.
+    """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
 
-    Its shape is (steps, 3), in rad/s, with NaN from an overflow on. The type of the scene's numbers
-    determines the arithmetic.
+    It is NaN from an overflow on. The type of the scene's numbers determines the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -200,7 +200,7 @@ def _factors(matrix: Array) -> Array:
 
 
 def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step reduces a method's error, without mistake."""
+    """Return the factor by which halving the step reduces the error of a method without mistake."""
     finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 

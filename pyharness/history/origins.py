@@ -1,4 +1,4 @@
-"""Disagreements of the decks and the thesis, and their evidence on the origin of faults.
+"""Disagreements of the decks and the thesis, as evidence on the origin of faults.
 
 The table `data/disagreements.toml` separates the sources' statements from our inferences.
 """
@@ -21,10 +21,10 @@ CERTAINTIES = tuple(CERTAINTY)
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    `steps` are from `data/cards/collation.toml`, `equations` are formulas of the thesis, `where`
-    and `says` a place in it and its words, `cards` are texts by program and number. `known` is from
-    the sources; `suggests` and `origin` are our inferences. `unnoticed` is the reason why the test
-    cases do not show the fault.
+    `steps` are from `data/cards/collation.toml`, `equations` are formulas of the thesis. `where` is
+    a place in the thesis, and `says` its words. `cards` are texts by program and number. `known` is
+    from the sources; `suggests` and `origin` are our inferences. `unnoticed` is the reason why the
+    test cases do not show the fault.
     """
 
     id: str
@@ -59,7 +59,7 @@ def unexplained_defects() -> dict[str, str]:
 
 
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements that each pair shares, with uniform or `scanned_names`."""
+    """Return the number of statements that each pair shares, with uniform or scanned names."""
     found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 
@@ -70,7 +70,7 @@ def statement_count(program: str) -> int:
 
 
 def mistakes() -> list[str]:
-    """Return a sentence for each mistake in the table of disagreements."""
+    """Return a sentence for each mistake in the table."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

@@ -1,7 +1,7 @@
 """Compare a page that a machine printed with the pages that our programs print.
 
-It needs Python's standard library alone and is also a script, `machine/judge.py` in the data
-package beside the pages: ``python judge.py FILE`` compares the page in FILE. Its exit status is 0
+The module needs only Python's standard library. It is also the script `machine/judge.py` beside the
+pages in the data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0
 if a page is equal, 1 if all differ, and 2 if FILE has no page of this form.
 """
 
@@ -14,13 +14,13 @@ from itertools import zip_longest
 from pathlib import Path
 
 PAGES = "pages.csv"
-"""The table of the pages to compare, in the script's folder."""
+"""The table of the pages, in the script's folder."""
 
 # A number as FORMAT writes it: asterisks if too long, R or I (CDC) if not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
 _LEAST = 6  # every row of results has at least six numbers, and no line of the heading has
 SHOWN = 5
-"""The number of differences to show if no page is equal."""
+"""The number of differences shown if no page is equal."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return the steps for our run: those of the text, or of the cards for a longer page."""
+    """Return the steps for our run: those of the text or, for a longer page, of the cards."""
     return card_steps if rows > steps else steps
 
 

@@ -1,4 +1,4 @@
-"""The history of the edition's text: the changes in `data/revisions.toml`."""
+"""The history of the edition's text, from `data/revisions.toml`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -10,11 +10,11 @@ CHANGES = {
     "changed": "altered entries",
     "removed": "removed entries",
 }
-"""The fields of a revision that name apparatus entries, with headings."""
+"""The fields of a revision that name apparatus entries, with their headings."""
 
 
 class Revision(NamedTuple):
-    """A change of the edition's text, the cards and the apparatus.
+    """A change of the edition's text: the cards and the apparatus.
 
     `digest` identifies the text after the change, and is empty if the cards were not yet data.
     `cards` has numbers by program, as in ``750-770, 800``.

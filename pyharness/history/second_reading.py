@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
-The first reading of the scan is our text of the cards; the second is a random sample that was read
-again (`data/cards/second-reading.toml`). The numbers of misreadings that both or only one reading
-corrects give an estimate of the uncorrected ones.
+The first reading of the scan is our text of the cards. The second is a random sample that was read
+again (`data/cards/second-reading.toml`). The numbers of misreadings that one or both readings
+correct give an estimate of the uncorrected ones.
 """
 
 import random
@@ -55,15 +55,16 @@ class Recapture(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate: Lincoln and Petersen's, corrected for small samples."""
+    """Return Chapman's estimate, which corrects Lincoln and Petersen's for small samples."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of the size of a population.
 
-    With independent samples, the number in both is hypergeometric. Neither of its tails from `both`
-    on is below 0.025. Raise ValueError if `both` is 0, when there is no upper limit.
+    For independent samples, the number in both is hypergeometric. At a size in the interval,
+    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, when there is no
+    upper limit.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -86,7 +87,7 @@ def _probability(size: int, first: int, second: int, begin: int, end: int) -> fl
 
 
 def sample() -> list[Card]:
-    """Return the cards required in the second reading, ordered as in the decks."""
+    """Return the cards to be read a second time, ordered as in the decks."""
     given = facts("cards/second-reading")
     size = sum(len(given[program]) for program in PROGRAMS)
     drawn = set(random.Random(given["seed"]).sample([*witness_lines()], size))
@@ -126,7 +127,7 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> list[Recapture]:
     """Return the estimates with places and with whole cards as units.
 
-    Whole cards avoid the dependence of a machine's repeated misreading of a letter.
+    A machine repeats its misreading of a letter, which makes places dependent, but not cards.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():
@@ -140,12 +141,12 @@ def recaptures() -> list[Recapture]:
 
 
 def disagreeing() -> list[ReadCard]:
-    """Return the cards of the sample that the two readings read differently."""
+    """Return the cards of the sample on which the two readings differ."""
     return [each for each in read_cards() if each.first != each.second]
 
 
 def second_reading_report() -> Report:
-    """Return the report on two readings of sampled cards, with the estimated misreadings."""
+    """Return the report on the two readings of the sample, with the estimated misreadings."""
     found, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]

@@ -1,8 +1,8 @@
 """TAPE5, the file of unformatted sequential records that each program writes.
 
 Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one record: its length in bytes, seven binary64 numbers, and
-the length again, all little-endian, as in today's Fortran compilers and `scipy.io.FortranFile`. The
-author's tape had other record marks and, as we infer, words of 60 bits.
+the length again. All are little-endian, as in today's Fortran compilers and `scipy.io.FortranFile`.
+The author's tape had other record marks and, as we infer, words of 60 bits.
 """
 
 import numpy as np

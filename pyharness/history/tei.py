@@ -1,10 +1,14 @@
 """The edition as a TEI P5 document: every card, the scan's variants, and the apparatus.
 
-Cards are in order. A `pb` element marks the beginning of a page, with its position `n` in the scan.
-An `app` element is a difference: `lem` is our reading, `rdg` the scan's. An `fw` element is a
-heading added by an editor, a `surplus` text that belongs to no card. To restore the scan, take the
-pages in the order of `n`, each `rdg` instead of its `lem`, and the lines of cards, `fw` and
-`surplus`.
+The elements are:
+
+- `pb`: the beginning of a page, with its position `n` in the scan;
+- `app`: a difference, where `lem` is our reading and `rdg` the scan's;
+- `fw`: a heading added by an editor;
+- `surplus`: text that belongs to no card.
+
+Cards are in order. To restore the scan, take the pages in the order of `n`, each `rdg` instead of
+its `lem`, and the lines of cards, `fw` and `surplus`.
 """
 
 from collections.abc import Iterator
@@ -27,7 +31,7 @@ from pyharness.thesis.cards import Card, deck, numbers, parallels
 from pyharness.thesis.port_lines import Place
 
 SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
-"""The schema of the document, from version 4.12.0 of the TEI guidelines."""
+"""The schema of the document, of version 4.12.0 of the TEI guidelines."""
 
 _RESPONSIBLE = f"#{EDITORS}"
 _HEAD = (
@@ -40,7 +44,7 @@ _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why
 
 
 class _Page(NamedTuple):
-    """A page of the scan; `moved` explains an unexpected place, else it is None."""
+    """A page of the scan; `moved` explains an unexpected place, or is None."""
 
     number: int
     lines: list[Any]

@@ -9,7 +9,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 
 TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
-"""The tables in `data` that make up the edition's text, without the ending `.toml`.
+"""The tables in `data` that make up the edition's text, without the suffix `.toml`.
 
 They are the cards of each program with the scan's variants, and the apparatus.
 """

@@ -19,8 +19,8 @@ _MONTHS = (
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, or empty if no source dates it; `why` explains
-    an uncertain date.
+    `first` and `last` are months, as in ``1979-01``, or empty without a date; `why` explains an
+    uncertain one.
     """
 
     id: str

@@ -31,7 +31,7 @@ class WordRun:
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
     rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
-    25``. Of the `fields` numbers on the longer page, `different` differ. `error` is the largest
+    25``. The longer page has `fields` numbers, of which `different` differ. `error` is the largest
     error of omega (rad/s); `singular` counts rows with IER = 129.
     """
 
@@ -49,7 +49,7 @@ class WordRun:
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one program on one case: in binary64, with 113 bits, and others."""
+    """The runs of one listing on one case: in binary64, with 113 bits, and in other arithmetics."""
 
     double: WordRun
     widest: WordRun
@@ -75,7 +75,7 @@ def cells(
     lengths: Sequence[int] = LENGTHS,
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
-    """Yield the runs of the programs on the cases, in binary64, with 113 bits, and others."""
+    """Yield the runs of each program, original and corrected, on each case."""
     words = [Word(p, rule) for rule in RULES for p in lengths]
     chosen = [
         (case, listing)

@@ -139,7 +139,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell]) -> Picture:
-    """Return a picture of omega's largest error (rad/s) against p; a dashed line for 113 bits."""
+    """Return a picture of the largest error of omega (rad/s) against p; dashed: with 113 bits."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

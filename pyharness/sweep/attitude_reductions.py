@@ -26,7 +26,7 @@ def end_attitude(batch: Batch, _: Given) -> Array:
 
 
 def largest_tilt(batch: Batch, given: Given) -> Array:
-    """Return the largest angles (rad) of an axis from its initial direction, shape (n,)."""
+    """Return the largest angles (rad) between an axis and its initial direction, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     found: Array = 2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)).max(axis=1)
     return found
@@ -53,9 +53,9 @@ def axis_flips(batch: Batch, given: Given) -> NDArray[np.int64]:
 
 
 def pointing_error(batch: Batch, given: Given) -> Array:
-    """Return the final angles (rad) of an axis from a direction in space, shape (n,).
+    """Return the final angles (rad) between an axis and a direction in space, shape (n,).
 
-    The direction is `towards`; if empty, the axis's initial one.
+    The direction is `towards` or, if empty, the axis's initial one.
     """
     if not given["towards"]:
         return largest_tilt(batch, {**given, "samples": 1})
@@ -80,7 +80,7 @@ def _in_space(batch: Batch) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Given) -> tuple[Array, Array]:
-    """Return the squared cosine and sine of half the angle of an axis from its start."""
+    """Return the squared cosine and sine of half an axis's angle from its initial direction."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)

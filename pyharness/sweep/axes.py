@@ -40,8 +40,11 @@ class Axis:
     """One axis of a sweep's grid: a field of the scene or solver, as in ``omega.1``.
 
     Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
-    together. `how` is `listed`, a spacing of `SPACINGS`, or a distribution of `DRAWS`; `values` are
-    accordingly all values, both ends, or the distribution's parameters.
+    together. `how` tells what `values` are:
+
+    - `listed`: all values;
+    - a spacing of `SPACINGS`: both ends;
+    - a distribution of `DRAWS`: its parameters.
     """
 
     field: str
@@ -195,7 +198,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError, with `where`, if its field does not allow its extremes."""
+    """Return `axis`; raise InputError, with `where`, if its extremes are not allowed."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

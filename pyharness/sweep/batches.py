@@ -1,6 +1,6 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-`scene` has the values that do not vary; `own` maps each varied field to its n values.
+`scene` has the values that all share; `own` maps each field that varies in the batch to n values.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 
 def looped_fields(sweep: Sweep) -> list[str]:
-    """Return the varied fields that must be equal in all scenes of a batch."""
+    """Return the varied fields whose values must be equal in all scenes of a batch."""
     fields = [axis.field for axis in sweep.axes]
     found = [
         name
@@ -57,7 +57,7 @@ def looped_fields(sweep: Sweep) -> list[str]:
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
     """Yield the batches of selected scenes, each with its positions in `where`.
 
-    `where` has, for each dimension of the grid, the indices of the scenes.
+    `where` has the indices of the scenes, an array for each dimension of the grid.
     """
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
@@ -137,7 +137,7 @@ def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | 
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments" (kg m2) or "coefficients", and numbers (n, 3); "", None if not varied."""
+    """Return "moments" (kg m2) or "coefficients", and their values (n, 3); or "" and None."""
     if scene.coefficients is not None:
         found = _three("body.coefficients", scene.coefficients, own, n)
         return ("coefficients", found) if found is not None else ("", None)
@@ -179,9 +179,9 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors (n, 3) by angles (rad) relative to the body's principal axes.
+    """Return unit vectors (n, 3) with given angles (rad) from the body's principal axes.
 
-    `tilt` is from the axis of the middle moment, `azimuth` about it, from the axis of the least
+    `tilt` is from the axis of the middle moment. `azimuth` is about it, from the axis of the least
     moment towards that of the largest. `moments` is (n, 3), or None for the scene's body.
     """
     bodies = np.array([scene.moments]) if moments is None else moments

@@ -22,7 +22,7 @@ class DamageError(Exception):
 
 
 class Label(NamedTuple):
-    """The identity of a store: its format, the version of pyharness, the SHA-256 of the sweep."""
+    """The identity of a store."""
 
     schema: object  # number of the store's format; an integer if pyharness wrote the store
     version: str  # of pyharness
@@ -32,8 +32,8 @@ class Label(NamedTuple):
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
     """Return the content of a file of checksums of existing files.
 
-    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file can't be read,
-    is not regular, or is larger than `limit` (bytes).
+    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file is unreadable,
+    not regular, or larger than `limit` (bytes).
     """
     lines = [
         f"# pyharness sweep store, schema {label.schema}, version {label.version}, "
@@ -83,7 +83,7 @@ def _digest(folder: Path, name: str, limit: int) -> str:
 
 
 def _opened(folder: Path, name: str, limit: int) -> int:
-    """Return a descriptor; raise DamageError for a missing, large or not regular file."""
+    """Return a file's descriptor; raise DamageError if it is missing, large or not regular."""
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
         handle = os.open(folder / name, os.O_RDONLY | os.O_NONBLOCK)
@@ -108,9 +108,9 @@ def _opened(folder: Path, name: str, limit: int) -> int:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a path exists, if only as a link without target.
+    """Return whether a path exists, even as a link without target.
 
-    Raise DamageError if an error of the file system prevents the test.
+    Raise DamageError if the file system can't tell.
     """
     try:
         os.lstat(folder / name)
@@ -122,7 +122,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove anything at a path, but no link's target, and any file in place of its parents."""
+    """Remove anything at a path, except a link's target, and any file in place of its parents."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -138,7 +138,7 @@ def clear(folder: Path, name: str) -> None:
 def place_checksums(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Write the file `checksums` for files written just before; raise OSError if one is damaged."""
+    """Write the checksums of files just written; raise OSError if one of them is damaged."""
     try:
         content = checksum_text(label, part, folder, names, limit)
     except DamageError as damage:

@@ -14,8 +14,8 @@ from multiprocessing import connection, resource_tracker
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C in all processes and threads that are started within this context.
 
-    A terminal sends SIGINT to all its processes, but only the parent should react. The entering
-    thread receives a signal when the context ends.
+    A terminal sends SIGINT to all its processes, but only the parent should react. The calling
+    thread receives the signal when the context ends.
     """
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.

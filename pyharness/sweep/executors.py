@@ -206,8 +206,7 @@ def _connected(dask: Any, address: str) -> Any:
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
     """Wait until the Dask scheduler has workers; the caller limits the time.
 
-    Each answer without workers appends True to `answered`, so that the caller can distinguish it
-    from no answer.
+    Each answer without workers appends True to `answered`, which thus differs from no answer.
     """
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.
@@ -218,7 +217,7 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield number and results of each chunk; Dask computes the chunks of dead workers again."""
+    """Yield number and results of each chunk; Dask repeats the chunks of dead workers."""
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)

@@ -17,7 +17,7 @@ class Field:
     """A number of a scene or solver that an axis may vary.
 
     `takes` returns whether a value is allowed; `allowed` describes the allowed values. If `looped`,
-    all scenes of a call must share the value, except step size and Lipschitz constant of the
+    all scenes of a batch share the value; step size and Lipschitz constant are exceptions for the
     thesis's programs. If `whole`, values are rounded to integers.
     """
 

@@ -47,7 +47,7 @@ class Estimate:
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the seconds to solve and write the missing chunks, and to read all chunks.
 
-    If other processes compute, only the longer of the times to solve and to write counts.
+    If other processes compute, solving and writing overlap, and only the longer time counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -133,8 +133,8 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
-    Along dimensions in which a batch is constant, they have five distinct values, or more if the
-    batches of a chunk are small. The sample's batches are thus about as large as real ones.
+    Dimensions along which a batch is constant keep five distinct indices, or more if the batches of
+    a chunk are small. Thus the batches of the sample are about as large as real ones.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)

@@ -1,6 +1,6 @@
 """The picture of a sweep: a reduction over one or two dimensions, in panels.
 
-Each panel is for other values along the remaining dimensions.
+The panels differ in the values along the remaining dimensions.
 """
 
 import itertools
@@ -95,7 +95,7 @@ Panel = tuple[str, list[Array], Array]
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
 ) -> list[Panel]:
-    """Return by panel title (values along other dimensions, component), indices and values."""
+    """Return title (values along other dimensions, component), indices and values of each panel."""
     reduction = REDUCTIONS[asked.reduction]
     most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
     places = [_thinned(axis_of[d].count, most) for d in shown]

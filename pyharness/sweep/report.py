@@ -27,7 +27,7 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 
 
 class Found(NamedTuple):
-    """Statistics of a reduction's component, in `units`.
+    """Statistics of one component of a reduction, in `units`.
 
     `scenes` counts the scenes with a finite value, and `none` the others. `least`, `mean` and
     `largest` are None if no value is finite.
@@ -44,9 +44,9 @@ class Found(NamedTuple):
 
 
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
-    """Return statistics of a reduction's components, or counts of its codes of outcomes.
+    """Return the statistics of a reduction's components, and the counts of its codes of outcomes.
 
-    The other one is empty. Values are read in blocks.
+    One of the two is empty. Values are read chunk by chunk.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)

@@ -44,7 +44,7 @@ def bytes_per_scene(sweep: Sweep) -> int:
 
 
 def _bytes_per_chunk(sweep: Sweep, block: int) -> int:
-    """Return the bytes of a chunk's files with checksums, in whole blocks."""
+    """Return the bytes of a chunk's files and checksums, in whole blocks of the disk."""
     scenes = math.prod(sweep.chunk_shape)
     sizes = [empty(asked, 1).nbytes * scenes for asked in sweep.reductions]
     return block * sum(-(-size // block) for size in (*sizes, 1))
@@ -53,8 +53,7 @@ def _bytes_per_chunk(sweep: Sweep, block: int) -> int:
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the bytes of the missing chunks on disk, and of all workers in memory.
 
-    Raise InputError if the disk or half of the memory is too small, or if there are too many
-    chunks.
+    Raise InputError if the disk or half of the memory is too small, or for too many chunks.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
@@ -106,9 +105,16 @@ def swept(
     progress: bool | Progress = False,
     repair: bool = False,
 ) -> Iterator[tuple[Store, Outcome]]:
-    """Compute the missing chunks as `run_sweep`, and yield the open store and the outcome.
+    """Compute the chunks of a sweep that its store lacks; yield the open store and the outcome.
 
-    The store is locked until the context ends.
+    `path` is the store's folder, made if missing, and locked until the context ends. `executor` is
+    "here", "processes" or "dask"; "dask" starts a cluster here unless `address` names a scheduler,
+    as in ``tcp://host:8786``. `before` gets the forecast before the computation. `progress` is True
+    for a bar, or a function that is called after each chunk with the number of computed chunks, of
+    all to compute, and "chunks". With `repair`, damaged chunks and metadata are made again.
+
+    Raise InputError if the store is another sweep's or damaged, no cluster answers, or disk or
+    memory is too small; computed chunks remain.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)
@@ -138,16 +144,7 @@ def run_sweep(
     progress: bool | Progress = False,
     repair: bool = False,
 ) -> Outcome:
-    """Compute the chunks of a sweep that its store lacks, and return the outcome.
-
-    `path` is the store's folder, made if missing. `executor` is "here", "processes" or "dask",
-    which starts a cluster here without the `address` of a scheduler, as in ``tcp://host:8786``.
-    `before` gets the forecast before the computation. `progress` is True for a bar, or a function
-    that is called after each chunk with the number of computed chunks, of all to compute, and
-    "chunks". With `repair`, damaged chunks and metadata are made again. Raise InputError if the
-    store is another sweep's or damaged, no cluster answers, or disk or memory is too small;
-    computed chunks remain.
-    """
+    """Compute the missing chunks of a sweep as `swept` does, and return the outcome."""
     with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
         return outcome
 

@@ -1,6 +1,6 @@
 """Torques of a sweep that depend on the state.
 
-For other numbers, their scene is read again from its text.
+To change their numbers, the scene is read again from its text.
 """
 
 import tomllib
@@ -56,7 +56,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(scene: Scene) -> bool:
-    """Return whether the torque has a ready term with the body's inertia."""
+    """Return whether the torque has a ready term with the inertia of the scene's body."""
     return isinstance(scene.torque, StateTorque) and any(
         _is_of_body(dict(term), scene) for term in _terms(scene.torque)
     )

@@ -179,9 +179,9 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether `path` has the results of this sweep; False if missing or empty.
+    """Return whether `path` is the store of this sweep; False if it is missing or empty.
 
-    Raise InputError for any other file or folder, or if no folder can be made.
+    Raise InputError for any other file or folder, or if the folder can't be made.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -240,7 +240,7 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make an empty store by renaming, so that `folder` is always missing or has all metadata."""
+    """Make an empty store and rename it to `folder`, which is therefore never incomplete."""
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)

@@ -22,9 +22,9 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class ReductionSpec:
-    """A requested reduction, a key of `REDUCTIONS`, with parameters and array name.
+    """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For the reduction `claim`, `function` names the function that checks the claim, as in
+    For the reduction `claim`, `function` checks the claim; it is named as in
     ``package.module:name``.
     """
 

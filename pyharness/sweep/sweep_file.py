@@ -48,8 +48,8 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
     """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
     The path of a scene file is relative to the sweep file. `claims` maps each claim to the function
-    that checks it, as in ``package.module:name``: for a `Batch` of n scenes it returns 1 where the
-    claim holds, 0 fails, 2 does not apply, 3 holds in part.
+    that checks it, as in ``package.module:name``. For a `Batch` of n scenes it returns 1 where the
+    claim holds, 0 where it fails, 2 where it does not apply, 3 where it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"

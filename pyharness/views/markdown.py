@@ -5,7 +5,7 @@ from pyharness.views.table import paragraph
 
 
 def write(report: Report) -> str:
-    """Return a report as Markdown; its data, without a page, have all digits."""
+    """Return a report as Markdown: its page, or else its data with all digits."""
     if report.page is not None:
         return "\n".join(map(_section, report.page))
     assert report.data is not None

@@ -150,7 +150,7 @@ def chosen(
 ) -> list[SceneContender]:
     """Return the solvers for single scenes that the option `where` selects, by default all.
 
-    Raise InputError if a listed solver can't compute the attitude, but `attitude` requires it.
+    Raise InputError if `attitude` is true and a listed solver can't compute it.
     """
     if text is None:
         return list(contenders)

@@ -27,10 +27,10 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print verdicts on the claims of the thesis, or with an option the effect of unstated values.
+    """Print verdicts on the claims of the thesis, or the effect of values that it leaves open.
 
-    --assignments, --evidence and --atlas test with which values, such as the initial omega, the
-    claims hold.
+    --assignments, --evidence and --atlas test for which of these values, such as the initial omega,
+    the claims hold.
     """
     if options.assignments:
         shared.refuse(options, "--assignments", ("explain", "evidence", "word"))

@@ -35,7 +35,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _card(options: argparse.Namespace) -> int:
-    """Print the card `options.name`, its apparatus entries, and their effects."""
     from pyharness.history.cards_report import cards_report
     from pyharness.thesis.cards import chosen
 

@@ -29,7 +29,7 @@ EXAMPLE = "family --case 5 --weighting galerkin --terms 3"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure the orders of weighted residual methods beside the theory.
+    """Print the orders of weighted residual methods, measured and derived.
 
     Return 1 if a measured order is below the derived one.
     """

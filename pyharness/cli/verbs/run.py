@@ -52,7 +52,8 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 def run(options: argparse.Namespace) -> int:
     """Print one trajectory.
 
-    Return 1 if, with --strict, amplified rounding errors exceed the tolerance.
+    With --strict, return 1 if amplified rounding errors exceed the tolerance, or if the integration
+    may have stepped over a short change of the torque.
     """
     by_method = options.method is not None
     scene = shared.chosen_scene(

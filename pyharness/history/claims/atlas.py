@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes. A claim has 1 point if it is
-reproduced, 1/2 if in part, without weights. Verdict codes are from `over_starts`.
+The starts cover the sphere of directions at several magnitudes. Each claim counts equally: 1 point
+if it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,8 +39,8 @@ Codes = NDArray[np.int8]
 class Atlas:
     """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
 
-    The axes of `codes` are reading, steps, magnitude of omega(0) (rad/s), height (omega3 over the
-    magnitude) and longitude (rad).
+    The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
+    over the magnitude) and longitude (rad).
     """
 
     codes: Mapping[str, Codes]
@@ -56,11 +56,11 @@ class Atlas:
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
 
     def choices(self) -> list[tuple[str, int]]:
-        """Return all pairs of reading and number of steps, ordered like the codes."""
+        """Return all pairs of reading and number of steps, in the order of `codes`."""
         return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the points of each start; `reading` and `steps` are indices."""
+        """Return the total points of each start; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
@@ -117,7 +117,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return, by case, the claims in `names` about that case alone."""
+    """Return the claims in `names` that concern a single case, by case."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -127,7 +127,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the codes of the claims for the original programs, by start in `starts`."""
+    """Return the verdict codes of the claims for the original programs, by start in `starts`."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}

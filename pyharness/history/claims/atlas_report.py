@@ -30,7 +30,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of `claims --atlas`, for the first reading and number of steps."""
+    """Return the report of `claims --atlas`, mostly for the first reading and number of steps."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -157,7 +157,7 @@ def _by_choice(atlas: Atlas) -> Table:
 
 
 def _percentage_turned(atlas: Atlas) -> Table:
-    """Return the percentage of starts at which another reading or step number changes a verdict."""
+    """Return, by claim, the percentage of verdicts that another reading or step number changes."""
     places = [(k, 0) for k in range(1, len(atlas.readings))]
     places += [(0, m) for m in range(1, len(atlas.steps))]
     rows = []
@@ -170,7 +170,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return maps of the points over the sphere of directions, and each claim's mean points."""
+    """Return a picture: points over the sphere of directions, and mean points of each claim."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")

@@ -2,8 +2,8 @@
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
 one value for all cases in which the thesis gives none, or for each case the value that we adopt.
-The score is the number of testable claims about the original programs that are reproduced; in part
-counts one half. There are no weights and no tuned parameters.
+The score is the number of testable claims about the original programs that are reproduced; a claim
+reproduced in part counts one half. There are no weights or tuned parameters.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from pyharness.model.listing import PROGRAMS, names_of
 POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
 STEPS = (100, 300)
 KINDS = ("result", "design")
-"""The kinds of claims about the programs."""
+"""The kinds of claims that are scored, those about the programs."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Combination:
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return this combination's values, as text, by name of the choice."""
+        """Return the value of each choice as text, by the name of the choice."""
         given = self.assumptions
         start = given.start or ()
         return {
@@ -104,9 +104,9 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 
 
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
-    """Return `chosen` with the defaults for assumptions on which a claim does not depend.
+    """Return `chosen` with the defaults for assumptions on which the claim does not depend.
 
-    Assumptions that become equal need one test of the claim.
+    Combinations that differ in these alone share one test of the claim.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

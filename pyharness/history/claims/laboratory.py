@@ -1,4 +1,4 @@
-"""The laboratory that tests claims: it runs the programs under assumptions, each run once."""
+"""The laboratory, which runs the programs under assumptions to test claims; runs are cached."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) where the thesis gives none; None selects the value in `cases.toml`.
-    `readings` are those that this edition does not adopt. `word` is the arithmetic.
+    `readings` are alternatives to the readings that this edition adopts. `word` is the arithmetic.
     """
 
     start: Triple | None = None
@@ -39,8 +39,13 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
-    `parts` divides the step size of a run; results are at the steps of the case. Without `may_stop`
-    the stop test of the Runge-Kutta program is skipped. Errors are against the reference solution.
+    `parts` divides the step size of a run; `runs` and `error` use the steps of the case. Without
+    `may_stop` the stop test of the Runge-Kutta program is skipped. Errors are against the reference
+    solution.
+
+    The points of the collocation model are at k/(n+1) of the interval length DT, k = 1 ... n. In
+    the original programs DT grows by the step size in every step, so that the points move out of
+    the step, and the torque must be constant.
     """
 
     is_original: bool
@@ -68,7 +73,7 @@ class Laboratory:
     def run_on(
         self, scene: Scene, listing: Listing, may_stop: bool = True, lipschitz: float = 500.0
     ) -> Trajectory:
-        """Return the run of a listing on a scene in the assumed word; `lipschitz` is in 1/s."""
+        """Return the run of a listing in the assumed arithmetic; `lipschitz` is in 1/s."""
         return _run(listing, scene, may_stop, lipschitz, self.assumptions.word)
 
     def truth(self, case: int) -> Reference:
@@ -76,7 +81,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return a program's omega, NaN after the end of the run, with its steps and ending."""
+        """Return the run of a program on a case at the steps of the case."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -93,12 +98,7 @@ class Laboratory:
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the collocation model with n = `terms` terms, shape (steps, 3).
-
-        Its points are at k/(n+1) of the interval length DT, k = 1 ... n. In the original programs
-        DT grows by the step size in every step, so that the points move out of the step, and the
-        torque must be constant.
-        """
+        """Return omega (rad/s) of the model with n = `terms` terms, shape (steps, 3)."""
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
@@ -124,7 +124,7 @@ def starts() -> list[Triple]:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component, over rows in both arrays."""
+    """Return the largest difference (rad/s) of any omega component, over the common rows."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
@@ -183,7 +183,7 @@ def _model(scene: Scene, terms: int, accumulates: bool, word: str) -> Array:
 
 
 LITERALS = ("DT=", "T=", "DT+")
-"""The statements of the collocation decks with the step size as a literal number.
+"""The statements of the collocation decks in which the step size is a literal number.
 
 ``DT=`` sets the interval length DT before the loop, ``T=`` sets the end of the interval, and
 ``DT+`` adds to DT in every step.
@@ -215,12 +215,12 @@ def integrate_models(
     omega: Array, coefficients: Array, torque: Array, terms: int,
     dt: float, end: float, growth: float, steps: int,
 ) -> Array:  # fmt: skip
-    """Integrate the collocation model of n bodies with constant torque at once.
+    """Return omega (rad/s) of the collocation model for n bodies at once, shape (n, steps, 3).
 
-    `omega` (rad/s) has the shape (n, 3), `coefficients` A, B and C in its last axis; `torque` is
-    over the moments (rad/s2). The points divide (0, dt) evenly, where dt (s) grows by `growth` (s)
-    in every step of length `end` (s). Return omega (rad/s), shape (n, steps, 3), as in the programs
-    except for rounding; NaN from an overflow on.
+    `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. The
+    constant `torque` is divided by the moments (rad/s2). The points divide (0, dt) evenly, where dt
+    (s) grows by `growth` (s) in every step of length `end` (s). The results are those of the
+    programs except for rounding, and NaN from an overflow on.
     """
     a, b, c = coefficients.T
 

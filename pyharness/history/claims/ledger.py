@@ -1,7 +1,4 @@
-"""The claims of the thesis, and verdicts on them for original and corrected programs.
-
-A claim is an entry of `data/claims.toml`.
-"""
+"""The claims of the thesis, entries of `data/claims.toml`, and our verdicts on them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -22,7 +19,7 @@ _ROOMS = (verdicts, methods, theory)
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on one claim with one assumption changed; it `survives` if they are the same."""
+    """The verdicts on a claim with one assumption changed; it `survives` if they do not change."""
 
     assumption: str
     original: str
@@ -32,7 +29,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, and those with each assumption changed, one at a time."""
+    """The verdicts on a claim, as adopted and with each assumption changed, one at a time."""
 
     claim: dict[str, Any]
     original: Judged
@@ -44,8 +41,8 @@ class Judgement:
 class Assignment:
     """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts.
 
-    It `holds` if the original programs reproduce, at least in part, all claims about the case
-    except those that fail with every start.
+    It `holds` if the original programs reproduce, at least in part, all claims about this case.
+    Claims that fail with every start do not count.
     """
 
     case: int

@@ -61,9 +61,10 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The stop test applies eq. 19 only if its quotients, changes of a derivative between two stages
-    over changes of its variable, are Lipschitz quotients of the differential equations. These are
-    at most the norm of the Jacobian, here the largest along the reference and the run.
+    The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the differential
+    equations. A quotient is the change of a derivative between two stages, divided by the change of
+    its variable. A Lipschitz quotient is at most the norm of the Jacobian, here the largest norm
+    along the reference and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -150,7 +151,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return the numbers of cases with at most half the error if `LITERALS` are divided by ten."""
+    """Return the numbers of cases whose error halves if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -196,8 +197,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    Operations of a step, weighted by `unit_times`, are counted on the cards and in our LEQT1F, both
-    as written and with repeated terms counted once.
+    The operations of a step on the cards and in our LEQT1F are counted, weighted by `unit_times`.
+    They are counted as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -233,8 +234,8 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    It is undecided if the thresholds in `factors`, or counts with and without our LEQT1F, give
-    different verdicts.
+    The verdict is undecided if it depends on the threshold in `factors`, or on whether the cards of
+    our LEQT1F are counted.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -275,9 +276,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Two sets of differences (rad/s) are tested: errors in Case 1, which every method solves exactly
-    but for rounding, with decreasing steps; and differences of runs as in section IV.2 between
-    binary64 and `words`.
+    Two kinds of rounding error (rad/s) are measured. The first is the error in Case 1, which every
+    method solves exactly but for rounding, with decreasing steps. The second is the difference of
+    runs as in section IV.2 between binary64 and `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

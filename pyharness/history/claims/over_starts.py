@@ -1,8 +1,8 @@
 """Verdicts on claims from many initial omegas at once, by the functions in `rules`.
 
 A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none. A sweep calls one attribute
-of this module for each claim in `JUDGED`, which `__getattr__` returns.
+steps. Each start is used in all cases in which the thesis gives none. For each claim in `JUDGED`,
+`__getattr__` makes a function of this module, which the sweep calls.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 
 
 class Starts:
-    """The runs from n starts, a `rules.Bench`, for cases without omega(0) in the thesis.
+    """A `rules.Bench` of the runs from n starts, used in the cases without omega(0) in the thesis.
 
     The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).

@@ -1,10 +1,10 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. Its arrays have
-the shape (..., steps, 3), where ... is () or (n,), and a `Grade` the shape .... The `rule` of the
-claim in `data/claims.toml` describes the grades. An error is the largest of any component of omega
-over the steps that the program ran, against the reference solution. The range of a component is its
-largest minus its smallest value.
+the shape (steps, 3) or (n, steps, 3); the values of a `Grade` have the shape () or (n,). The `rule`
+of the claim in `data/claims.toml` describes the grades. An error is the largest of any component of
+omega over the steps that the program ran, against the reference solution. The range of a component
+is its largest minus its smallest value.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a claim's test: numbers by description, and flags for each start."""
+    """The result of a claim's test: its numbers, and whether the claim holds from each start."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -76,8 +76,8 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
-    The differences must be at most `share` of the largest omega and a tenth of each component's
-    range; in part, only the first.
+    The difference must be at most `share` of the largest omega and, in each component, a tenth of
+    the range. The claim holds in part if only the first is true.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -99,7 +99,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the Runge-Kutta program fails in a case: ends early and is wrong.
 
-    In part, only one of the two.
+    It holds in part if only one of the two is true.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -146,8 +146,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that a tenth of the step size improves collocation, with one exception.
 
-    Errors must be finite and decrease to half or less in four fifths (in part: half) of the other
-    pairs of program and case.
+    Apart from it, errors must be finite and at least halve for four fifths of the pairs of program
+    and case; for half of them the claim holds in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -168,7 +168,7 @@ def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
 def small_step_runge_kutta(bench: Bench, cases: Sequence[int]) -> Grade:
     """Grade the claim that a tenth of the step size does not improve the Runge-Kutta program.
 
-    The runs are without stop test.
+    The programs run without the stop test.
     """
     numbers = {}
     for case in cases:

@@ -8,9 +8,9 @@ from pyharness.model.facts import facts
 class Sentence(NamedTuple):
     """A sentence of the thesis with its claims; fields that do not apply are empty.
 
-    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` is the
-    reason for a sentence without claims. `laboratory` is the run that shows it best, as in
-    ``case=2&program=two-term``; `command` shows more than `claims --explain`.
+    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` tells why a
+    sentence has no claims. `laboratory` is the run that shows it best, as in
+    ``case=2&program=two-term``. `command` is one that shows more than `claims --explain`.
     """
 
     where: str

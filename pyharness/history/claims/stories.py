@@ -1,6 +1,6 @@
 """Each claim of the thesis as a story of three sentences, with computed numbers.
 
-A field of a sentence in `data/claims.toml` is replaced by a number of our verdict.
+The sentences are in `data/claims.toml`. Their fields are replaced by numbers of our verdict.
 """
 
 import re
@@ -10,10 +10,10 @@ from typing import NamedTuple
 from pyharness.history.claims.ledger import Judgement
 
 FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
-"""A field: the programs, `min of` or `max of`, the name of the number, and ` in %`.
+"""The pattern of a field, as in ``{original: max of case *: gain in %}``.
 
-After `min of` or `max of`, the name is a file-name pattern, and the field is the smallest or
-largest of all matching numbers.
+A field has the programs, the name of the number, and perhaps `in %`. After `min of` or `max of`,
+the name is a file-name pattern, and the smallest or largest of all matching numbers is taken.
 """
 _TIMES = "\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

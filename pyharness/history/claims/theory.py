@@ -115,7 +115,7 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The counterexample is the square root at x and 2 x, with x from .01 down to 10**-decades.
+    The counterexample is the square root, between x and 2 x for x from .01 down to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -139,7 +139,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    In part, their steps agree up to O(h**5).
+    It is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -244,8 +244,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
 
-    A perturbation of 1e-8 of a steady rotation should change as exp(Q t): grow at the rate Re Q
-    (1/s) if this is above 0, else stay within ten times its size for ten periods.
+    A perturbation of a steady rotation by 1e-8 should change as exp(Q t). If Re Q is above 0, it
+    should grow at this rate (1/s); if not, stay within ten times its size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:

@@ -1,12 +1,12 @@
 """Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
 
 Each function is the `test` of one or more claims in `data/claims.toml`. The claim's `rule`
-describes the decision, and its `parameters` are the keyword arguments. `lab` is a laboratory, which
-runs the programs under the chosen assumptions; `case` is a number of Table 1.
+describes the decision, and its `parameters` are the keyword arguments. `lab` runs the programs
+under the chosen assumptions; `case` is a number of Table 1.
 
 An error is the largest of any component of omega against the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
-reference omega. A claim that fails is "not reproduced" unless a docstring says otherwise.
+reference omega. A claim that fails is "not reproduced" or, in some tests, "false".
 """
 
 import math
@@ -101,7 +101,7 @@ def coincident(lab: Laboratory, case: int, share: float) -> Judged:
 
 
 def error_size(lab: Laboratory, case: int, low: float, high: float) -> Judged:
-    """Judge the claim that collocation errors over the amplitude are from `low` to `high`."""
+    """Judge the claim that collocation errors are from `low` to `high` times the amplitude."""
     amplitude = float(ranges(lab.truth(case)).max()) / 2.0
     numbers = {
         f"{program}: largest error over the amplitude": lab.error(program, case) / amplitude
@@ -132,7 +132,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers of the verdict name the subsets of defects with which the run stops at that step.
+    The numbers name the subsets of defects with which the run stops at that step.
     """
     stop = lab.run("runge-kutta", case).stop
     found = math.nan if stop is None else float(stop.step)
@@ -158,7 +158,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that omega1 of the Runge-Kutta program grows beyond the sine."""
+    """Judge the claim that omega1 of the Runge-Kutta program becomes larger than the sine."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}

@@ -4,7 +4,7 @@ One step of length h solves omega' = f(t, omega), equations 16-18, with a polyno
 omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
 along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
 for n weight functions W (eq. 26). The thesis makes one correction. `checks.theory.tableau` computes
-its coefficients.
+the coefficients of a method.
 """
 
 import math
@@ -31,8 +31,8 @@ _WORST_CONDITION = 1e8
 class Member:
     """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
 
-    The weights of least squares are the derivatives of the residual with f held constant, i
-    t**(i-1) (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1)
+    The weights of least squares are i t**(i-1), the derivatives of the residual with f held
+    constant (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1)
     (`thesis`), Gauss-Legendre (`gauss`), or n different numbers from 0 to 1.
     """
 
@@ -104,14 +104,14 @@ def converged_order(member: Member) -> int:
 
 
 def predicted_order(member: Member) -> int:
-    """Return the order of the global error: one more per correction, up to `converged_order`."""
+    """Return the order of the global error: corrections + 1, at most `converged_order`."""
     return min(member.corrections + 1, converged_order(member))
 
 
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    The first estimate uses the torque at the beginning of the step, corrections that at their
+    The first estimate uses the torque at the beginning of the step, corrections the torque at their
     nodes. Each step rounds omega by about one unit in the last place.
     """
     omega = integrate(scene, [member])[0]

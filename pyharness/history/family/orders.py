@@ -40,7 +40,7 @@ MOST_STEPS = 2_000
 class OrderFinding:
     """The derived and measured order of convergence of a method in a scene, and its error.
 
-    `measured` is None if errors are only rounding or too large. It is `settled` if its last two
+    `measured` is None if all errors are too large or only rounding. It is `settled` if its last two
     values differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
     """
 
@@ -75,7 +75,7 @@ def order_table(
 ) -> list[OrderFinding]:
     """Return the orders of convergence and the errors of many methods, measured together.
 
-    Raise InputError for an unbounded reference or more than `MOST_STEPS` steps.
+    Raise InputError if the solution is unbounded or the scene has more than `MOST_STEPS` steps.
     """
     if scene.steps > MOST_STEPS:
         raise InputError(f"steps is {scene.steps}; allowed for orders: 1 to {MOST_STEPS}")

@@ -230,7 +230,7 @@ def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
             "Conjectures: mistakes that the programs for three other weightings may have had. IV.2 "
             "says that they gave no meaningful results in Cases 1 and 2; they are not printed.",
             "sub, gal, lsq: subdomain, Galerkin and least squares; .1, .2: Cases 1 and 2. Each "
-            "cell is the largest error relative to the largest omega; a tenth or more fails. "
+            "cell is the largest error relative to the largest omega; more than a tenth fails. "
             "both, either: with how many weightings the mistake fails in both cases, or in either."
             + ("" if word == BINARY64 else f" Computed in {word}."),
         ],

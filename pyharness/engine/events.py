@@ -176,11 +176,12 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
     """Return a mask of the pairs of adjacent roots around an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
-    gap = np.diff(roots.time)
+    widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
+    # A far root is not beside the extremum, however flat the function is there.
+    is_close = np.diff(roots.time) <= np.minimum(widest[:-1], widest[1:])
     for k in (slice(None, -1), slice(1, None)):
         step = -roots.slope[k] / roots.curvature[k]
-        widest = np.sqrt(8.0 * roots.near[k] / np.abs(roots.curvature[k]))
-        near = np.flatnonzero((gap <= widest) & (np.abs(step) <= widest))
+        near = np.flatnonzero(is_close & (np.abs(step) <= widest[k]))
         if near.size:
             trial = np.clip(roots.time[k] + step, *solution.pieces.edges[[0, -1]])[near]
             found[near] |= np.abs(solution.values(g, trial)) <= noise[near]

@@ -24,45 +24,41 @@ FORMATS = ("table", "json", "csv", "markdown")
 # Options that several verbs share, with help texts. A placeholder after the name, as N in "--case
 # N", means that the option takes a value.
 BODY = {
-    "--case N": "Use the scene (body, initial state, torque and steps) of this case of Table 1 of "
-    "the thesis, 1 to 7.",
-    "--scene FILE": "Read the scene (body, initial state, torque and steps) from this TOML file.",
-    "--omega0 A,B,C": "Three components of the initial angular velocity in the body's axes, rad/s "
-    "(default: those of the scene).",
+    "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene: body, initial "
+    "state, torque and steps. Give this or --scene.",
+    "--scene FILE": "Read the scene from this TOML file (`pyharness scene new` writes a sample).",
+    "--omega0 A,B,C": "Initial angular velocity (omega), rad/s: three components about the axes "
+    "of the body (default: the scene's).",
 }
 SCENE = {
     **BODY,
-    "--step-size H": "Step size of the integration, s, above 0 (default: the scene's).",
-    "--steps N": "Number of integration steps from time 0, at least 1 (default: the scene's).",
+    "--step-size H": "Length of a step, s, above 0 (default: the scene's).",
+    "--steps N": "Number of steps from time 0, at least 1 (default: the scene's).",
 }
 LISTING = {
-    "--listing L": "Version of the program: original, with all its defects (default), or "
-    "corrected, without any.",
-    "--fix NAME,...": "Correct only these faults of the original program: defects, doubtful "
-    "readings or conjectures (names: `pyharness defects`).",
-    "--keep NAME,...": "Keep only these faults of the original program, and correct all others "
-    "(names: `pyharness defects`).",
-    "--reading NAME,...": "Use the alternative reading of these ambiguous statements of the "
-    "printed program (names: `pyharness defects --kind reading`).",
-    "--conjecture NAME,...": "Assume these statements, which are missing from the printed program, "
-    "or none (names: `pyharness defects --kind conjecture`).",
-    "--lipschitz L": "Stop the Runge-Kutta program when the slopes change by more than L times the "
-    "change of the variables, L in 1/s (default 500, as printed).",
-    "--no-stop": "Run the Runge-Kutta program to its last step, without the test that stops a "
-    "diverging run.",
+    "--listing L": "Version of the program: original, with all defects (faults of its author; "
+    "default), or corrected, without any.",
+    "--fix NAME,...": "Correct only these defects, readings or conjectures of the original "
+    "program (names: `pyharness defects`).",
+    "--keep NAME,...": "Keep only these defects, readings or conjectures, and correct all others.",
+    "--reading NAME,...": "Read these doubtful statements of the original program in the other "
+    "possible way (names: `pyharness defects --kind reading`; default: no statement).",
+    "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
+    "program, or none (names: `pyharness defects --kind conjecture`; default: torque-held).",
+    "--lipschitz L": "Stop the Runge-Kutta program when a slope changes by more than L times the "
+    "change of its variable; L in 1/s (default 500, as printed).",
+    "--no-stop": "Omit this test, so that the Runge-Kutta program runs to its last step.",
 }
 EFFORT = {
-    "--effort F": "Multiply the limit of computational work by this factor, above 0 (default 1, "
-    "which allows about ten seconds)."
+    "--effort F": "Multiply the work limit, beyond which a computation ends with an error, by F, "
+    "above 0 (default 1: about ten seconds, for a program half a minute)."
 }
 STRICT = {
-    "--strict": "Exit with status 1 if the motion amplifies rounding errors so much that they "
-    "exceed the tolerance, or if the integration may have stepped over a short change of the "
-    "torque."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance."
 }
 ALSO = {
-    "--also FILE,...": "Write the result to these files too, each in the format of its name: .md "
-    "(Markdown), .xml (JUnit) or .json."
+    "--also FILE,...": "Write the result to these files too; the ending of a name sets the "
+    "format: .md (Markdown), .xml (JUnit) or .json."
 }
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
 
@@ -74,12 +70,12 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
     is no --plot.
     """
     first, *others = formats
-    form = {"--format F": f"Output format of the result: {first} (default), {', '.join(others)}."}
+    form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
     picture = {
         "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
         "numbers to a .csv file of the same name."
     }
-    out = {"--out FILE": "Write the result to this file instead of the standard output."}
+    out = {"--out FILE": "Write the result to this file instead of standard output."}
     return {**form, **(picture if plot else {}), **out}
 
 

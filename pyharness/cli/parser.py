@@ -10,7 +10,7 @@ from pyharness.cli.options import FORMATS, LISTING, SCENE, check_known
 from pyharness.model.errors import InputError, unknown
 
 _NEGATIVE = re.compile(r"-[.\d]")
-_GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "listing")}
+_GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "version of the programs")}
 _OUTPUTS = ("--format", "--plot", "--out", "--also", "--strict")
 _NARROWEST, _WIDEST = 80, 100  # columns
 
@@ -38,7 +38,9 @@ class Parser(argparse.ArgumentParser):
         super().__init__(
             prog=f"pyharness {verb}",
             description=f"{description[:1].upper()}{description[1:]}.",
-            epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
+            epilog=f"example:\n  pyharness {self.module.EXAMPLE}\n\n"
+            "The thesis: R. Jacobs, A Digital Computer Approach to the Unsymmetric Rigid\n"
+            "Body Problem, 1982. Terms: docs/glossary.md.",
             allow_abbrev=False,
             add_help=False,
             # Without a width, argparse would import `shutil` for every command.

@@ -26,28 +26,27 @@ _TERM_BODIES = 1000
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, s, up to 1000 (default: 3, and a second run to "
-    "100 in Cases 3 and 4; with --attitude in all cases except 6).",
-    "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, instead "
-    "of the cases of the thesis.",
-    "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per body "
-    "against the number of bodies, and memory.",
-    "--terms": "Measure scenes whose torque depends on omega, time and attitude, written as "
-    "ready terms or as Python functions, for one body and for many.",
-    "--bodies N": f"Number of bodies in a call that solves many, 1 to {_MOST_BODIES} (default "
+    "--horizon T": "End time of each integration, s, up to 1000 (default: 3; Cases 3 and 4, with "
+    "--attitude all cases except 6, are measured to 100 too).",
+    "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
+    "instead of the cases.",
+    "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
+    "body against the number of bodies, and memory.",
+    "--terms": "Measure torques that depend on omega (angular velocity), time and attitude, both "
+    "ready ones (pyharness.torques) and Python functions, for one body and for many.",
+    "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
     "(default: the present year and week, as in 2026-W47).",
-    "--attitude": "Compute and measure the attitude (orientation) of the body together with its "
-    "angular velocity.",
-    "--methods A,B": "Measure only these of our methods and programs, by name (default: all); "
-    "none: leave them out.",
-    "--peers X,Y": "Measure only these third-party solvers, by name or package (default: all that "
-    "are installed); none: leave them out.",
-    "--plan": "Instead of the solvers, measure the time that each part of a computation would take "
-    "which `pyharness plan` leaves out.",
-    "--growth": "Measure how the error of the Taylor method grows with the integration time, up to "
-    "1e5 s, in Cases 3 and 4.",
+    "--attitude": "Compute and measure the attitude (orientation) of the body together with omega.",
+    "--methods A,B": "Measure only these of our methods and programs, as named in the first "
+    "column of the result; none: leave them out (default: all).",
+    "--peers X,Y": "Measure only these third-party solvers, by the same names or by package "
+    "(heyoka, numba, scipy); none: leave them out (default: all installed ones).",
+    "--plan": "Measure instead how much time each computation that `pyharness plan` leaves out "
+    "would take.",
+    "--growth": "Measure instead how the error of the Taylor method grows with the integration "
+    "time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
 }
 EXAMPLE = "bench --case 5 --peers none"

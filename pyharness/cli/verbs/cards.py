@@ -18,19 +18,21 @@ from pyharness.thesis.deck_collation import faults, rows
 _LARGEST_SCAN = 1 << 24  # bytes
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
-    "cards CARDS": "Show these cards, by program, number or range, as in two-term, 1660, "
-    "1040-1090 or two-term:1660 (default: all cards of the three programs).",
+    "cards CARDS": "Show these cards (lines of the programs), by program, number or range, as in "
+    "two-term, 1660, 1040-1090 or two-term:1660 (default: all).",
     "--classes": "Count the notes of each kind (defect, doubtful reading, ...), the cards that "
     "they name, and the differences from the scan that they explain.",
-    "--collate": "Compare the card decks of the three programs, operation by operation, with each "
-    "other and with sections II to V of the thesis.",
-    "--origins": "Show where the decks and the thesis disagree, and what each disagreement "
+    "--collate": "Compare the three programs, operation by operation, with each other and with "
+    "sections II to V of the thesis.",
+    "--origins": "Show where the programs and the thesis disagree, and what each disagreement "
     "suggests about the origin of a fault.",
-    "--second-reading": "Compare our text of a random sample of cards with a second reading of the "
-    "scan, and estimate how many misreadings remain.",
-    "--scan FILE": "Compare our text of the cards, character by character, with the OCR text of a "
-    "scan of the thesis in this file.",
+    "--second-reading": "Compare our text of a random sample of cards with a second reading of "
+    "the scan, and estimate how many misreadings remain.",
+    "--scan FILE": "Compare our text of the cards, character by character, with the text in this "
+    "file, which character recognition (OCR) made from a scan of the thesis.",
     **shared.outputs(FORMATS, plot=""),
+    "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). tei: all cards "
+    "and notes in TEI, the XML format of text editions.",
 }
 EXAMPLE = "cards runge-kutta:860"
 

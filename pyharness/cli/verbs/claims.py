@@ -9,18 +9,17 @@ from pyharness.model.errors import InputError
 from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
-    "--explain ID": "Explain the verdict on the claim with this identifier, as in "
-    "abstract-superior, with the numbers behind it.",
-    "--assignments": "Show the assumed values with which all claims hold, for each case whose "
-    "initial angular velocity the thesis omits.",
-    "--word W": "Floating-point arithmetic in which the programs run for the verdicts: "
-    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--evidence": "Count the claims that hold for every combination of initial conditions, "
-    "readings of ambiguous program statements, conjectured statements and numbers of steps.",
-    "--atlas STORE": "Report for which initial angular velocities the claims hold; STORE is the "
-    "folder of a sweep's results; needs --sweep.",
-    "--sweep FILE.toml": "Sweep file (TOML) from which `pyharness sweep` made the folder of "
-    "--atlas.",
+    "--explain ID": "Explain the verdict on one claim (statement of the thesis), with the "
+    "numbers behind it; ID is its name in the output of `pyharness claims`.",
+    "--assignments": "For each case whose initial angular velocity the thesis omits, show with "
+    "which assumed values the claims about this case hold.",
+    "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
+    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
+    "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
+    "readings of doubtful statements, assumptions about missing ones, and number of steps.",
+    "--atlas STORE": "Report from which initial angular velocities the claims hold, according to "
+    "the results of `pyharness sweep` in this folder; needs --sweep.",
+    "--sweep FILE.toml": "The sweep file from which the folder of --atlas was made.",
     **shared.outputs(plot="the counts of --evidence, or of the map of --atlas,"),
 }
 EXAMPLE = "claims --explain abstract-superior"

@@ -16,19 +16,20 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     **shared.SCENE,
     **shared.LISTING,
-    "--listing L": "Version of the programs: original, with all their defects, or corrected, "
-    "without any (default: both).",
+    "--listing L": "Version of the programs: original, with all defects (faults of their "
+    "author), or corrected, without any (default: both).",
     "--program P": f"Compare this program alone: {', '.join(PROGRAMS)} (default: all three).",
-    "--method M,...": "Compare these methods (docs/reference/methods.md) instead of the programs; "
-    "the torque of the scene may then depend on omega or attitude.",
-    "--word W": "Run the programs in this floating-point arithmetic: "
-    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
-    "--tolerance E": "Relative tolerance of the methods of --method or, without it, of SciPy's "
-    "solve_ivp, at most 1 (default: the method's own).",
-    "--attitude": "Compare the attitude (orientation) of the body too, with its error as an angle "
-    "in rad.",
-    "--ablate": "Run every subset of each program's defects, and list the subsets by their error, "
-    "largest first.",
+    "--method M,...": "Compare these methods (names: docs/reference/methods.md) instead of the "
+    "programs; the torque may then depend on omega or attitude.",
+    "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
+    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
+    "--tolerance E": "Largest allowed error of the methods (without --method, of SciPy's "
+    "solve_ivp), relative to the largest component of omega, at most 1 (default: the method's "
+    "own).",
+    "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
+    "rad.",
+    "--ablate": "Run every subset of each program's defects, and list the subsets by their "
+    "error, largest first.",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),

@@ -13,17 +13,16 @@ from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
 FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)} (required).",
-    "--case N": "Set the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
-    "(default: the case on the published cards).",
+    "--case N": "Put the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
+    "(default, as published: Case 5 for runge-kutta, Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "The form gfortran suits that compiler; ftn is a batch job for the CDC's compiler FTN.",
+    "gfortran has changes for that compiler; ftn is a batch job for the CDC's compiler FTN.",
     "--system S": "Operating system of the CDC computer that runs the job of --dialect ftn: "
     f"{' or '.join(SYSTEMS)} (default nos).",
-    "--round": "Set the option of the compiler FTN that rounds results instead of truncating them; "
-    "needs --dialect ftn.",
-    "--terms N": "Derive a collocation deck with N terms, 3 or 5, from the four-term deck; the "
-    "result is a conjecture, because the thesis prints no such deck.",
+    "--round": "Let FTN round results instead of truncating them; needs --dialect ftn.",
+    "--terms N": "Derive a collocation deck with N terms, 3 or 5, from the four-term deck; it is "
+    "a conjecture, because the thesis prints no such deck.",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"

@@ -8,10 +8,11 @@ from pyharness.history.apparatus_report import apparatus_report, entry_report
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "name NAME": "Show this entry and its effect in every case; give its name or its card, as in "
-    "1660 or two-term:1660 (default: list all entries).",
-    "--kind K": "List only the entries of this kind, such as defect, reading or conjecture "
-    "(default: all kinds).",
+    "name NAME": "Show this entry and its effect in every case; NAME is its name or its card "
+    "(numbered line of a program), as in stage-base, 1660 or two-term:1660 (default: list all "
+    "entries).",
+    "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
+    "(doubtful card) or conjecture (missing card) (default: all).",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -8,12 +8,11 @@ from pyharness.model.errors import InputError
 FORMATS = ("table", "json")
 OPTIONS = {
     "--out DIR": "Write the web pages to this folder, which is created if missing; the first "
-    "page is index.html.",
-    "--data DIR": "Write the data of the edition, without web pages, to this folder: cards, notes "
-    "on them (apparatus), verdicts on the thesis, figures, runs and printed pages, as CSV, JSON, "
-    "TEI and text.",
-    "--docs DIR": "Folder of the documents from which the pages are made (default: the folder docs "
-    "of the source checkout).",
+    "page is index.html. Give this or --data.",
+    "--data DIR": "Write only the data to this folder, as CSV, JSON, TEI and text: cards (lines "
+    "of the programs), notes on them, verdicts on the thesis, figures, runs and printed pages.",
+    "--docs DIR": "Folder of the documents from which pages are made (default: docs of the "
+    "source checkout).",
     "--format F": "Output format of the list of written files: table (default) or json.",
 }
 EXAMPLE = "edition --out pages"

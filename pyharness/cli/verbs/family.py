@@ -12,17 +12,19 @@ _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")
 _DEFAULT_CASE = "5"
 OPTIONS = {
     **shared.SCENE,
+    "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene (default: "
+    f"{_DEFAULT_CASE}, without --scene).",
     "--weighting W": "Measure one method, with this weighting of its residual: "
     f"{', '.join(WEIGHTINGS)} (default: several methods, or collocation if --terms, --points or "
     "--corrections is given).",
-    "--terms N": "Number of terms of the trial solution, 1 to 12 (default 2).",
-    "--points P": "Collocation points: thesis (equally spaced, "
-    "default), gauss, or fractions of the step as in 0.3,0.6.",
+    "--terms N": "Number of terms of the trial function, 1 to 12 (default 2).",
+    "--points P": "Collocation points: thesis (equally spaced, default), gauss, or N fractions "
+    "of the step, as in 0.3,0.6.",
     "--corrections K": "Number of corrections of the estimate in each step, 0 to 100 (default 1).",
-    "--lost": "Rank conjectured mistakes by how many of the three unpublished programs of section "
-    "IV.2 of the thesis fail with them.",
-    "--word W": "Floating-point arithmetic of the programs that --lost runs: "
-    f"{', '.join(WORD_NAMES)} (default {WORD_NAMES[0]}).",
+    "--lost": "Instead, rank conjectured mistakes by how many of the three unpublished programs "
+    "of section IV.2 of the thesis fail with them.",
+    "--word W": f"Floating-point arithmetic of the programs of --lost: {', '.join(WORD_NAMES)} "
+    f"(default {WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"

@@ -8,8 +8,8 @@ from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
 OPTIONS = {
-    "--out DIR": "Write the SVG, PNG and CSV files of the figures to this folder, which is created "
-    "if missing.",
+    "--out DIR": "Write the figures to this folder, as SVG, PNG and CSV files; it is created if "
+    "missing (required).",
     "--format F": "Output format of the list of drawn figures: table (default) or json.",
 }
 EXAMPLE = "figures --out figures"

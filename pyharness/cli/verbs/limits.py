@@ -9,8 +9,7 @@ from pyharness.model.listing import PROGRAMS
 
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run only this program with ever smaller steps: {', '.join(PROGRAMS)} "
-    "(default: all three).",
+    "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
     "--halvings K": "Number of times that the step size is halved, 1 to 12 (default 6).",
     **shared.EFFORT,
     **shared.outputs(plot=""),

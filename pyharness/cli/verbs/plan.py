@@ -9,12 +9,12 @@ from pyharness.engine.solver import PREPARED
 
 OPTIONS = {
     **shared.BODY,
-    "--method M": "Plan a solution by this method: auto (default) or another method of "
-    "docs/reference/methods.md.",
-    "--tolerance E": "Relative tolerance of the angular velocity, at most 1 (default: the method's "
-    "own, 1e-12 for auto).",
-    "--velocity": "Plan to compute the translational velocity in addition to the angular velocity.",
-    "--rows": "Plan to compute results at intermediate times too, as with `pyharness run --times`.",
+    "--method M": f"Plan a solution by this method: {', '.join(PREPARED)} (default auto, which "
+    "chooses closed-form, quick or taylor).",
+    "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
+    "1 (default: the method's own, 1e-12 for auto).",
+    "--velocity": "Include the translational velocity.",
+    "--rows": "Include results at intermediate times, as `pyharness run --times` prints them.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "plan --case 5 --tolerance 1e-9"

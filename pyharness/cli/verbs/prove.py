@@ -14,19 +14,18 @@ from pyharness.truth.enclosure_report import certificates_report, enclosure_repo
 _DIGITS = 25
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, s, of either sign, in the order of their distance "
-    "from 0 (default: the end of the scene's last step).",
+    "--times T1,T2,...": "Times of the results, s, all positive or all negative, in the order of "
+    "their distance from 0 (default: the end of the scene's last step).",
     "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): the half-width of "
-    "each interval is at most 10**-D rad/s, or 10**-D times the largest component of omega if "
-    "that exceeds 1 rad/s.",
+    "each interval is at most 10**-D rad/s, times the largest component of omega if that exceeds "
+    "1 rad/s.",
     "--velocity": "Enclose the translational velocity too; needs python-flint.",
-    "--transition": "Enclose the derivatives of the solution with respect to the initial angular "
-    "velocity too; "
-    "needs python-flint.",
-    "--certificate FILE": "Write a certificate of the steps to this file (.json), which --check "
-    "verifies; for torques that depend on time alone.",
-    "--check FILE,...": "Verify the certificates in these files instead of proving anything; needs "
-    "no third-party library.",
+    "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
+    "too; needs python-flint.",
+    "--certificate FILE": "Write the steps of the proof to this file (.json), a certificate that "
+    "--check verifies; for torques that depend on time alone.",
+    "--check FILE,...": "Verify the certificates in these files instead of proving anything; "
+    "needs no scene and no third-party library.",
     **shared.EFFORT,
     **shared.outputs(plot=""),
 }

@@ -9,10 +9,11 @@ from pyharness.model.errors import InputError
 
 OPTIONS = {
     **shared.BODY,
-    "--disturbance D": "Magnitude of the perturbation of each steady rotation, as a fraction of "
-    "the rotation's magnitude, above 0 and below 1 (default 0.001).",
+    "--disturbance D": "Size of the perturbation of each steady rotation (constant omega), as a "
+    "fraction of its omega, above 0 and below 1 (default 0.001).",
     **shared.outputs(
-        plot="the polhodes, and of the growth rates of perturbations for all moments of inertia,"
+        plot="the polhodes (curves of omega without torque) and of the growth rates of "
+        "perturbations for all moments of inertia"
     ),
 }
 EXAMPLE = "rotations --case 4 --disturbance 1e-3"

@@ -25,26 +25,30 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the thesis's appendix: {', '.join(PROGRAMS)} (needed "
-    "unless --method is given).",
-    "--implementation I": "Language of the program: fortran or python (default fortran, "
-    "but python with --word other than binary64).",
-    "--word W": f"Run the program in this arithmetic: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). Fortran has {', '.join(COMPILED_WORDS)}; the others run in Python.",
-    "--method M": "Solve the scene by this method instead of a program: auto, taylor, closed-form, "
-    "dop853 and others (docs/reference/methods.md).",
+    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)} (give this or "
+    "--method).",
+    "--implementation I": "Language of the program: fortran or python (default fortran, but "
+    "python with --word other than binary64).",
+    "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
+    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates. "
+    f"Fortran has only {', '.join(COMPILED_WORDS)}.",
+    "--method M": "Solve the scene by this method instead: auto, taylor, closed-form, dop853 or "
+    "another of docs/reference/methods.md.",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
     f"{', '.join(FORMS)} (3-1-3, 3-2-1: Euler angles about these axes).",
-    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); needs "
-    "--method and --attitude.",
-    "--tolerance E": "Largest allowed error of the angular velocity from --method, relative to its "
-    "largest component (default: the method's own, 1e-12 for auto).",
-    **shared.STRICT,
+    "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
+    "needs --method and --attitude.",
+    "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "
+    "component (default: the method's own, 1e-12 for auto).",
+    "--strict": "Exit with status 1 if amplified rounding errors may exceed the tolerance, or if "
+    "a SciPy method may have missed a short change of the torque; needs --method.",
     **shared.EFFORT,
     **shared.outputs(FORMATS),
+    "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). printer and "
+    "tape5, for programs, are the printed page and the binary file TAPE5.",
 }
 EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 

@@ -38,8 +38,8 @@ step_size = 0.01                    # s
 steps = 100
 """
 OPTIONS = {
-    "action ACTION": "What to do: new (write a sample scene file), check (check a scene "
-    "file) or schema (print the JSON Schema of scene files, for an editor).",
+    "action ACTION": "What to do: new (write a sample scene file), check (check a file) or "
+    "schema (print the JSON Schema of scene files, for an editor).",
     "file FILE": "The scene file to check.",
     "--case N": "With new, write this case of Table 1 of the thesis, 1 to 7 (default: a brick, "
     "with every section of a scene file).",

@@ -13,11 +13,11 @@ FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
-    "begin with this text, as in shapes/auto.",
-    "--scene FILE": "Test the scene in this TOML file instead of our scenes, whose torque may "
-    f"depend on omega or attitude. Only these trials are run: {', '.join(SCENE_TRIALS)}.",
-    "--save DIR": "Save the scene with the worst result of each method in each trial as a scene "
-    "file (TOML) in this folder (default: only failures, in the folder worst).",
+    "begin with this text, as in shapes/auto. The output describes each trial.",
+    "--scene FILE": "Test the scene in this TOML file instead of ours, in the trials "
+    f"{', '.join(SCENE_TRIALS)}. Its torque may depend on omega or attitude.",
+    "--save DIR": "Save the scene with the worst result of each method in each trial as a TOML "
+    "file in this folder (default: only failures, in the folder worst).",
     **shared.outputs(FORMATS, plot="the one trial that --only names"),
 }
 EXAMPLE = "stress --only separatrix --plot separatrix.png"

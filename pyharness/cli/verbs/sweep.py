@@ -21,16 +21,16 @@ from pyharness.sweep.sweep_file import read_sweep
 CLAIMS = over_starts.FUNCTIONS
 _MOST_WORKERS = 1024
 OPTIONS = {
-    "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and the "
-    "quantities (reductions) to store for each scene.",
-    "--out STORE": "Store the results in this folder, in the Zarr format; if an earlier run of the "
-    "sweep was interrupted, compute only what is missing.",
-    "--repair": "Recompute damaged chunks (blocks of the grid) of the store, and rewrite damaged "
+    "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and "
+    "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
+    "--out STORE": "Store the results in this folder, in the Zarr format (required); if an "
+    "earlier run of the sweep was interrupted, only what is missing is computed.",
+    "--repair": "Recompute damaged blocks (chunks) of the grid in the store, and rewrite damaged "
     "metadata.",
-    "--executor E": "Where to compute: here (in this process, the default), processes (in several) "
-    "or dask (in a Dask cluster).",
-    "--workers N": "Number of worker processes of --executor processes or dask, "
-    f"1 to {_MOST_WORKERS} (default: one for each processor).",
+    "--executor E": "Where to compute: here (in this process, the default), processes (in "
+    "several) or dask (in a Dask cluster).",
+    "--workers N": "Number of worker processes of --executor processes or dask, 1 to "
+    f"{_MOST_WORKERS} (default: one for each processor).",
     "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "
     "(default: start a cluster on this machine); needs --executor dask.",
     "--quantity NAME": "Name of the stored quantity that --plot draws (default: the first with "

@@ -21,32 +21,35 @@ _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
 OPTIONS = {
     "--only ID,...": f"Run only checks of these kinds: {', '.join(KINDS)}; or only those whose "
-    "ids begin with this text, as in cells/two-term.",
+    "ids begin with this text, as in cells/two-term. Some kinds: cells (Fortran "
+    "against Python), words (other floating-point formats), decks (the compiled cards), schemes "
+    "(single steps), stops (stopped runs), prepared (`prepare` of Python), golden (stored "
+    "trajectories).",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
     "--draws N": f"Number of random scenes: for methods (default {DRAWS}), with --port for the "
     "port (default 0), with --integrator of each kind (default 2).",
-    "--external FILE": "Only check our methods against the published results in this file "
-    "(docs/how-to/external.md describes its format).",
-    "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in this "
-    "file, which one of the programs printed on some machine.",
-    "--port COMMAND": "Compare a port of the programs to another language, started by this "
-    "command, bit for bit with our Python versions (docs/how-to/ports.md).",
-    "--integrator COMMAND": "Compare an integrator of rigid bodies, started by this command, with "
-    "the true solution of random scenes, and name its faults (docs/how-to/integrators.md).",
-    "--order P": "Order of convergence that the integrator must have at least (default 1).",
-    "--program P": "Consider only this program, two-term, four-term or runge-kutta, with "
-    "--listing-output or --port (default: all three).",
-    "--case N": "Consider only this case of Table 1, 1 to 7, with --listing-output or --port "
-    "(default: all cases).",
-    "--cell NAME,...": "With --port, compare only these combinations of program, case and listing, "
-    "as in two-term/case-3, or random scenes, as in random/7; with --integrator, only these kinds "
-    "of scenes or scenes, as in wave or wave-1 (default: all).",
-    "--self-test": "Introduce known faults into the software, or with --port or --integrator into "
-    "its answers, one by one, and report which checks detect each fault.",
-    "--update": "Compute and write the golden record (stored trajectories for comparison) again, "
-    "and report what changed.",
-    "--record DIR": "Folder of the golden record (default: tests/golden of the source checkout).",
+    "--external FILE": "Only compare our methods with the published results in this file "
+    "(format: docs/how-to/external.md).",
+    "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in "
+    "this file, which one of the programs printed on some machine.",
+    "--port COMMAND": "Start a version of the programs in another language by this command, and "
+    "compare it bit for bit with ours in Python (docs/how-to/ports.md).",
+    "--integrator COMMAND": "Start an integrator of rigid bodies by this command, compare it "
+    "with the true solution of random scenes, and name its faults (docs/how-to/integrators.md).",
+    "--order P": "Lowest order of convergence that --integrator may have (default 1).",
+    "--program P": "With --listing-output or --port, consider only this program: two-term, "
+    "four-term or runge-kutta (default: all three).",
+    "--case N": "With --listing-output or --port, consider only this case of Table 1 of the "
+    "thesis, 1 to 7 (default: all).",
+    "--cell NAME,...": "With --port, compare only these runs, as in two-term/case-3, or random "
+    "scenes, as in random/7; with --integrator, only these scenes or kinds (free, constant, "
+    "wave), as in wave-1 (default: all).",
+    "--self-test": "Plant known faults one by one in the software, or in the answers of --port "
+    "or --integrator, and report which checks detect each.",
+    "--update": "Compute and write the stored trajectories of the kind golden again, and report "
+    "what changed.",
+    "--record DIR": "Folder of these trajectories (default: tests/golden of the source checkout).",
     **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
     **shared.ALSO,
 }

@@ -17,12 +17,12 @@ from pyharness.thesis.vectors import Answer, answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
-    "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all cases).",
+    "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
-    "--all": f"Run the programs with every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits "
-    "instead of selected ones (about twelve minutes).",
-    "--vectors FILE": "Check our emulation of the CDC's arithmetic against the operations and "
-    "results in this JSON file.",
+    "--all": f"Use every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits instead of selected "
+    "ones (about twelve minutes).",
+    "--vectors FILE": "Instead, check our emulation of the CDC's arithmetic against the "
+    "operations and results in this JSON file.",
     **shared.outputs(FORMATS, plot="the error against the precision, for one --case,"),
 }
 EXAMPLE = "words --case 2 --program runge-kutta"

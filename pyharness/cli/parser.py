@@ -38,9 +38,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(
             prog=f"pyharness {verb}",
             description=f"{description[:1].upper()}{description[1:]}.",
-            epilog=f"example:\n  pyharness {self.module.EXAMPLE}\n\n"
-            "The thesis: R. Jacobs, A Digital Computer Approach to the Unsymmetric Rigid\n"
-            "Body Problem, 1982. Terms: docs/glossary.md.",
+            epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
             allow_abbrev=False,
             add_help=False,
             # Without a width, argparse would import `shutil` for every command.

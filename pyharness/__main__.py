@@ -19,7 +19,7 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
 
 
 def start() -> None:
-    """Run the command line and end the process with its status, promptly after Ctrl-C."""
+    """Run the command line, and exit with its status, promptly after Ctrl-C."""
     from pyharness.cli import interruption
     from pyharness.cli.main import main
 

@@ -1,7 +1,7 @@
-"""Ready events for `solve`, which finds them along a trajectory.
+"""Ready events: predefined functions whose roots `pyharness.solve` finds along a trajectory.
 
-An event is an element of the argument ``events=[...]`` of `pyharness.solve`. A Python function of
-time and omega can also be an event.
+Pass one of them, or a list, as the argument `events`. A Python function of time and omega can also
+be an event.
 """
 
 from pyharness.engine.event_functions import Event

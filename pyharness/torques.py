@@ -1,7 +1,7 @@
-"""Ready torques that depend on the state of the body: terms, which can be added.
+"""Ready terms: predefined torques, functions of time and state that can be added.
 
-A sum of terms, of torque laws about the body axes, and of Python functions is a torque for
-`pyharness.Scene`. At least one of two summands must be a term.
+A sum of terms, torque laws and Python functions is a torque for `pyharness.Scene`. At least one of
+two summands must be a term.
 """
 
 from pyharness.engine.field_terms import (

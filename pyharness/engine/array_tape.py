@@ -30,7 +30,7 @@ def inputs_of(times: Array, state: Array) -> list[Array]:
 
 
 def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
-    """Return a tape's outputs, shape (n, m) for m outputs; not finite where it is singular."""
+    """Return the m outputs of a tape at n states, shape (n, m); not finite where it is singular."""
     with np.errstate(all="ignore"):
         found: Sequence[Any] = evaluate(tape, inputs_of(times, state), ARRAYS)
     # A constant output is a number, without a shape.

@@ -76,10 +76,10 @@ def check_animation(path: str, scene: Scene) -> None:
 
 
 def animation(scene: Scene, method: str, tolerance: float | None, end: float, path: str) -> bytes:
-    """Return the bytes of an animated brick, GIF or HTML by the ending of `path`, to `end` (s).
+    """Return an animated brick until `end` (s) as bytes, GIF or HTML by the ending of `path`.
 
-    The brick has the scene's moments. Motions below 2 s are stretched to 2 s, and those above 10 s
-    are compressed to 10 s. Raise InputError if the motion overflows before `end`.
+    The brick has the scene's moments. A motion shorter than 2 s is stretched to 2 s, and one longer
+    than 10 s is compressed to 10 s. Raise InputError if the motion overflows before `end`.
     """
     from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
@@ -146,7 +146,7 @@ def _scene_of_brick(figure: "Figure", scene: Scene, found: Trajectory, rate: flo
 
 
 def _brick(scene: Scene) -> Array:
-    """Return the corners of a brick, (8, 3); a side has at least 1 % of the longest."""
+    """Return the corners of a brick, (8, 3); each side is at least 1 % of the longest."""
     moments = np.array(scene.moments)
     sides = np.sqrt(np.maximum(0.0, moments.sum() - 2.0 * moments))
     sides = np.maximum(sides, 0.01 * sides.max())

@@ -1,11 +1,11 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
 A weak torque changes the periodic torque-free motion slowly. One macro-step computes the change
-over very many revolutions. The stroboscopic solution is that of Calvo, Chartier, Murua and
-Sanz-Serna 2011, Numerical stroboscopic averaging for ODEs and DAEs, Applied Numerical Mathematics
-61; the two scales are those of Chartier, Crouseilles, Lemou and Mehats 2015, Uniformly accurate
-numerical schemes for highly oscillatory Klein-Gordon and nonlinear Schroedinger equations,
-Numerische Mathematik 129.
+over very many revolutions. The stroboscopic solution, the state once in each revolution, is that of
+Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging for ODEs and DAEs,
+Applied Numerical Mathematics 61; the two scales are those of Chartier, Crouseilles, Lemou and
+Mehats 2015, Uniformly accurate numerical schemes for highly oscillatory Klein-Gordon and nonlinear
+Schroedinger equations, Numerische Mathematik 129.
 """
 
 import math
@@ -57,10 +57,11 @@ def averaged(
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
     `steps` of the result counts macro-steps; `error` is measured with more nodes and a higher order
-    of averaging. Raise InputError for an opaque torque; if omega without torque would not
-    circle a principal axis, as for a sphere, or is near the separatrix; if the torque is not weak,
-    or may be in resonance; if a recorded torque is not a polynomial in omega and time, and waves,
-    because it may change within a macro-step; and if the work limit is exceeded.
+    of averaging. Raise InputError for a torque that is opaque, depends on the attitude, is not
+    weak, or may be in resonance. Raise it too if omega without torque would not circle a principal
+    axis, as for a sphere, or is near the separatrix, and if the work limit is exceeded. A recorded
+    torque must be a polynomial in omega and time, times waves; any other may change within a
+    macro-step.
     """
     coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
     if coordinates is None:
@@ -187,7 +188,7 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the next macro-step, as long as accuracy allows, or raise TimedError."""
+        """Return the next macro-step, shortened until accurate; raise TimedError if none is."""
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))
         length = self._forecast()
@@ -230,7 +231,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles for a squared modulus; raise TimedError near 1."""
+        """Return how many angles a squared modulus requires; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

@@ -1,10 +1,10 @@
 """Coordinates of omega that a weak torque changes slowly, for the method `averaged`.
 
-The body rotates about principal axis a, and b, c are the next axes in cyclic order. In Euler's
-equations w_b' = P w_c w_a + n_b, and so on, n is the torque over the moment, and the coefficients
-P and Q of b and c have opposite signs. With x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
-w_c, u = w_a^2 and the angle psi, psi' = |PQ|^(1/2) |w_a|, the motion without torque is exactly 2
-pi-periodic in psi:
+The body rotates about principal axis a; b and c are the next axes in cyclic order. Euler's
+equations are w_b' = P w_c w_a + n_b, and so on, where n is the torque over the moment. The
+coefficients P and Q of axes b and c have opposite signs. Let x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
+w_c, u = w_a^2, and let psi be the angle with psi' = |PQ|^(1/2) |w_a|. Without torque the motion is
+exactly 2 pi-periodic in psi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
@@ -27,7 +27,7 @@ Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
 class Coordinates(NamedTuple):
-    """The constants of the coordinates about one axis; a point is (p1, p2, p3, t), t in s."""
+    """The constants of the coordinates about one axis. A point is (p1, p2, p3, t), with t in s."""
 
     axes: tuple[int, int, int]  # b, c, a
     on_b: float  # x over w_b
@@ -84,7 +84,7 @@ class Coordinates(NamedTuple):
         return math.sqrt(max(float(on_axis), float(on_others)))
 
     def by_omega(self, omega: Array, cosine: Array, sine: Array) -> Array:
-        """Return the derivatives of (p1, p2, p3) by omega, (n, 3, 3), at n fixed angles psi."""
+        """Return the derivatives d(p1, p2, p3)/d(omega) at n fixed angles psi, shape (n, 3, 3)."""
         b, c, a = self.axes
         found = np.zeros((len(cosine), 3, 3))
         found[:, 0, b], found[:, 0, c] = cosine * self.on_b, sine * self.on_c
@@ -94,7 +94,7 @@ class Coordinates(NamedTuple):
         return found
 
     def omega(self, point: Array, cosine: Array, sine: Array) -> tuple[list[Array], Array, Array]:
-        """Return omega (rad/s), y and |w_a| at a point and the angle of this cosine and sine."""
+        """Return omega (rad/s), y and |w_a| at a point, for the cosine and the sine of psi."""
         y = point[0] * sine + point[1] * cosine
         fast = np.sqrt(point[2] + self.bend * y * y)
         b, c, a = self.axes
@@ -107,7 +107,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return the derivatives of a point by psi; `mean` (s) is subtracted from that of t."""
+        """Return d/dpsi of a point, with `mean` (s) subtracted from dt/dpsi."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)

@@ -26,7 +26,7 @@ class Done(NamedTuple):
     def from_start(
         cls, coordinates: Coordinates, start: Array, error: Array, transition: Array
     ) -> Self:
-        """Return a macro-step, with the derivatives of its start by omega."""
+        """Return a completed macro-step, with `by_omega` computed at its start."""
         phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
         cosine, sine = np.cos(phases), np.sin(phases)
         omega = coordinates.omega(start[:, None], cosine, sine)[0]
@@ -37,7 +37,7 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest error of omega (rad/s) and amplification at up to four ends of steps."""
+    """Return the largest error of omega (rad/s) and amplification, at up to five ends of steps."""
     count = len(done)
     error, growth = _estimate_end(coordinates, coefficients, done, omega, angle)
     for n in range(1, count, -(-count // _MOST_ENDS)):

@@ -14,7 +14,7 @@ from pyharness.model.chebyshev import points, to_coefficients
 
 
 class Slow(NamedTuple):
-    """Matrices, shape (n, n), of n Chebyshev points from 0 to 1."""
+    """The n Chebyshev points from 0 to 1, their weights, and matrices of shape (n, n)."""
 
     nodes: Array
     integral: Array  # from values to their integral from 0
@@ -54,7 +54,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return an even `count` of angles and their arrays."""
+    """Return an even number `count` of angles and their arrays."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)
@@ -83,7 +83,7 @@ def between_nodes(count: int, at: Array) -> Array:
 
 
 def between_angles(count: int, at: Array) -> Array:
-    """Return the trigonometric interpolation matrix from `count` angles, even, to `at` (rad)."""
+    """Return the trigonometric interpolation matrix from `count` angles (even) to `at` (rad)."""
     half = 0.5 * (at[:, None] - fast_nodes(count).angles)
     sine = np.sin(half)
     hit = np.abs(sine) < 1e-17

@@ -1,7 +1,7 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow s = psi/length, from
-0 to 1. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow variable s =
+psi/length, from 0 to 1. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
@@ -50,8 +50,8 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), is the point at psi = 0, whose time lacks a part proportional
-    to psi; `error` is its measured error. `modulus` is the largest squared modulus.
+    `stroboscopic`, shape (4, nodes), is the point at psi = 0, and `error` its measured error. Its
+    time lacks a part proportional to psi. `modulus` is the largest squared modulus.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class MacroStep:
     def mean_slopes(
         coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
     ) -> Array:
-        """Return the derivatives by psi at a point, averaged over psi, shape (4,)."""
+        """Return d/dpsi of a point, averaged over psi, shape (4,)."""
         fast = fast_nodes(angles)
         times = np.full(angles, time)
         found: Array = coordinates.slopes(
@@ -128,7 +128,7 @@ class MacroStep:
             raise NotResolvedError
 
     def _slopes(self, point: Array, fast: Fast, slow: Slow | None = None) -> Array:
-        """Return the derivatives by psi on a grid of nodes and angles, shape (4, nodes, angles)."""
+        """Return d/dpsi of points on a grid of nodes and angles, (4, nodes, angles)."""
         nodes = (slow or self._slow).nodes[: point.shape[-2], None]
         time = self._start_time + (self._pace * self.length) * nodes + point[3]
         self.evaluations += point[0].size // point.shape[-1] * len(fast.angles)
@@ -162,7 +162,6 @@ class MacroStep:
         return found
 
     def _newton(self, residual: Array) -> Array:
-        """Return Newton's correction of V."""
         n = self._n_unknowns
         found = residual.copy()
         found[:n] = (self._inverse @ residual[:n].ravel()).reshape(n, -1)
@@ -171,7 +170,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the error of V at the nodes, by two finer sweeps."""
+        """Return the error of V at the nodes, measured by two finer sweeps."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -182,7 +181,7 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return the error of V at an angle (rad), (4,), and its transition matrix, (4, 4)."""
+        """Return the error of V at an angle (rad), (4,), and the transition matrix, (4, 4)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)

@@ -19,7 +19,7 @@ _MOST_DEGREE = 8.0
 
 
 def torque_of(scene: Scene) -> tuple[Torque, bool]:
-    """Return the torque over the moments, and whether it may depend on time."""
+    """Return the torque over the moments as a function, and whether it may depend on time."""
     if isinstance(scene.torque, StateTorque):
         return _state_torque(scene, scene.torque), True
     _, constant, rate, sines, cosines = normalized(scene)
@@ -66,8 +66,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError if the degree of a recorded torque exceeds 8 or is infinite: a macro-step may
-    miss a pulse, or an effect in a narrow range of omega.
+    Raise InputError if the degree of a recorded torque exceeds 8 or is infinite, because a
+    macro-step may miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

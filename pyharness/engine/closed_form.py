@@ -1,4 +1,4 @@
-"""Closed forms: a sphere under a TorqueLaw; other bodies without torque, by elliptic functions."""
+"""Closed forms: spheres under a TorqueLaw, and other bodies without torque (elliptic functions)."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 under a torque, or if there is none."""
+    """Return the period of omega (s); 0 if it has none, or under a torque."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -29,7 +29,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return the largest error and amplification, at the last time or, if large, at 16 times."""
+    """Return error and amplification at the last time or, if large, their maxima over 16 rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

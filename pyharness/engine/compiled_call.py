@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 class CompiledCall(NamedTuple):
     """A prepared solver as a function for compiled code, such as numba's.
 
-    ``function(data, start, t_end, state)`` reads omega (rad/s), and for an attitude a unit
-    quaternion, as doubles at the address `start`, and writes the state at `t_end` (s) to `state`.
-    It returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver` exists.
+    ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
+    for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to the address
+    `state`, and returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver`
+    exists.
     """
 
     function: Any

@@ -40,7 +40,7 @@ def with_events(
     """Return a trajectory with its events, and without rows beyond a terminal event.
 
     `sol` is the solution as a function of time, `ends` are the first and last requested times (s),
-    and `rows` returns further rows.
+    and `rows` computes further rows.
     """
     events = no_events(len(functions), 3 if found.attitude is None else 7)
     if sol.t_min < sol.t_max:
@@ -71,7 +71,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return a trajectory over at most six periods (s) on each side of 0."""
+    """Return the trajectory; a side of 0 that exceeds six periods (s) is limited to three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

@@ -1,7 +1,7 @@
 """Dense output by Chebyshev polynomials through a method's results at their nodes.
 
 Intervals are divided until the last coefficients are far below the tolerance. A closed form is
-evaluated instead.
+evaluated directly instead.
 """
 
 import itertools
@@ -43,7 +43,7 @@ _SHORT = 0.25  # a change in a shorter part of an interval might be hidden betwe
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) that has no polynomial yet, part of a longer one."""
+    """An interval (s) that has no polynomial yet, and is part of a longer one."""
 
     low: float
     high: float
@@ -53,7 +53,7 @@ class _Open:
     def is_rough(
         self, tail: float, times: Array, values: Array, scale: float, rough: float
     ) -> bool:
-        """Return whether errors of the method, below `rough`, prevent smaller tails."""
+        """Return whether errors of the method, up to `rough`, keep the last coefficients large."""
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
         # A fast wave between few nodes has small tails too, but differs from the longer polynomial.
@@ -83,7 +83,7 @@ def dense_output(
 ) -> DenseOutput:
     """Return the solution as a function of time, between 0 and the rows of `found`.
 
-    `rows` returns further rows; the tolerance 1 stands for a fixed step. Raise InputError if more
+    `rows` computes further rows; the tolerance 1 stands for a fixed step. Raise InputError if more
     than 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
@@ -111,7 +111,7 @@ def state_pieces(
 def _first_edges(
     scene: Scene, found: Trajectory, ends: list[float], tolerance: float
 ) -> list[float]:
-    """Return the ends of the first intervals (s), among them all changes of tables."""
+    """Return the edges of the first intervals (s), including all breaks of tables."""
     tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
     inner = {time for time in (tape.breaks if tape else ()) if ends[0] < time < ends[-1]}
     bounds = sorted({*ends, *inner})

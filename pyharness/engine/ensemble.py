@@ -23,15 +23,16 @@ class Ensemble(BatchResult):
         apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
         `sensitive` (amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
-        Unit quaternions from body to space, scalar first. Fields are None if not requested.
+        Unit quaternions from body to space, scalar first. This and the following fields are None if
+        not requested.
     estimates : ndarray, shape (n, 2), or None
-        `error` and `growth`, in columns.
+        The columns `error` and `growth`.
     t_events, y_events : list of list of ndarray, or None
-        By function, then body: the times (s) of k events, shape (k,), and the states, shape (k, 3)
-        or (k, 7); None for a body without a result.
+        Times (s) and states of events, indexed by function, then by body: for k events shape (k,),
+        and (k, 3) or (k, 7); None for a body without a result.
     sensitivities : dict of ndarray, or None
-        By name, the derivatives of the final states by a parameter of m values, shape (n, 3, m) or
-        (n, 7, m); NaN for a body without a result.
+        By name, the derivatives of the final states with respect to a parameter with m values,
+        shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
 
@@ -60,7 +61,7 @@ class Ensemble(BatchResult):
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications or upper bounds of them, shape (n,); NaN where unknown."""
+        """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
         return None if self.estimates is None else self.estimates[:, 1]
 
     def estimates_of(self, piece: slice) -> Array:

@@ -1,7 +1,7 @@
 """Polynomials through the values of an event's function, and the errors of these values.
 
-A zero interval is one on which a function is 0 to within its error, and which it reaches by a kink
-or a jump; a decay to 0 has no such interval.
+In a zero interval, a function is 0 to within its error. The interval is a root if the function
+reaches it by a kink or a jump, but not if it decays to 0.
 """
 
 import math
@@ -44,8 +44,8 @@ _COARSEST = 1e-10
 class Solution:
     """The solution of a scene in which events are searched.
 
-    `pieces` are polynomials, `sol` is the dense output, and `tolerance` that of omega, 0 for a
-    fixed step.
+    `pieces` are its polynomials, and `sol` is its dense output. `tolerance` is that of omega; 0 for
+    a fixed step.
     """
 
     pieces: Pieces
@@ -109,7 +109,7 @@ def _normalised(states: Array) -> Array:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return converged polynomials through a function's values, and sign changes elsewhere."""
+    """Return converged polynomials through a function's values; elsewhere, its sign changes."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
@@ -168,7 +168,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 
 
 def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials that exceed their noise, with the noise."""
+    """Return the polynomials that may exceed twice their noise, with the noise stored."""
     noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
     fits = replace(fits, noise=noise)
     return fits.only(fits.sizes > 2.0 * noise)
@@ -191,8 +191,8 @@ class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
     `noise` is the magnitude below which a value beside an interval can't be distinguished from 0.
-    `before` and `after` are the signs there; 0 where the function decays, and at the ends of the
-    solution.
+    `before` and `after` are the signs of the function beside it; 0 where the function decays, and
+    at the ends of the solution.
     """
 
     low: Array
@@ -202,7 +202,7 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return a root where the integration from 0 reaches an interval.
+        """Return for each interval a root at the end that the integration from 0 reaches first.
 
         Without `counts_touches`, only intervals with opposite signs on both sides have a root.
         """

@@ -41,8 +41,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The `limit`-th event ends the integration; infinite for none. `is_vectorized` says whether the
-    function accepts arrays, None if not yet known.
+    The event number `limit` ends the integration; infinite if none does. `is_vectorized` says
+    whether the function accepts arrays; None if not yet known.
     """
 
     name: str

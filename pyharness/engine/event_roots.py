@@ -1,9 +1,9 @@
 """Isolation of all real roots of polynomials on intervals, for many intervals at once.
 
 A polynomial with the Chebyshev coefficients c has no root on the interval if |c[0]| > |c[1]| +
-|c[2]| + ... The same bound for the derivative leaves at most one root, and for the second
-derivative at most two, with one extremum between. Other intervals are halved, so that no root is
-missed (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
+|c[2]| + ... If this bound holds for the derivative, there is at most one root; for the second
+derivative, at most two, with one extremum between them. Other intervals are halved, so that no root
+is missed (Trefethen 2013, Approximation Theory and Approximation Practice, chapters 3 and 18).
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return the matrices of the derivative, the left half and the right half of an interval."""
+    """Return matrices from coefficients to those of the derivative, left half and right half."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -46,8 +46,8 @@ _ORDERS = np.arange(NODES)
 class Fits:
     """Polynomials on p intervals from `low` to `high` (s), with `coefficients`, (p, NODES).
 
-    `first` and `last` are the function's values at `low` and `high`, equal at common ends. Below
-    the magnitude `noise` the function can't be distinguished from 0.
+    `first` and `last` are the function's values at `low` and `high`, equal at common ends of
+    intervals. Below the magnitude `noise`, the function can't be distinguished from 0.
     """
 
     low: Array
@@ -73,8 +73,8 @@ class Roots:
     """Candidates for roots at n times (s).
 
     `change` is the sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
-    `slope` (1/s) and `curvature` (1/s2) are the polynomial's derivatives. Below `noise` the
-    function, and below `near` the polynomial, can't be distinguished from 0. The function remains 0
+    `slope` (1/s) and `curvature` (1/s2) are derivatives of the polynomial. Below `noise` the
+    function can't be distinguished from 0, nor the polynomial below `near`. The function remains 0
     for `lasting` (s), negative before time 0.
     """
 
@@ -169,7 +169,7 @@ def _has_no_root(coefficients: Array) -> Array:
 
 
 def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Array) -> Roots:
-    """Return the roots at the points x, from -1 to 1, of the polynomials with these numbers."""
+    """Return the roots at the points x, from -1 to 1, of the polynomials of index `number`."""
     half = 0.5 * fits.high[number] - 0.5 * fits.low[number]
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
@@ -201,7 +201,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     c: Array, first: Array, last: Array, slopes: Array, near: Array
 ) -> list[tuple[Array, Index, Index]]:
-    """Return tuples of points, sign changes and row numbers, for at most one extremum a row."""
+    """Return points, sign changes and row numbers of roots, in rows with at most one extremum."""
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)

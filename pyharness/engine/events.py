@@ -1,8 +1,8 @@
 """Events: the times at which functions of time, omega and attitude are 0.
 
-The function is approximated by polynomials, on intervals that are divided until these converge, and
-all their roots are isolated, also close and double roots of a smooth function. Where it is not
-smooth, intervals become tiny, and only sign changes between nodes are found.
+A function is approximated by polynomials on intervals, which are divided until the polynomials
+converge. All roots of the polynomials are isolated, including close and double roots. Where the
+function is not smooth, intervals become tiny, and only sign changes between nodes are found.
 """
 
 import math
@@ -47,7 +47,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return the roots with the noise at their times, and without extrema that are not near 0."""
+    """Return the roots with the noise at their times, without extrema that are not near 0."""
     if not roots.time.size:
         return roots
     noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
@@ -77,7 +77,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times of roots, those of inexact sign changes by bisection."""
+    """Return the times of roots; inexact times of sign changes are refined by bisection."""
     # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
     bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
@@ -216,9 +216,10 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 
 
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
-    """Return the times of the events after (`side` 1) or before (-1) time 0, away from 0.
+    """Return the times of events after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a sign change at time 0 is from the value 0, and one at the end to the value 0.
+    As in SciPy, a root at time 0 is a sign change from the value 0, and one at the end a sign
+    change to the value 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0:
@@ -241,7 +242,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times of all events on one side of 0, by repetition beyond the polynomials."""
+    """Return the times of all events on one side of 0, repeated beyond the polynomials."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min

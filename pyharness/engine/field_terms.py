@@ -18,9 +18,9 @@ def gravity_gradient(
 ) -> StateTorque:
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
-    The unit vector r from the centre of attraction is (cos n t, sin n t, 0) about the axes of
-    space. The torque is 0 if a principal axis is along r. In the plane of the orbit this
-    equilibrium is stable if the axis has the smaller of the two moments in the plane.
+    The unit vector r from the centre of attraction is (cos n t, sin n t, 0) along the axes of
+    space. The torque is 0 if a principal axis is along r. For rotations in the plane of the orbit,
+    this equilibrium is stable if the axis has the smaller of the two moments in that plane.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def gravity_gradient(
     Raises
     ------
     InputError
-        If `inertia` is not as in a scene, or `rate` is not finite.
+        If a scene would not accept `inertia`, or `rate` is not finite.
 
     References
     ----------
@@ -78,14 +78,16 @@ def gravity_gradient(
 def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b on a magnetic dipole that is fixed in the body.
 
-    The field is b = R^T B, with B about the axes of space, and R from body to space.
+    The field along the body axes is b = R^T B, where B is along the axes of space, and R rotates
+    from body to space.
 
     Parameters
     ----------
     moment : three numbers
         The moment m of the dipole about the body axes (A m2).
     field : three numbers, or TorqueLaw
-        The field B (T) about the axes of space, or a law of it with ``frame="space"``.
+        The field B (T) along the axes of space; if it depends on time, a TorqueLaw with
+        ``frame="space"``.
 
     Returns
     -------
@@ -95,7 +97,7 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
     Raises
     ------
     InputError
-        If an argument is of another form, a number is not finite, or the law has another frame.
+        If an argument has another form, a number is not finite, or the law has another frame.
 
     References
     ----------
@@ -121,10 +123,10 @@ def magnetic_dipole(moment: Numbers, field: TorqueLaw | Numbers) -> StateTorque:
 def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
-    The coils have the moment m = -k b', where b' = R^T B' - omega x b is the rate of the field b =
-    R^T B that a magnetometer in the body measures. In a constant field the torque -k (|b|^2 omega -
-    (omega . b) b) damps the part of omega that is perpendicular to the field. In a rotating field
-    the body finally rotates with the field.
+    The coils have the moment m = -k b'. Here b = R^T B is the field that a magnetometer in the body
+    measures, and b' = R^T B' - omega x b is its rate. In a constant field the torque -k (|b|^2
+    omega - (omega . b) b) damps the part of omega that is perpendicular to the field. In a rotating
+    field the body finally rotates with the field.
 
     Parameters
     ----------
@@ -141,7 +143,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     Raises
     ------
     InputError
-        If an argument is of another form, a number is not finite, or the law has another frame.
+        If an argument has another form, a number is not finite, or the law has another frame.
 
     References
     ----------
@@ -170,12 +172,13 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    Use it in sums. Alone, a ``TorqueLaw(..., frame="space")`` is solved faster.
+    The matrix R rotates from body to space. Use the term in sums; alone, a ``TorqueLaw(...,
+    frame="space")`` is solved faster.
 
     Parameters
     ----------
     torque : three numbers, or TorqueLaw
-        The torque N (N m), or a law of it with ``frame="space"``.
+        The torque N (N m), or a TorqueLaw with ``frame="space"``.
 
     Returns
     -------
@@ -185,7 +188,7 @@ def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     Raises
     ------
     InputError
-        If `torque` is of another form, a number is not finite, or the law has another frame.
+        If `torque` has another form, a number is not finite, or the law has another frame.
 
     References
     ----------

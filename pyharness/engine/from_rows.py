@@ -18,9 +18,9 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
 
-    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003), with
-    omega at the Gauss points from the cubic through two rows and their derivatives. After a
-    rotation that overflows, all attitudes are NaN.
+    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003). Omega at
+    the Gauss points is from the cubic Hermite polynomial between two rows. All attitudes after a
+    rotation that overflows are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])
@@ -44,7 +44,7 @@ def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
 
 
 def _between(rows: Array, slopes: Array, span: Array, part: float) -> Array:
-    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by cubic Hermite."""
+    """Return omega (rad/s), (n, 3), at the fraction `part` of n steps, by Hermite's cubic."""
     rest = 1.0 - part
     ends = (
         rest * rest * (1.0 + 2.0 * part) * rows[:-1] + part * part * (1.0 + 2.0 * rest) * rows[1:]

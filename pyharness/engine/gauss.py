@@ -27,12 +27,12 @@ _NEAR_THE_END = 1e300
 
 
 def gauss(stages: int) -> Integrator:
-    """Return the solver by Gauss collocation with 1 to 8 `stages`, of twice this order.
+    """Return the solver by Gauss collocation with 1 to 8 `stages`; the order is twice their number.
 
-    With d the largest difference of omega between two solutions, and r <= 2 the ratio of their
-    steps, the estimated error of the finer is 2 d / (r**p - 1), with a safety factor of 2; p is the
-    order, but at most 8, because at the longer steps of higher orders the error does not yet fall
-    at the full order.
+    The estimated error of the finer of two solutions is 2 d / (r**p - 1), with a safety factor of
+    2. Here d is their largest difference of omega, r <= 2 is the ratio of their steps, and p is the
+    order, but at most 8. Beyond 8, steps are longer, and the error does not yet fall at the full
+    order.
     """
 
     def solve(
@@ -124,9 +124,9 @@ class _Solution:
     def blows_up(self, coarser: "_Solution", start: float) -> bool:
         """Return whether this solution and a coarser one end because omega grows without bound.
 
-        Both then end before the last time, nearly together, at |omega| = m. Either m > 1e300 rad/s
-        in both; or the finer m exceeds 1.5 times the coarser, and this product exceeds 1000 times
-        `start` (rad/s) and every |omega| at a requested time.
+        Both then end before the last time, nearly together. Let m be |omega| at the end. Either m
+        exceeds 1e300 rad/s in both; or the finer m exceeds 1.5 times the coarser m, and this
+        product exceeds 1000 times `start` (rad/s) and every |omega| at a requested time.
         """
         if COMPLETE in (self.status, coarser.status):
             return False
@@ -139,7 +139,7 @@ class _Solution:
 
 
 class _Kernel(NamedTuple):
-    """A scene and its times as functions of the step size (s), and bounds for the steps."""
+    """Functions of the step size (s) for one scene and its times, and bounds for the steps."""
 
     solution: "Callable[[float], _Solution]"
     counts: Callable[[float], Array]  # steps in each interval
@@ -166,7 +166,7 @@ def _kernel(scene: Scene, stages: int, times: Sequence[float], effort: float) ->
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of steps in each interval; one may exceed `step` (s) by a relative 1e-6."""
+    """Return the number of steps in each interval; one may exceed `step` (s) by 1e-6 of it."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 
@@ -178,5 +178,5 @@ def _lengths(times: Sequence[float]) -> Array:
 
 
 def _first_step(rate: float, shortest: float) -> float:
-    """Return a step (s), a whole part of `shortest`, with at most half a radian of phase."""
+    """Return a first step (s) of at most half a radian of phase: `shortest` over an integer."""
     return max(1e-300, shortest / max(1.0, math.ceil(min(1e18, 2.0 * rate * shortest))))

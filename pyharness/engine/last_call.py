@@ -48,7 +48,7 @@ class LastCall:
 
     @property
     def ctypes(self) -> CompiledCall:
-        """Return the solver for compiled code, such as numba's; `capsule` is for C."""
+        """Return the solver for compiled code, such as numba's; C code uses `capsule`."""
         return compiled_call(self)
 
     def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
@@ -67,16 +67,16 @@ class LastCall:
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first.
 
-        ``gave up``: work limit exceeded, or no correct digit of the phase left; ``refused``: the
-        method does not apply; ``sensitive``: amplified rounding errors exceed the tolerance. The
-        test for ``sensitive`` takes microseconds for a closed form, milliseconds for Gauss
-        collocation.
+        It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left, and
+        ``refused`` if the method does not apply. It is ``sensitive`` if amplified rounding errors
+        exceed the tolerance. The test for ``sensitive`` takes microseconds for a closed form,
+        milliseconds for Gauss collocation.
         """
         return self._judge()[0]
 
     @property
     def error(self) -> float | None:
-        """Return the estimated error of the last result, relative or an angle (rad), or None."""
+        """Return the estimated error of the last result (relative, or rad), or None if unknown."""
         return self._judge()[1]
 
     @property
@@ -91,7 +91,7 @@ class LastCall:
 
     @property
     def steps(self) -> int:
-        """Return the steps of the last call; for Gauss collocation, the right-hand sides."""
+        """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
         return abs(self._counted())
 
     def _counted(self) -> int:

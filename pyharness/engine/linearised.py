@@ -14,7 +14,7 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 
 
 def transitions(times: Array, slopes: Array) -> Array:
-    """Return transition matrices from n times (s) to the last, (n, m, m), by Jacobians (1/s)."""
+    """Return transition matrices from n times (s) to the last, (n, m, m), from Jacobians (1/s)."""
     # The Jacobian hardly changes in an interval. Therefore the exponential of Jacobian times
     # interval is the state-transition matrix.
     pieces = exponentials(np.diff(times)[:, None, None] * slopes)

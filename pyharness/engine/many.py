@@ -1,6 +1,6 @@
 """Solution of many bodies in one call, side by side in the kernel and in threads.
 
-The other bodies, their order and the number of threads change no bit of a result.
+Each result is bit-for-bit independent of the other bodies, their order and the number of threads.
 """
 
 from collections.abc import Iterable, Sequence
@@ -89,24 +89,24 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values hold where no array is given; or all scenes, without arrays.
+        One scene, whose values apply where no array is given; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     omega0 : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
-        Quaternions at time 0, from body to space, scalar first. The default is that of the scene;
-        if the scene has no attitude, none are returned.
+        Quaternions at time 0, from body to space, scalar first. The default is the scene's
+        attitude; if it has none, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
         Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
-        Inertia matrices (kg m2), instead of moments, about the axes of all vectors and attitudes.
+        Inertia matrices (kg m2) instead of moments, about the axes of all vectors and attitudes.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Constant torques (N m) and their rates (N m/s); over the moments (1/s2, 1/s3) for bodies
-        given by coefficients.
+        Constant torques (N m) and rates (N m/s). For bodies given by coefficients, these are
+        torques over moments (1/s2, 1/s3).
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        The k waves of the torques: three amplitudes (as `torque_constant`) and the frequency
-        (rad/s).
+        The k waves of each torque: three amplitudes (in the unit of `torque_constant`) and a
+        frequency (rad/s).
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses closed forms or the Taylor
         series.
@@ -120,11 +120,11 @@ def solve_many(
     estimates : bool
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
-        Functions whose roots are computed, as in `solve`, but not terminal. They need the method
-        `auto`, `taylor` or `closed-form`, and some milliseconds a body.
+        Functions whose roots are computed, as in `solve`; none may be terminal. The method must be
+        `auto`, `taylor` or `closed-form`. Events take some milliseconds per body.
     sensitivities : iterable of str
-        Names of parameters, as in `solve`, for derivatives of the final states, by the same three
-        methods.
+        Names of parameters, as in `solve`, with respect to which the final states are
+        differentiated. The same three methods are allowed.
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
@@ -141,7 +141,7 @@ def solve_many(
     ------
     InputError
         If the arrays differ in their numbers of rows, the method can't solve the bodies, the
-        tolerance or effort is out of range, or no events or sensitivities can be computed.
+        tolerance or effort is out of range, or events or sensitivities can't be computed.
     NotBuiltError
         If the extension is not built.
 
@@ -286,7 +286,7 @@ def _solve_groups(
 
 
 class _Bodies:
-    """The checked arguments of the kernel: rows of a scene, `ready`, or instead arrays, `own`."""
+    """The checked arguments of the kernel: arrays `own`, and for others a scene's `ready` rows."""
 
     def __init__(
         self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,

@@ -1,4 +1,4 @@
-"""Many initial omegas and attitudes of a prepared scene."""
+"""Solution of a prepared scene from many initial omegas and attitudes."""
 
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,7 @@ def many_attitudes(
     solver: "AttitudeSolver", code: int, omega0: Any, t_end: Any, attitude0: Any = None, *,
     threads: int = 1, out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
-    """Return what `AttitudeSolver.many` does: omegas, (n, 3), attitudes, (n, 4), and statuses."""
+    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `AttitudeSolver.many`."""
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)

@@ -19,7 +19,7 @@ def solve_side_by_side(
     """Solve the bodies in `piece` side by side, and return the indices of the unsolved bodies.
 
     A body remains unsolved if its error can't be measured. All do if the torque is neither recorded
-    nor in space, or if the solver does more than its kernel.
+    nor in space, or if the solver's class overrides `__call__`.
     """
     is_plain = "__call__" not in vars(type(solver))
     packed = getattr(solver, "packed_for_lanes", solver.packed) if is_plain else None

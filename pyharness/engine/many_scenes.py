@@ -27,7 +27,7 @@ class Axes:
         self.axes, self.turns = axes, turns
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Replace `omega0` and `attitude0` of `given`, if in `names`, by those about the axes."""
+        """Convert `omega0` and `attitude0` of `given`, if in `names`, to principal axes."""
         if "omega0" in names:
             rows = rows_of("omega0", given["omega0"], 3)
             self._check("omega0", rows)
@@ -52,7 +52,7 @@ class Axes:
 def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
     """Return scenes with full inertia matrices as arrays about principal axes, and these axes.
 
-    None becomes NaN. The arrays have A, B, C, because rounded moments are less accurate.
+    None becomes NaN. The arrays have A, B, C, because rounded moments would be less accurate.
     """
     each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
     axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
@@ -107,7 +107,7 @@ _kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
     """Return the shared, read-only `checked_rows` of a scene, with its `merged` torque.
 
-    They are cached, because for few bodies the conversion takes longer than the solution.
+    They are cached, because for few bodies their conversion takes longer than the solution.
     """
     # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
     # its scene alive, so that no other object gets its identity.

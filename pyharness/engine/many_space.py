@@ -1,7 +1,7 @@
 """Conversion of the arrays of `solve_many` to one scene per body.
 
-Full inertia matrices need it, and so do torques in space or of the state, and changing inertias,
-whose bodies are solved here by prepared solvers.
+Full inertia matrices need it. So do torques in space, torques of the state and changing inertias;
+prepared solvers solve these bodies here.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,8 +53,8 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if the torque needs an attitude and has none, if the method can't solve the
-    scene, or if a torque in space acts on bodies given by coefficients.
+    Raise InputError if the torque needs an attitude and none is given, if the method can't solve
+    the scene, or if a torque in space acts on bodies given by coefficients.
     """
     check_torque(scene, method, attitude=True)
     check_prepared(scene, method)

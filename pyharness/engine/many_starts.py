@@ -1,4 +1,4 @@
-"""Many initial angular velocities of a prepared scene."""
+"""Solution of a prepared scene from many initial angular velocities."""
 
 from typing import Any
 

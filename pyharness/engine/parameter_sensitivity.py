@@ -1,4 +1,4 @@
-"""Sensitivities, the derivatives of a solution by parameters, by Taylor series."""
+"""Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series."""
 
 import itertools
 import math
@@ -75,7 +75,7 @@ def checked_names(
 def sensitivities_at(
     scene: Scene, found: Trajectory, names: Sequence[str], tolerance: float, effort: float
 ) -> dict[str, Array]:
-    """Return the derivatives by each parameter of m values, shape (n, 3, m) or (n, 7, m).
+    """Return the derivatives with respect to each parameter, (n, 3, m) or (n, 7, m) for m values.
 
     `tolerance` is relative to the largest derivative in a column so far. Raise InputError if the
     work limit is exceeded, or a derivative overflows.
@@ -100,7 +100,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns of each name, the derivatives, (n, 3, m) or (n, 7, m), and those at 0."""
+    """Return the columns by name, the derivatives, (n, 3 or 7, m), and those at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed, forcings = _packed(equations.tape, len(state), equations.forcings)
@@ -141,7 +141,7 @@ def _slope(scene: Scene) -> Array:
 def _by_periods(
     scene: Scene, names: Sequence[str], times: Array, period: float, tolerance: float, effort: float
 ) -> tuple[dict[str, slice], Array]:
-    """Return the columns of each name, and the derivatives of a periodic omega, (n, 3, m)."""
+    """Return the columns by name, and the derivatives of a periodic omega, (n, 3, m)."""
     # A perturbation of the initial omega changes the period, and thus grows by the same multiple of
     # the slope of omega in every period. Therefore the state-transition matrix of one period is M =
     # I + N, where N has rank 1 and N N = 0, and that of k periods M^k = I + k N (Floquet). The part
@@ -172,7 +172,7 @@ def _by_periods(
 def _packed(
     tape: Tape, n_unknowns: int, forcings: NDArray[np.int32]
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return the kernel's array of a tape, and `forcings` as numbers of its combinations."""
+    """Return a tape as the kernel's array, and `forcings` as numbers of its combinations."""
     packed = kernel_tape(tape, n_unknowns)
     # The outputs are the last combinations, which the array counts here.
     first = int(packed[3]) - len(tape.outputs)
@@ -180,7 +180,6 @@ def _packed(
 
 
 def _check(status: int, n_rows: int, times: Array, derivatives: Array) -> None:
-    """Raise InputError if derivatives are not complete or not finite."""
     time = times[min(n_rows, len(times) - 1)]
     if status == GAVE_UP:
         raise TimedError(

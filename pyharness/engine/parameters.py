@@ -39,9 +39,9 @@ class _Body(NamedTuple):
 class VariedEquations:
     """The equations of motion of a scene, and how they depend on parameters.
 
-    `tape` has the partial derivatives of the rates as outputs, then the rates. `forcings`, shape
-    (n, m), are the numbers, from 1, of the outputs for n rates and m columns; 0 for a derivative of
-    0. `columns` are the columns of each name.
+    The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
+    parameter has a column; `columns` has those of each name. `forcings`, shape (n, m), are the
+    numbers, from 1, of the outputs for n rates and m columns; 0 for a derivative of 0.
     """
 
     tape: Tape
@@ -52,7 +52,7 @@ class VariedEquations:
 def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
     """Return the parameters of a scene by name, except the initial state.
 
-    The value of a name that two summands of the torque have is None.
+    A name that two summands of the torque share has the value None.
     """
     found: dict[str, list[float] | None] = {}
     if scene.moments is not None:
@@ -76,7 +76,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at time 0, (n,), and its derivatives by parameter, (n, m)."""
+    """Return the state at time 0, (n,), and its derivatives by m parameters, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]

@@ -52,7 +52,7 @@ def prepare(
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
-        end, by default as in `solve`. It does not change the error of fixed steps and Gauss
+        end, by default as in `solve`. It does not affect the error of fixed steps and Gauss
         collocation. If the motion amplifies perturbations by a factor K, no method has a relative
         error below some 1e-15 K.
     effort : float
@@ -63,17 +63,17 @@ def prepare(
     Returns
     -------
     Solver or AttitudeSolver
-        A callable. ``solver(omega0, t_end)`` returns omega (rad/s, shape (3,)) at `t_end` (s), with
-        `attitude` also a quaternion from body to space, scalar first, shape (4,). Under a torque
-        that depends on the state, an initial omega above 2**300 or below 2**-300 rad/s is
-        `refused`; `solve` accepts it.
+        A callable. ``solver(omega0, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
+        With `attitude` it also returns a quaternion from body to space, scalar first, shape (4,).
+        Under a torque that depends on the state, an initial omega above 2**300 or below 2**-300
+        rad/s is `refused`; `solve` accepts it.
 
     Raises
     ------
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
-        attitude, and `attitude` is false; if the tolerance or effort is out of range. A call raises
-        InputError if a changing moment reaches 0 before `t_end`.
+        attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
+        raises InputError if a changing moment reaches 0 before `t_end`.
     NotBuiltError
         If the extension is not built.
 

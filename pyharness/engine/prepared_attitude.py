@@ -37,7 +37,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
     Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, attitude0)``: three numbers
     (rad/s), the final time (s), positive, negative or 0, and the initial quaternion from body to
-    space, scalar first, by default the scene's or (1, 0, 0, 0).
+    space, scalar first. By default it is the scene's, or (1, 0, 0, 0).
 
     A call returns two new arrays: omega (rad/s), shape (3,), and the attitude, shape (4,), at
     `t_end`. Both are NaN if the kernel could not finish; `status` has the reason. Invalid arguments
@@ -90,7 +90,7 @@ class AttitudeSolver(LastCall, BoundAttitudeKernel):
 
     @cached_property
     def packed_for_lanes(self) -> Array:
-        """Return the array for the kernel of many bodies, with torques in space recorded."""
+        """Return the array for the kernel of many bodies, with a torque in space recorded."""
         if self._code != Methods.SPACE_TORQUE:
             return self.packed
         scene, (tolerance, _, effort) = self.plan.scene, self._given
@@ -115,7 +115,7 @@ def attitude_plan(scene: Scene, method: str, tolerance: float) -> Plan:
 def _check(
     usual: Quaternion, omega0: object, t_end: object, attitude0: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return arguments of types that C does not know: omega with quaternion, and `t_end` (s)."""
+    """Return omega with quaternion, and `t_end` (s), from arguments that C does not accept."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     attitude = usual if attitude0 is None else unit_quaternion("attitude0", attitude0)[0]
     return (*start, *attitude), time

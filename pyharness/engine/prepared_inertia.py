@@ -1,6 +1,6 @@
 """Prepared solvers of scenes with a full inertia matrix.
 
-Their calls convert to principal axes and back in Python, and are slower than those from C.
+Their calls convert to principal axes and back in Python, and are therefore slower than others.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ def _no_compiled_call(solver: object) -> Any:
 
 
 class InertiaSolver(Solver):
-    """A `Solver` about the matrix's axes; `plan` and `growth` are about principal axes."""
+    """A `Solver` about the axes of the matrix; `plan` and `growth` are about the principal axes."""
 
     ctypes = capsule = property(_no_compiled_call)
 
@@ -146,7 +146,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return the attitudes of the matrix's axes from those of principal axes, (4,) or (n, 4)."""
+    """Return attitudes of the matrix's axes from those of the principal axes, (4,) or (n, 4)."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

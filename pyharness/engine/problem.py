@@ -1,4 +1,8 @@
-"""Conversion of scenes to arguments of the Fortran kernels, and of their results."""
+"""Conversion of scenes to arguments of the Fortran kernels, and of their results.
+
+A torque over moments is four arrays: constant (1/s2), rate (1/s3), sines and cosines, whose columns
+are three amplitudes and the frequency (rad/s).
+"""
 
 import math
 from collections.abc import Sequence
@@ -19,19 +23,14 @@ _NOT_FINITE = (
 
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the coefficients A, B, C, and the torque over the moments in four arrays.
-
-    The four are constant (1/s2), rate (1/s3), sines and cosines, whose columns are three amplitudes
-    and the frequency (rad/s). Raise InputError if a value is not finite.
-    """
+    """Return A, B, C, and the torque over the moments; raise InputError if one is not finite."""
     return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
 
 
 def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
     """Return A, B, C, the ratios of the largest moment to each, and the torque over the largest.
 
-    The scene must have moments. The torque is as in `normalized`. Raise InputError if a value is
-    not finite.
+    The scene must have moments. Raise InputError if a value is not finite.
     """
     moments = np.array(scene.moments)
     largest = moments.max()
@@ -90,7 +89,7 @@ def trajectory_of(
     growth: float | None = None,
     attitudes: Array | None = None,
 ) -> Trajectory:
-    """Return the trajectory of a kernel's first `n_rows` columns of omega and attitudes.
+    """Return the trajectory from the first `n_rows` columns of a kernel's omega and attitudes.
 
     It has no `error` and `growth` if the last time was not reached.
     """

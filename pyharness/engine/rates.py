@@ -15,7 +15,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the derivatives of n states, omega (rad/s), (n, 3), or with quaternion, (n, 7).
+    """Return the time derivatives of n states: omega (rad/s), (n, 3), or with quaternion, (n, 7).
 
     A derivative is not finite where the torque is singular.
     """

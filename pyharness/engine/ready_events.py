@@ -1,4 +1,4 @@
-"""Ready events, the functions of time and state whose roots `solve` computes."""
+"""Ready events: predefined functions of time and state whose roots `solve` computes."""
 
 import math
 from typing import Any
@@ -24,8 +24,8 @@ def crosses(
     terminal : bool or int
         Whether the first event ends the integration; with a number n, the n-th event does.
     direction : {-1, 0, 1}
-        1 for increasing, -1 for decreasing components, in the direction of integration; 0 for both,
-        and for an extremum that equals the value.
+        1 for increasing, -1 for decreasing components, in the direction of integration; 0 for both.
+        With 0, an extremum that equals the value is also an event.
 
     Returns
     -------
@@ -110,8 +110,8 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
     terminal : bool or int
         As in `crosses`.
     direction : {-1, 0, 1}
-        Sign change of the derivative in the direction of integration: forward in time, -1 for
-        maxima and 1 for minima; backward, 1 for maxima and -1 for minima; 0 for both.
+        The sign change of the derivative in the direction of integration; 0 for both. Forward in
+        time, -1 selects maxima and 1 minima; backward in time, 1 selects maxima and -1 minima.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def system(scene: Scene) -> Tape:
 
 @lru_cache(maxsize=64)
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
-    """Return a tape as the kernel's array, which fortran/modern/tape.f90 describes.
+    """Return a tape as the kernel's array, whose format is in fortran/modern/tape.f90.
 
     The last `n_unknowns` outputs, by default all, are derivatives. Sine and cosine of one angle
     become one operation, because the recurrence of one needs the other.

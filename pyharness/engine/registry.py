@@ -56,7 +56,7 @@ class Method:
 
     @property
     def is_fixed_step(self) -> bool:
-        """Return whether the method has the scene's step size."""
+        """Return whether the method uses the scene's step size."""
         return self.finest == 1.0
 
 
@@ -89,7 +89,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver that imports `name`, with arguments its factory, at its first call."""
+    """Return a solver that imports `name` when called; with `arguments`, `name` is its factory."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)

@@ -49,8 +49,9 @@ def trajectory_report(
 ) -> Report:
     """Return the report of a trajectory, with a table of its rows and a picture.
 
-    `form` is that of the attitude: ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word` is
-    the arithmetic of a thesis program, None for binary64. `bound` is for the method `reference`.
+    The attitude is written in the `form` ``quaternion``, ``3-1-3``, ``3-2-1`` or ``matrix``. `word`
+    is the arithmetic of a thesis program, None for binary64. `bound` is the error bound of the
+    method `reference`.
     """
     columns = [*_TIMES, *_OMEGA]
     parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]

@@ -74,10 +74,10 @@ def has_ordinary_rows(found: Trajectory) -> bool:
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
-    """Return the power of 2 that brings omega near 1 rad/s, as a factor.
+    """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    It allows for the omega that the torque may cause until `time` (s), for a torque of the state by
-    an estimate. It is 1 if no rescaling is needed or possible, as for an opaque torque.
+    It allows for the omega that the torque may cause until `time` (s); for a torque of the state,
+    this is an estimate. It is 1 if no rescaling is needed or possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0

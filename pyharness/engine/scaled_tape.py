@@ -1,6 +1,7 @@
 """A recorded torque in rescaled time, in which omega is near 1 rad/s.
 
-Each slot has its own power of two as factor, so that none overflows or underflows.
+Each slot (input or result) has its own power of two as factor, so that none overflows or
+underflows.
 """
 
 import math

@@ -61,7 +61,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
-    """Return the scene of a file's bytes; raise InputError, which begins with `where`."""
+    """Return the scene of a file's bytes, or raise InputError with `where` before its message."""
     data = toml_of(content, where)
     try:
         return scene_of(data, default_name)

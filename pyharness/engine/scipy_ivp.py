@@ -1,8 +1,9 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of a step, our tolerance limits the error at the requested times. A
-preliminary integration with few digits gives the local tolerance by the largest |omega|, the error
-amplification, and the phase, in proportion to which local errors add up.
+SciPy controls the local error of a step; our tolerance limits the error at the requested times.
+Local errors add up in proportion to the phase. A preliminary integration with few digits therefore
+determines the largest |omega|, the error amplification and the phase, which give the local
+tolerance.
 """
 
 import math
@@ -81,7 +82,7 @@ def finest_tolerance(name: str, scene: Scene, time: float) -> float:
 
 
 def scipy_method(name: str) -> Integrator:
-    """Return an integrator that chooses the local tolerance of SciPy's method `name`."""
+    """Return an integrator by SciPy's method `name` that chooses the local tolerance."""
 
     def solve(
         scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
@@ -223,7 +224,7 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return, for each wave, the largest component over its moment (1/s2), and the frequency."""
+    """Return each wave's largest ratio of amplitude to moment (1/s2), and its frequency."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))

@@ -36,8 +36,8 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    The limit is `most` right-hand sides. The state begins with omega (rad/s). `rate`, the largest
-    Euler coefficient, times omega and time is the phase (rad).
+    The limit is `most` right-hand sides. The state begins with omega (rad/s). The phase (rad) is
+    `rate`, the largest Euler coefficient, times omega and time.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Run:
         self.unit = 1.0 if abs(end) >= _SHORTEST_SPAN else math.ldexp(1.0, math.frexp(end)[1])
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Do nothing, unless overridden; called at time 0, after steps, and inside the last one."""
+        """Do nothing, unless overridden; called at time 0, after each step, and within the last."""
 
     def solved(
         self,

@@ -1,7 +1,7 @@
 """The Taylor series of a recorded torque, as a check of an integration by SciPy.
 
-SciPy may pass a short change of the torque. If the results differ, the steps of the series limit
-those of SciPy.
+SciPy may step over a short change of the torque. If the results differ, the steps of the series
+limit those of SciPy.
 """
 
 import math
@@ -33,7 +33,7 @@ class Span(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """The rows of a series, and spans with limits of SciPy's steps."""
+    """The rows of a series, and spans with limits on SciPy's steps."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]

@@ -71,12 +71,12 @@ def solve_state(
     effort: float,
     most: float,
 ) -> Trajectory:
-    """Return the trajectory of a scene whose torque depends on the state, by SciPy's `name`.
+    """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
 
     The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
     work limit in right-hand sides of a body without torque.
 
-    The ending is ``overflow`` where omega grows without bound or the torque is singular, and
+    The ending is ``overflow`` if omega grows without bound or the torque is singular. It is
     ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
     opaque function fails, the attitude is missing, the tolerance can't be met, or the work limit is
     exceeded.
@@ -277,13 +277,13 @@ class _StateRun(Run):
                 self._undefined = None
 
     def is_singular(self) -> bool:
-        """Return whether a rate at time 0 is not finite; SciPy's first step would not end."""
+        """Return whether a rate at time 0 is not finite; SciPy's first step would then not end."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return not all(map(math.isfinite, self.slopes(0.0, self.start)))
 
     def expected_omega(self) -> float:
-        """Return the largest |omega| (rad/s) with few digits, or a guess if not to be computed."""
+        """Return the largest |omega| (rad/s) to few digits, or a guess if rows are missing."""
         scale = max(map(abs, self.start[:3])) or self._pushed()
         for _ in range(_MOST_GUESSES):
             found = self.rows([self.end], _COARSE, scale)

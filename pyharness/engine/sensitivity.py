@@ -29,7 +29,7 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether the unit roundoff times `growth` (1 + `noise`) exceeds 0.3 tolerances."""
+    """Return whether unit roundoff times `growth` times (1 + `noise`) exceeds 0.3 tolerances."""
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
 
@@ -42,10 +42,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    The error is relative to each term, not to their small sum. It is the ratio of the omega that
-    each term would cause alone until `t_end` (s), with rounding in each of `steps` steps, to
-    `scale` (rad/s), by default the initial |omega| or that by the whole torque. It is 0 if terms do
-    not nearly cancel, or depend on the state.
+    Each term has a relative rounding error, which is large against their small sum. The result is
+    the omega that each term would cause alone until `t_end` (s), with rounding in each of `steps`
+    steps, over `scale` (rad/s). The default scale is the initial |omega|, or the omega that the
+    whole torque causes. The result is 0 if terms do not nearly cancel, or depend on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

@@ -23,7 +23,7 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return two trajectories, before time 0 in ascending order, and after it, as one.
+    """Return two trajectories as one: before time 0, in ascending order, and after it.
 
     The result has the sums of steps and evaluations, and the worse error, amplification and ending.
     """

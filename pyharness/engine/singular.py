@@ -1,4 +1,4 @@
-"""The search for the operation by which a recorded torque is undefined."""
+"""The search for the operation that makes a recorded torque undefined."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -35,11 +35,11 @@ class SingularError(TimedError):
 def undefined_operation(
     tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
 ) -> str | None:
-    """Return a text with the operation that is undefined at the end of an integration.
+    """Return which operation is undefined at the end of an integration, and what to write instead.
 
-    It also says what to write instead. `begin`, `before` and `end` are the inputs of the tape at
-    the beginning of the integration, at the beginning of the last step, and at the end. The result
-    is None if omega or a quotient becomes infinite.
+    `begin`, `before` and `end` are the inputs of the tape at the beginning of the integration, at
+    the beginning of the last step, and at the end. The result is None if omega or a quotient
+    becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

@@ -84,21 +84,21 @@ def solve(
         space, require it.
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        within the tolerance. It takes further integrations. With a fixed step it is a cubic on each
-        step.
+        to within the tolerance. This takes further integrations. With a fixed step, `sol` is a
+        cubic on each step.
     events : callable, Event, or list of these
         Functions of `(t, omega)` or `(t, omega, attitude)`, or events of `pyharness.events`, whose
         roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
         as in SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept
         arrays are called with arrays.
     sensitivities : iterable of str
-        Names of parameters by which `sensitivities` of the trajectory has the derivatives of omega
-        and of the quaternion: `omega0`; `moments`, `coefficients`, or `inertia` (columns I11, I22,
-        I33, I12, I13, I23); `attitude`, small initial rotations (rad) about the body axes;
-        `torque.NAME`, with NAME a constant of a scene file's expressions, a keyword argument of a
-        function with a number as its default, or `constant`, `rate`, `sines`, `cosines` of a
-        TorqueLaw (four columns per wave: three amplitudes, frequency). The method must be `auto`,
-        `taylor` or `closed-form`.
+        Names of parameters. `sensitivities` of the trajectory then has the derivatives of omega and
+        of the quaternion with respect to them. A name may be `omega0`, `moments`, `coefficients`,
+        or `inertia` (columns I11, I22, I33, I12, I13, I23). `attitude` means small initial
+        rotations (rad) about the body axes. In `torque.NAME`, NAME is a constant of a scene file's
+        expressions, or a function's keyword argument with a number as its default. For a TorqueLaw,
+        it is `constant`, `rate`, `sines` or `cosines` (four columns per wave: three amplitudes,
+        frequency). The method must be `auto`, `taylor` or `closed-form`.
 
     Returns
     -------
@@ -110,9 +110,10 @@ def solve(
     ------
     InputError
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
-        attitude, and `attitude` is false; if the times are not in order; if a changing moment
-        reaches 0; if the tolerance can't be met within `effort`; if dense output needs too many
-        polynomials; if an event has other arguments or results; if sensitivities can't be computed.
+        attitude, and `attitude` is false; if the times are not in order; or if a changing moment
+        reaches 0. Also if the tolerance can't be met within `effort`; if dense output needs too
+        many polynomials; if an event has other arguments or results; or if sensitivities can't be
+        computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -224,7 +225,7 @@ def finest(method: str, scene: Scene, time: float) -> float:
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method of the plan, or by its fallback."""
+    """Return the trajectory at `times` (s) by the method of the plan, or else by its fallback."""
     chosen = plan(scene, "auto", tolerance, rows=True)
     method = METHODS[chosen.method]
     more = more if method.gives_steps else ()

@@ -49,10 +49,10 @@ class Solver(LastCall, BoundKernel):
     """A solver of a scene, prepared for one method by `prepare`.
 
     Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, out=out)``: three numbers
-    (rad/s), and the final time (s), positive, negative or 0. A call returns omega at `t_end`
-    (rad/s) as a new array of shape (3,), or in the contiguous array `out` of three floats, which
-    may be `omega0`. Invalid arguments raise an InputError and leave `out` unchanged. Calls are
-    fastest with an array of floats.
+    (rad/s), and the final time (s), positive, negative or 0. A call returns omega (rad/s) at
+    `t_end` as a new array of shape (3,), or in `out`, a contiguous array of three floats, which may
+    be `omega0`. Invalid arguments raise an InputError and leave `out` unchanged. Calls are fastest
+    with an array of floats.
 
     If the kernel could not finish, or an argument is not finite, the result is NaN and `status` has
     the reason.
@@ -108,8 +108,8 @@ class Solver(LastCall, BoundKernel):
         ``solver.many(omega0, t_end, threads=1, out=None)`` takes `omega0` (rad/s) of shape (n, 3),
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in `out`
         unless None, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
-        others or on threads, but may differ by rounding from a single call. Invalid arguments raise
-        an InputError.
+        others or on `threads`, but may differ by rounding from a single call. Invalid arguments
+        raise an InputError.
         """
         from pyharness._many import ManyStarts
 
@@ -131,7 +131,6 @@ class Solver(LastCall, BoundKernel):
 
 
 def _check(omega0: object, t_end: object, out: object) -> tuple[Triple, float]:
-    """Return `omega0` (rad/s) and `t_end` (s) as floats, or raise InputError."""
     start, time = three_floats("omega0", omega0), number("t_end", t_end)
     if out is not None and (found := no_buffer(out)):
         raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")

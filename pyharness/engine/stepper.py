@@ -41,8 +41,8 @@ class Stepper:
         The body, its torque and its state at time 0. Moments or inertia must not change with time,
         and the torque must not be opaque.
     tolerance : float, optional
-        The largest error of a step: of a component of omega, relative to the largest |omega| so
-        far, and of the attitude's angle (rad). Default is 1e-9.
+        The largest error of a step, in a component of omega relative to the largest |omega| so far,
+        and in the attitude's angle (rad). Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, from the scene's or (1, 0, 0, 0). Torques that depend on
         the attitude, or are about the axes of space, require it.
@@ -56,11 +56,11 @@ class Stepper:
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
     held_torque : ndarray, shape (3,)
-        A torque about the body axes (N m; for a body given by coefficients an acceleration, 1/s2)
-        that is added to the scene's until it is set again, even if another scene is set; 0 at
-        first.
+        A torque about the body axes that is added to the scene's: in N m, or for a body given by
+        coefficients as an acceleration, 1/s2. It is 0 at first, and applies until it is set again,
+        even if another scene is set.
     scene : Scene
-        The scene. If another one is set, time, omega and attitude continue.
+        The scene. If another one is set, time, omega and attitude are kept.
     steps : int
         The number of steps so far.
 
@@ -301,7 +301,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the lengths (s) of the steps to `end`, by end (s), without steps to `bounds`."""
+    """Return the length (s) of each step to `end`, by its end (s), without steps to `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -311,7 +311,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return the trajectory, as ``singular`` with a reason if its torque becomes undefined."""
+    """Return the trajectory, marked ``singular`` with a reason if its torque becomes undefined."""
     if found.ended != "overflow" or not is_recorded(scene):
         return found
     try:

@@ -46,8 +46,8 @@ def is_recorded(scene: Scene) -> bool:
 def with_constant_body(scene: Scene) -> Scene:
     """Return a scene with the same solution whose inertia does not change with time.
 
-    It has A = B = C = 0, and as its torque omega', where I omega' = N - I' omega - omega x (I
-    omega) for the inertia I and the torque N.
+    It has A = B = C = 0, and omega' as its torque. With the inertia I and the torque N, omega'
+    follows from I omega' = N - I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:
@@ -72,7 +72,7 @@ def with_constant_body(scene: Scene) -> Scene:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return the right-hand side f(t, state) under a torque of the state, NaN where singular.
+    """Return the right-hand side f(t, state) under a torque of the state; NaN where singular.
 
     The state is omega (rad/s), with or without the quaternion.
     """

@@ -1,6 +1,6 @@
 """Torque terms given by tables over time, and pulses, with components about the body axes.
 
-Taylor series begin a step where a table changes, and are as accurate as for a smooth torque.
+A Taylor series begins a step where a table changes, and is as accurate as for a smooth torque.
 """
 
 import itertools
@@ -38,8 +38,8 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     values : iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) at each time.
     interpolation : str
-        ``held`` (until the next time), ``linear``, or ``cubic``: a spline whose first two pieces
-        are one polynomial, as are the last two.
+        ``held`` (constant until the next time), ``linear``, or ``cubic``: a spline whose first two
+        pieces are one polynomial, as are the last two.
 
     Returns
     -------
@@ -49,8 +49,8 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     Raises
     ------
     InputError
-        If times do not ascend, numbers of times and values differ, the interpolation is unknown, or
-        a number is not finite.
+        If the times do not ascend, the numbers of times and values differ, the interpolation is
+        unknown, or a number is not finite.
 
     References
     ----------
@@ -104,8 +104,8 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     Raises
     ------
     InputError
-        If pulses overlap, numbers of starts, durations and torques differ, a duration is not above
-        0, or a number is not finite.
+        If pulses overlap, the numbers of starts, durations and torques differ, a duration is not
+        above 0, or a number is not finite.
 
     References
     ----------
@@ -174,7 +174,6 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
 
 
 def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
-    """Return the torque of each of `count` pulses (N m)."""
     where = "[torque] pulses torque"
     allowed = "allowed: three numbers, or three numbers for each pulse"
     given = list(islice(number_list(where, torque, allowed), max(count, 3) + 1))
@@ -206,7 +205,7 @@ def _other_number(where: str, what: str, given: int, wanted: int) -> InputError:
 
 
 def _before(first: float, second: float) -> float:
-    """Return the time at which a constant piece as long as the first piece begins."""
+    """Return the start of a constant piece before `first` that is as long as the first piece."""
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 

@@ -37,16 +37,17 @@ _FIRST_PARTS = 1e-12, 1e-2  # limits of the first step, over the step that the t
 class Taylor(OdeSolver):  # type: ignore[misc]
     """Integrate an ordinary differential equation y' = fun(t, y) by its Taylor series.
 
-    It is a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0, method=Taylor)``.
-    `fun` is called twice, with symbols, and its arithmetic is recorded. Compiled code computes the
-    series, whose order, 8 to 28, depends on the tolerances. The dense output is the series.
+    Use it as a method of `scipy.integrate.solve_ivp`: ``solve_ivp(fun, t_span, y0,
+    method=Taylor)``. `fun` is called twice, with symbols that record its arithmetic. Compiled code
+    computes the series, whose order, 8 to 28, depends on the tolerances. The dense output is the
+    series.
 
     Parameters
     ----------
     fun : callable
-        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers by
-        arithmetic operators, integer powers, and NumPy's sqrt, sin, cos, tan, exp, sinh, cosh and
-        tanh, without branches on `t` or `y`; up to 20,000 operations.
+        The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers. It may
+        use up to 20,000 arithmetic operators, integer powers, and NumPy's sqrt, sin, cos, tan, exp,
+        sinh, cosh and tanh, but no branches on `t` or `y`.
     t0 : float
         The time of the initial state.
     y0 : array_like, shape (n,)

@@ -38,7 +38,7 @@ def damping(matrix: MatrixLike) -> StateTorque:
     Raises
     ------
     InputError
-        If `matrix` is of another form, or a number is not finite.
+        If `matrix` has another form, or a number is not finite.
 
     References
     ----------
@@ -58,9 +58,10 @@ def damping(matrix: MatrixLike) -> StateTorque:
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
     """Return a torque of drag that is an odd polynomial of omega.
 
-    It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega, or if `per_axis` of -C_n v_n,
-    where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no polynomial
-    and not smooth at 0; elsewhere, a torque function with ``numpy.sqrt`` can have it.
+    It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is that of
+    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no
+    polynomial, and is not smooth at 0. Away from 0, a Python function with ``numpy.sqrt`` can
+    describe it.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
     Raises
     ------
     InputError
-        If `coefficients` or one of them is of another form.
+        If `coefficients` or one of them has another form.
 
     References
     ----------
@@ -113,8 +114,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Alone, with a positive definite K, it leads from every near omega to the target, if the target
-    is 0 or about a principal axis.
+    Acting alone, with a positive definite K, it drives any nearby omega to the target, if that is 0
+    or along a principal axis.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTo
     Raises
     ------
     InputError
-        If an argument is of another form, or a number is not finite.
+        If an argument has another form, or a number is not finite.
 
     References
     ----------
@@ -158,10 +159,10 @@ def attitude_control(
 ) -> StateTorque:
     """Return the torque -2 k e0 e - K omega, which rotates the body to a target attitude.
 
-    The error quaternion (e0, e) is target* q, with the attitude q. A quaternion and its negative
-    have the same torque, so that the body does not unwind. For a number k the first term is -k
-    sin(angle) about the axis of the error, with the potential k (1 - cos(angle)); the equilibrium
-    at 180 degrees is unstable.
+    For the attitude q, the error quaternion (e0, e) is target* q, with the conjugate target*. A
+    quaternion and its negative have the same torque, so that the body does not unwind (rotate the
+    long way round). For a number k, the first term is -k sin(angle) about the axis of the error,
+    with the potential k (1 - cos(angle)); the equilibrium at 180 degrees is unstable.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def attitude_control(
     Raises
     ------
     InputError
-        If an argument is of another form, a number is not finite, or `target` is 0.
+        If an argument has another form, a number is not finite, or `target` is 0.
 
     References
     ----------
@@ -209,12 +210,13 @@ def attitude_control(
 
 
 def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> StateTorque:
-    """Return the torque -omega x h - u of wheels, which store the momentum h, on the body.
+    """Return the torque -omega x h - u on a body by its wheels, which store the momentum h.
 
-    The motors exert u on the wheels: h' = u. Without motors h is constant, and the body a gyrostat.
+    The motors exert u on the wheels: h' = u. Without motors, h is constant, and the body is a
+    gyrostat.
 
     Either h is the absolute momentum of the wheels about their axes, and the inertia of the body
-    excludes their moments about these axes; or h is relative to the body, and the inertia includes
+    excludes their moments about these axes. Or h is relative to the body, and the inertia includes
     these moments.
 
     Parameters
@@ -232,7 +234,7 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
     Raises
     ------
     InputError
-        If an argument is of another form, a number is not finite, or `motor` is about the axes of
+        If an argument has another form, a number is not finite, or `motor` is about the axes of
         space.
 
     References

@@ -49,7 +49,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
     All numbers, and the results of its methods, are bit-for-bit the same. A torque that scene files
-    can't describe becomes a recorded one.
+    can't describe becomes a recorded torque.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Raises
     ------
     InputError
-        If the file can't be read, is not by `Trajectory.save` or has another version, was changed
-        or damaged, or is larger than a quarter of this machine's memory.
+        If the file can't be read, was not written by `Trajectory.save`, has another version, was
+        changed or damaged, or is larger than a quarter of this machine's memory.
 
     Examples
     --------

@@ -28,8 +28,8 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return user values as a float array of rows, or raise InputError; a single row is allowed.
 
-    `shape` is the shape of a row; a letter, as "k", is any length. `rule` tests each number, and
-    has a phrase for the allowed ones.
+    `shape` is the shape of a row, in which a letter, such as "k", stands for any length. `rule`
+    tests each number, and has a phrase for the allowed ones.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -114,7 +114,7 @@ def threads_of(threads: object) -> int:
 def buffer_of(where: str, array: Any, shape: tuple[int, ...], kind: str) -> Any:
     """Return the user's output array if a kernel can write to it, or raise InputError.
 
-    It must have `shape` and the type character `kind`, as "d", and be writable, contiguous and
+    It must have `shape` and the type character `kind`, such as "d", and be writable, contiguous and
     aligned.
     """
     right = isinstance(array, np.ndarray) and array.shape == shape and array.dtype.char == kind

@@ -1,6 +1,6 @@
 """Attitudes as unit quaternions from body to space, scalar first, with Hamilton's product.
 
-A vector v about the body axes has the components q v q* about those of space, with the conjugate
+A vector v about the body axes has the components q v q* along the axes of space, with the conjugate
 q*. The kinematic equation is q' = q (0, omega)/2. Each InputError begins with `where`.
 """
 
@@ -61,7 +61,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
     """Return the attitude after rotations by three angles (degrees) about body axes.
 
-    Raise InputError for a `sequence` not in `SEQUENCES`, as "3-1-3", or other than finite angles.
+    Raise InputError unless `sequence` is in `SEQUENCES`, as "3-1-3", and the angles are finite.
     """
     if not isinstance(sequence, str) or sequence not in SEQUENCES:
         name = sequence if isinstance(sequence, str) else kind_of(sequence)
@@ -101,7 +101,7 @@ def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
     Where the first and last axes are parallel, only the sum or difference of their angles is
-    determined, and the last angle is 0. Arc tangents of half angles are accurate even near there.
+    determined; the last angle is then 0. Arc tangents of half angles are accurate even nearby.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":

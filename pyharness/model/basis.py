@@ -1,4 +1,4 @@
-"""Basis of a limit: proved, derived or measured, and the source."""
+"""The basis of a limit: proved, derived or measured, with its source."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,8 @@ MARKS = {
 class Basis:
     """The reason why a limit has its value, defined once, beside the limit.
 
-    `mark` is a key of `MARKS`, the weakest of the parts. `limit` states the limit, and `source` the
-    theorem, derivation or command, in Markdown.
+    `mark` is a key of `MARKS`, the weakest if parts differ. `limit` states the limit, and `source`
+    the theorem, derivation or command, in Markdown.
     """
 
     mark: str

@@ -16,8 +16,8 @@ _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 class BatchResult:
     """The angular velocities of n bodies, and how the computation of each body ended.
 
-    `omega` (rad/s), shape (n, ..., 3), is NaN without result. `status`, shape (n,), has integers of
-    `pyharness.model.codes.Statuses`.
+    `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,), has
+    integers of `pyharness.model.codes.Statuses`.
     """
 
     omega: Array
@@ -27,7 +27,7 @@ class BatchResult:
 
     @property
     def ended(self) -> NDArray[np.str_]:
-        """The statuses as text, as "complete", shape (n,)."""
+        """The statuses as text, such as "complete", shape (n,)."""
         return np.array(ENDS)[self.status]
 
     @property

@@ -76,8 +76,8 @@ def build() -> Build:
 class Installation:
     """The installation and the machine, for a bug report; None if unknown or missing.
 
-    `arithmetic` states which option or library changes the kernels' arithmetic, else ``as
-    written``. `environment` has the set variables of `INFLUENCES`.
+    `arithmetic` says which option or library changes the kernels' arithmetic; if none does, ``as
+    written``. `environment` has the variables of `INFLUENCES` that are set.
     """
 
     folder: str
@@ -110,7 +110,6 @@ def _cores() -> int:
 
 
 def _installer() -> str:
-    """Return the installer, such as ``pip, editable``."""
     import json
     from importlib.metadata import PackageNotFoundError, distribution
 
@@ -124,7 +123,7 @@ def _installer() -> str:
 
 
 def _instructions() -> str | None:
-    """Return the best instruction set that both build and processor have."""
+    """Return the best instruction set that both the build and the processor support."""
     try:
         from pyharness._kernels import choose_instructions
     except ImportError:

@@ -64,7 +64,7 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s), or infinities, around 0 between which the matrix is positive definite."""
+        """The times (s) around 0 between which the matrix is positive definite, or infinities."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -92,9 +92,9 @@ class ChangingMoments(Changing):
     """Principal moments of inertia that are polynomials of time.
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
-    in it. Mass that moves within the body has no angular momentum relative to its axes, and mass
-    that leaves none about the centre of mass. With the moments I and the torque N, I omega' = N -
-    I' omega - omega x (I omega).
+    in the body. Two assumptions apply: mass that moves within the body has no angular momentum
+    relative to the body axes, and mass that leaves has none about the centre of mass. With the
+    moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ def points(count: int) -> Array:
 
 
 def to_coefficients(count: int) -> Array:
-    """Return the matrix from values at the `points` to Chebyshev coefficients."""
+    """Return the matrix that converts values at the `points` to Chebyshev coefficients."""
     # Angles up to pi have the smallest rounding errors.
     turns = np.outer(np.arange(count), np.arange(count)[::-1]) % (2 * count - 2)
     angles = np.pi * np.minimum(turns, 2 * count - 2 - turns) / (count - 1)
@@ -28,7 +28,7 @@ def to_coefficients(count: int) -> Array:
 
 
 def nodes(low: Array, high: Array, at: Array) -> Array:
-    """Return the points `at`, from -1 to 1, moved to intervals; one row per interval."""
+    """Return the points `at`, from -1 to 1, mapped to each interval; one row per interval."""
     middle, half = 0.5 * low + 0.5 * high, 0.5 * high - 0.5 * low
     found: Array = middle[:, None] + half[:, None] * at
     found[:, 0], found[:, -1] = low, high

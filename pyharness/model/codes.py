@@ -36,7 +36,7 @@ class Methods:
 
 
 class Places:
-    """Indices, from 0, into the array of a prepared solver's kernel."""
+    """Indices, from 0, of the array that a prepared solver's kernel reads."""
 
     METHOD = 0
     TOLERANCE = 1  # relative; for methods that have a tolerance
@@ -66,7 +66,7 @@ class Series:
 
 
 class Waves:
-    """The limit, as a power of 2, of angles (rad) of our binary128 sine."""
+    """The limit of angles (rad) of our sine in binary128, as a power of 2."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 

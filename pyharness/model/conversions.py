@@ -53,9 +53,9 @@ class Conversions(SciPyNames):
         Returns
         -------
         pandas.DataFrame
-            With `time` (s) as its index, and columns `omega1` to `omega3` (rad/s), `velocity1` to
-            `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s, if it differs from `time`) and
-            `ier`, as far as present. ``attrs["units"]`` has the units.
+            Its index is `time` (s). Its columns, if present, are `omega1` to `omega3` (rad/s),
+            `velocity1` to `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s, if it differs from
+            `time`) and `ier`. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -88,9 +88,9 @@ class Conversions(SciPyNames):
         Returns
         -------
         xarray.Dataset
-            The variables `omega` and `velocity` with the dimensions `time` and `axis`, `attitude`
-            with `time` and `component`, `recorded_time` (if it differs from `time`) and `ier`, as
-            far as present, with `units` and `long_name`. Attributes say how the integration ended.
+            Its variables, if present, are `omega` and `velocity` (dimensions `time` and `axis`),
+            `attitude` (`time` and `component`), `recorded_time` (if it differs from `time`) and
+            `ier`. Each has `units` and `long_name`. Attributes say how the integration ended.
 
         Raises
         ------
@@ -180,15 +180,15 @@ class Conversions(SciPyNames):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        The restored numbers are bit-for-bit the same. The file is written completely or not at
-        all, in the format of `numpy.savez`: an array for each attribute, `scene` with the text of a
-        scene file, and `header` with other attributes and the operations of a recorded torque in
-        JSON.
+        The restored numbers are bit-for-bit the same. The file is written completely or not at all.
+        Its format is that of `numpy.savez`, with an array for each attribute. The array `scene` is
+        the text of a scene file; `header` has other attributes and the operations of a recorded
+        torque in JSON.
 
         Parameters
         ----------
         path : str or path
-            The path of the file, usually with the suffix ``.npz``. A file that exists is replaced.
+            The path of the file, usually with the suffix ``.npz``. An existing file is replaced.
 
         Raises
         ------

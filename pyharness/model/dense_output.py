@@ -70,8 +70,8 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        Functions that return omega (rad/s), with the attitude if requested, and their derivatives
-        in rows.
+        Functions that return the states (omega, rad/s, and the attitude if requested) and their
+        derivatives, in rows.
 
     Examples
     --------
@@ -116,8 +116,8 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times as for the state. Where a table of the torque changes, the derivative is that just
-            after.
+            Times as for the state. Where a table of the torque changes, the derivative just after
+            the change is returned.
 
         Returns
         -------

@@ -1,8 +1,9 @@
 """Diagonalisation of symmetric 3 x 3 matrices in integers, with high relative accuracy.
 
-In binary64 a small eigenvalue would have few digits. The elements are integer multiples of a power
-of 2. The absolute determinant of a regular matrix is hence at least the cube of this unit, and its
-smallest absolute eigenvalue has a lower bound, which determines the number of bits.
+In binary64 a small eigenvalue would have few correct digits. The elements are integer multiples of
+a power of 2, the unit. The absolute determinant of a regular matrix is hence at least the cube of
+the unit. This bounds its smallest absolute eigenvalue from below, and so determines the number of
+bits.
 """
 
 import math

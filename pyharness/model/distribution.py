@@ -1,4 +1,4 @@
-"""Name and version of the distribution, which is not called `pyharness`."""
+"""The name and version of the distribution, which is not called `pyharness`."""
 
 from pyharness.model.errors import InputError
 
@@ -14,7 +14,7 @@ def version() -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the pip command for a group of optional packages, as ``plots``."""
+    """Return the pip command for a group of optional packages, such as ``plots``."""
     return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 

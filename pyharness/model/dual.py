@@ -5,13 +5,13 @@ from typing import Any
 
 
 class Dual:
-    """A value of any arithmetic, with its derivatives by some unknowns."""
+    """A value in any arithmetic, with its derivatives with respect to some unknowns."""
 
     def __init__(self, value: Any, slopes: Sequence[Any]) -> None:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, from its value and its derivative by this number."""
+        """Return a function of this number, from its value and its derivative (chain rule)."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
@@ -57,5 +57,5 @@ class Dual:
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return a number as a dual number with `count` derivatives of 0."""
+    """Return a number as a dual number; a plain one has `count` derivatives of 0."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)

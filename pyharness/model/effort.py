@@ -33,7 +33,7 @@ class Integrator(Protocol):
     def __call__(
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
-        """Return the trajectory at `times` (s), of one sign and away from 0."""
+        """Return the trajectory at `times` (s) on one side of 0, in order away from 0."""
 
 
 def checked_effort(effort: Number) -> float:
@@ -51,7 +51,7 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return as text a factor on the work limit with which a computation should complete.
+    """Return, as text, a factor on the work limit with which a computation should complete.
 
     It is twice `needed`, or ten times the insufficient `effort`.
     """

@@ -26,7 +26,6 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str) -> None:
-        """Store the message as one printable line."""
         line = printable(" ".join(message.split()))
         if len(line) > _LONGEST:
             line = f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}"
@@ -76,7 +75,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value in words, as "a list", alike for TOML, Python and NumPy."""
+    """Return the type of a value in words, such as "a list", alike for TOML, Python and NumPy."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -97,9 +96,9 @@ def kind_of(value: object) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not `allowed`, with a similar name that is.
+    """Return the InputError for a name that is not `allowed`; it suggests a similar allowed name.
 
-    `what` is the kind of name, as "case"; `where` begins the message, as "--fix".
+    `what` is the kind of name, such as "case"; `where`, such as "--fix", begins the message.
     """
     import difflib
 

@@ -30,7 +30,7 @@ def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the zeros (s) next to time 0, where the polynomial is positive, or infinities."""
+    """Return the zeros (s) next to time 0, or infinities, of a polynomial that is positive at 0."""
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)
@@ -39,8 +39,8 @@ def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
 def _first_zero(polynomial: Sequence[Fraction]) -> float:
     """Return the first zero (s) of a polynomial after time 0, or infinity.
 
-    It is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki 2012,
-    Computer Aided Geometric Design 29); other intervals are halved.
+    The polynomial is above 0 in an interval if its coefficients in Bernstein's basis are (Farouki
+    2012, Computer Aided Geometric Design 29); other intervals are halved.
     """
     if min(polynomial) >= 0:
         return math.inf
@@ -90,7 +90,7 @@ def _bernstein(polynomial: Sequence[int]) -> list[int]:
 
 
 def _halves(row: list[int]) -> tuple[list[int], list[int]]:
-    """Return the coefficients in both halves, times 2**degree (de Casteljau)."""
+    """Return the coefficients in both halves of an interval, times 2**degree (de Casteljau)."""
     degree = len(row) - 1
     early, late = [row[0] << degree], [row[-1] << degree]
     for n in range(degree - 1, -1, -1):

@@ -44,8 +44,8 @@ def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, and `constants`. Values
-    are in N m, or in 1/s2 for a body with coefficients. Raise InputError, with the place, for an
-    invalid expression.
+    are in N m, or in 1/s2 for a body with coefficients. Raise InputError, which names the place,
+    for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)

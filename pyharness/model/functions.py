@@ -1,6 +1,7 @@
-"""Elementary functions of floats, by the C library, and of other floating-point numbers.
+"""Elementary functions of floats and of other floating-point numbers.
 
-The others are of a class in `pyharness.thesis.word`, whose methods round correctly.
+Those of floats are from the C library. Other numbers are of a class in `pyharness.thesis.word`,
+whose methods round correctly.
 """
 
 import math

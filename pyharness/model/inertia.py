@@ -22,7 +22,7 @@ _KEPT = 256  # number of cached principal frames
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments (kg m2) and axes of one body, rounded and to at least 30 digits.
+    """The principal moments (kg m2) and axes of one body, rounded, and to at least 30 digits.
 
     Each axis, a column of `axes`, is near the body's own axis of the same number; they form a
     right-handed frame. `moments_low` is the exact minus the rounded moments.

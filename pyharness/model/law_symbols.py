@@ -1,4 +1,4 @@
-"""Torque laws, or fields of the same form, in symbols."""
+"""Torque laws, or fields of the same form, evaluated with symbols."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def law_value(law: TorqueLaw, time: Any) -> Array:
-    """Return three components of a law at a time, about the law's axes."""
+    """Return the three components of a law at a time, about the law's axes."""
     found: list[Any] = [c + r * time for c, r in zip(law.constant, law.rate, strict=True)]
     waves = [(amplitude, np.sin(frequency * time)) for amplitude, frequency in law.sines]
     waves += [(amplitude, np.cos(frequency * time)) for amplitude, frequency in law.cosines]
@@ -19,7 +19,7 @@ def law_value(law: TorqueLaw, time: Any) -> Array:
 
 
 def law_integral(law: TorqueLaw, time: Any) -> Array:
-    """Return three components of the integral of a law from time 0."""
+    """Return the three components of the integral of a law from time 0."""
     square = time * time
     found: list[Any] = [
         c * time + 0.5 * r * square for c, r in zip(law.constant, law.rate, strict=True)
@@ -45,7 +45,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 
 
 def to_body(vector: Any, attitude: Any) -> Array:
-    """Return a vector about the axes of space in components about the body axes.
+    """Return the components about the body axes of a vector about the axes of space.
 
     The matrix is written out, so that terms of one torque share its products.
     """

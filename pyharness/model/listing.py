@@ -83,7 +83,7 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind: `corrected` if nothing is active, `original` for `switches`, else `custom`."""
+        """The kind: `corrected` (none active), `original` (`switches` active), or `custom`."""
         if not self.active:
             return "corrected"
         return (
@@ -116,13 +116,13 @@ class Listing:
 
 
 def flagged() -> list[dict[str, Any]]:
-    """Return the switchable entries of `data/apparatus.toml`; "flag" is the bit of each."""
+    """Return the entries of `data/apparatus.toml` that have a switch; "flag" is the bit of each."""
     return [entry for entry in facts("apparatus")["entry"] if "flag" in entry]
 
 
 @cache
 def names_of(kind: str, program: str | None = None) -> tuple[str, ...]:
-    """Return the names of a kind, as "defect", in one program or all."""
+    """Return the names of a kind, such as "defect", in one program or in all."""
     return tuple(
         entry["id"]
         for entry in flagged()

@@ -48,7 +48,7 @@ class Mechanics:
         return Rotation.from_quat(self._attitudes()[:, [1, 2, 3, 0]])
 
     def angular_momentum(self, frame: str = "body") -> Array:
-        """Return the angular momentum in each row, about the axes of the body or of space.
+        """Return the angular momentum in each row.
 
         Parameters
         ----------
@@ -63,7 +63,8 @@ class Mechanics:
         Raises
         ------
         InputError
-            If the body has no moments, the frame is unknown, or "space" comes without attitude.
+            If the body has no moments, the frame is unknown, or "space" is requested without an
+            attitude.
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
@@ -130,10 +131,10 @@ class Mechanics:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        It is the change of the kinetic energy, without the motors of the ready term `wheels`. The
-        formula (omega - omega0) . I (omega + omega0) / 2, unlike a difference of energies, loses no
-        digits where omega has changed little; the error is that of omega times the angular
-        momentum.
+        It is the change of the kinetic energy, without the work of the motors of the ready term
+        `wheels` on the wheels. The formula is (omega - omega0) . I (omega + omega0) / 2. Unlike a
+        difference of energies, it loses no digits where omega has changed little. Its error is that
+        of omega times the angular momentum.
 
         Returns
         -------

@@ -49,7 +49,7 @@ def check_writable(path: str, option: str) -> None:
 def write_files(contents: dict[str, bytes], option: str) -> None:
     """Write several files, all or none; raise InputError, which names `option`, on failure.
 
-    Files have temporary names and are then renamed; after any failure or Ctrl-C the previous files
+    Files have temporary names and are then renamed. After a failure or Ctrl-C, the previous files
     are restored. Devices and pipes are written first, and never replaced.
     """
     path = ""

@@ -25,7 +25,7 @@ def share(
 ) -> None:
     """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
 
-    After an exception, as by Ctrl-C, the integer `given_up` is 1; kernels read it and return.
+    After an exception, as by Ctrl-C, `given_up[0]` is 1; kernels poll it and return.
     """
     if threads == 1 or len(pieces) < 2:
         # Only the main thread receives signals; this is usually the calling one.
@@ -47,7 +47,7 @@ def share(
 
 
 def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Call `work` for pieces of nearly the same size, with the integer of `share`, in threads."""
+    """Call `work` in threads for pieces of nearly equal size, with `given_up` of `share`."""
     if not n:
         return
     given_up = np.zeros(1, dtype=np.int32)

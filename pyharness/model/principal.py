@@ -18,7 +18,7 @@ from pyharness.model.waves import exact_law
 class PrincipalScene(Scene):
     """A scene about the principal axes, with moments in double-double precision.
 
-    In double precision, rounding errors would be a large part of A, B, C of nearly equal moments.
+    In double precision, A, B, C of nearly equal moments would have large relative rounding errors.
     `moments_low` is the exact moments minus `moments` (kg m2).
     """
 
@@ -55,13 +55,13 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         The same problem with `moments`, and with the attitude of the principal axes. A torque about
         the axes of space is unchanged, and the result then has an attitude.
     axes : ndarray, shape (3, 3)
-        The principal axes in columns, about the body's own: a right-handed frame, in which each
-        axis is near the body's own axis of the same number.
+        The principal axes, in columns of components about the body's own axes. They form a
+        right-handed frame; each is near the body's own axis of the same number.
 
     Raises
     ------
     InputError
-        If the sum of amplitudes of one frequency is beyond the range of binary64.
+        If the amplitudes of one frequency have a sum beyond the range of binary64.
 
     Examples
     --------

@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide the user's function that reports progress, or a bar for True."""
+    """Provide a function that reports progress: the user's, or for True one with a bar."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

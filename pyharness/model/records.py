@@ -15,7 +15,7 @@ from pyharness.model.trajectory import Trajectory
 def scene_record(scene: Scene) -> dict[str, Any]:
     """Return a scene for JSON, with the keys of a scene file and "case".
 
-    Of a function, "torque" has the number of operations, or "opaque".
+    For a function, "torque" has the number of recorded operations, or "opaque".
     """
     body, values = body_of(scene)
     return {

@@ -1,6 +1,7 @@
-"""Reports: the results of a verb as data, which `pyharness.views` renders.
+"""Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-Types are named tuples, because each start creates them, and a dataclass takes five times as long.
+The types are named tuples, because each start of the program creates them, and dataclasses would
+take five times as long.
 """
 
 import math
@@ -30,7 +31,7 @@ def plain(value: Any) -> str:
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number as text with two digits, as 1.2e-3; None is a dash."""
+    """Return a number as text with two digits, such as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:
@@ -45,7 +46,7 @@ def digits(form: str, scale: float = 1.0) -> Callable[[float | None], str]:
 
 
 def counted(number: int, what: str) -> str:
-    """Return a number with a noun, as in 1 step, 2 steps."""
+    """Return a number with its noun, such as 1 step, 2 steps."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
@@ -67,7 +68,7 @@ def format_count(number: int) -> str:
 
 
 def format_bytes(number: float) -> str:
-    """Return a number of bytes as text, as in 1.25 MB."""
+    """Return a number of bytes as text, such as 1.25 MB."""
     for unit in ("bytes", "kB", "MB", "GB", "TB"):
         if number < 1000.0:
             return f"{number:.3g} {unit}"
@@ -138,7 +139,6 @@ class Picture:
     """A matplotlib figure, the table of its numbers, and the paragraphs of its title."""
 
     def __init__(self, figure: "Figure", numbers: Table, title: Sequence[str] = ()) -> None:
-        """Store figure, numbers and title."""
         self.figure, self.numbers, self.title = figure, numbers, title
 
 

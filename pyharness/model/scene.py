@@ -318,7 +318,7 @@ class Scene:
 
 
 def most_steps() -> int:
-    """Return how many steps fit in half of the memory, and in the programs' 32-bit counters."""
+    """Return how many steps fit in half of the memory and in the programs' 32-bit counters."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 

@@ -24,7 +24,7 @@ The number is increased if an old version would misread a new file, or a new ver
 def check_schema(where: str, kind: str, found: object, remedy: str) -> None:
     """Raise InputError unless `found` is the schema number of a `kind` that this version reads.
 
-    The message has `where`, as "scene file 'a.toml'", before, and `remedy` after the problem.
+    The message begins with `where`, such as "scene file 'a.toml'", and ends with `remedy`.
     """
     known = SCHEMAS[kind]
     if type(found) is int and found == known:

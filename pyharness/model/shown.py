@@ -11,7 +11,7 @@ _LONGEST = 60  # most characters of one value
 
 
 def short_repr(result: Any) -> str:
-    """Return a result as at most ten lines; arrays by type and shape."""
+    """Return a result as at most ten lines, with arrays by type and shape."""
     shown = [
         f"{each.name}={_short(value)}"
         for each in fields(result)

@@ -26,8 +26,8 @@ _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    The unit is N m for a body with moments or inertia, 1/s2 for coefficients. Scenes create it from
-    the function that is their torque.
+    The unit is N m for a body with moments or inertia, 1/s2 for one with coefficients. A scene
+    creates it if its torque is a function.
 
     Attributes
     ----------
@@ -38,19 +38,19 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        The three recorded expressions of a scene file, and pairs of name and value of their
-        constants.
+        The three expressions of a scene file that were recorded, and pairs of name and value of
+        their constants.
     terms : tuple
-        The other summands in a scene file: at most one `TorqueLaw`, and ready terms as pairs of
-        keys and values, first the kind.
+        The other summands in a scene file: at most one `TorqueLaw`, and ready terms, as pairs of
+        keys and values that begin with the kind.
     parameters : tuple of pairs
         Names and values of the recorded function's keyword arguments with numbers as defaults.
     varied : Tape or None
-        The function with these parameters as further inputs.
+        The recorded function with these parameters as further inputs.
     parts : tuple
         The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
-        False, True and False, as of a `TorqueLaw`.
+        False, True and False; attributes in common with `TorqueLaw`.
     """
 
     tape: Tape | None
@@ -96,7 +96,7 @@ class StateTorque:
         return first, second, third
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
-        """Return the sum with a torque, law, function, or 0 (for ``sum``), none opaque."""
+        """Return the sum with a torque, law, function, or 0 (for ``sum``); none may be opaque."""
         if type(other) is int and other == 0:
             return self
         if isinstance(other, (StateTorque, TorqueLaw)):
@@ -110,7 +110,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque about `axes`, columns of a (3, 3) array, and with their attitude.
+        """Return the torque for omega, attitude and components about `axes`, columns of a matrix.
 
         Raise InputError for an opaque torque.
         """
@@ -135,7 +135,7 @@ def replayed(function: Function) -> StateTorque:
 
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
-    """Return a function as a tape; keyword arguments `names` are further inputs."""
+    """Return a function as a tape; the keyword arguments `names` become further inputs."""
     return _recorded_with(Recorder(n_inputs=N_INPUTS + len(names)), function, names)
 
 
@@ -171,7 +171,7 @@ def recorded(function: Function) -> StateTorque:
     ------
     InputError
         If the function can't be recorded, does not return three numbers, or gives different records
-        in two calls, as with memory or random numbers.
+        in two calls, as with memory or with random numbers.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def recorded(function: Function) -> StateTorque:
 def opaque(function: Any) -> StateTorque:
     """Return a torque that is evaluated by calling a Python function.
 
-    Only SciPy's methods solve it.
+    Only SciPy's methods support it.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque with its function's numeric keywords, as far as recordable, as parameters."""
+    """Return a torque with the recordable numeric keywords of its function as parameters."""
     pairs = {
         each.name: converted(each.default)
         for each in signature(function).parameters.values()
@@ -312,7 +312,7 @@ def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | Torq
 
 
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
-    """Return a sum in the order of a scene file, so that its text gives the same tape."""
+    """Return a sum in the order of a scene file, whose text then gives the same tape."""
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
     tapes = [each.tape for each in torques if each.tape is not None]

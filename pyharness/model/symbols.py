@@ -1,7 +1,7 @@
-"""Symbols, with which a function is called once so that its arithmetic is recorded on a tape.
+"""Symbols: arguments with which a function is called so that its arithmetic is recorded on a tape.
 
 A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
-change its coefficients. Any other operation has one slot, however often it is repeated.
+change its coefficients. Any other operation has a slot for its result, only one even if repeated.
 """
 
 import math
@@ -131,7 +131,7 @@ class Symbol:
         return self.recorder.slot(Operation("linear", (), self.linear())), 1.0
 
     def _other(self, value: Any) -> "Symbol | None":
-        """Return the other operand as a symbol, or None if it is no number."""
+        """Return the other operand as a symbol; None if it is no number."""
         if isinstance(value, Symbol):
             if value.recorder is not self.recorder:
                 raise self.recorder.impure()

@@ -1,7 +1,7 @@
 """The tape: a function of time, omega and attitude, recorded as a list of arithmetic operations.
 
-It is recorded with symbols (`pyharness.model.symbols`), and evaluated in every arithmetic: floats,
-decimal numbers, Taylor series, or symbols again.
+It is recorded with symbols (`pyharness.model.symbols`), and evaluated in any arithmetic: floats,
+decimal numbers, Taylor series, or symbols again. A slot is the place of an input or of a result.
 """
 
 import math
@@ -33,8 +33,8 @@ class Linear(NamedTuple):
 class Table(NamedTuple):
     """A function of time that consists of cubic polynomials.
 
-    Piece k is c0 + c1 s + c2 s^2 + c3 s^3, with s the time (s) minus breaks[k], and holds from this
-    break to the next; the first piece also before, the last without end.
+    Piece k is c0 + c1 s + c2 s^2 + c3 s^3, where s is the time (s) minus breaks[k]. It applies from
+    this break to the next; the first piece also before, the last without end.
     """
 
     breaks: tuple[float, ...]
@@ -166,7 +166,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
     A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another large
-    number, unless the outputs depend on it.
+    number, unless the outputs depend on which.
     """
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):

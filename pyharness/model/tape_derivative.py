@@ -1,4 +1,4 @@
-"""Tapes with the derivatives of a tape by inputs or parameters."""
+"""Tapes that compute the derivatives of a tape with respect to inputs or parameters."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     """Return a tape of the derivatives of each output by m parameters, then of the outputs.
 
-    The parameters, with these `values`, are the last inputs of `tape`; the result lacks them.
+    The parameters are the last inputs of `tape`; the result has these `values` in their place.
     """
     count = len(values)
     instead = "fewer parameters"

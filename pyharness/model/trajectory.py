@@ -71,13 +71,13 @@ class Trajectory(Mechanics, Conversions):
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        Numbers of steps (rows, for SciPy's methods and the reference) and right-hand sides.
+        Numbers of steps (for SciPy's methods and the reference, of rows) and right-hand sides.
     ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
-        How the integration ended. With all rows: "complete"; "sensitive" if the amplified rounding
-        error exceeds the tolerance; "unchecked" if SciPy may have passed a short change of a
-        recorded torque, because the series that bounds its steps does not reach the end. Early:
-        "stopped" by the Lipschitz test, "overflow", "singular" for an undefined torque, or a
-        terminal "event".
+        How the integration ended. Endings with all rows are "complete"; "sensitive" if the
+        amplified rounding error exceeds the tolerance; and "unchecked" if the series that bounds
+        SciPy's steps does not reach the end. SciPy may then have stepped over a short change of a
+        recorded torque. Early endings are "stopped" by the Lipschitz test, "overflow", "singular"
+        for an undefined torque, and a terminal "event".
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
@@ -88,7 +88,7 @@ class Trajectory(Mechanics, Conversions):
         The error amplification: the largest norm of the state-transition matrices of omega to the
         end.
     reason : str or None
-        The time and the operation at which a recorded torque is not defined.
+        The time and the operation at which a recorded torque is undefined.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
@@ -109,8 +109,8 @@ class Trajectory(Mechanics, Conversions):
     y_events : list of ndarray, or None
         Omega (rad/s), with the attitude if requested, at these times: shape (k, 3) or (k, 7).
     sensitivities : dict of ndarray, or None
-        By parameter the derivatives of omega (rad/s), with the quaternion if requested: shape (n,
-        3, m) or (n, 7, m) for m values.
+        By name of a parameter, the derivatives of omega (rad/s), with the quaternion if requested:
+        shape (n, 3, m) or (n, 7, m) for m values.
 
     Examples
     --------

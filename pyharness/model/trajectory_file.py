@@ -1,7 +1,7 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
 They are archives of `numpy.savez`. The array `header` is JSON with other attributes and the schema
-number, `scene` the text of a scene file, and `sha256` a digest of all other arrays.
+number, `scene` is the text of a scene file, and `sha256` is a digest of all other arrays.
 """
 
 import hashlib
@@ -144,7 +144,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return data for JSON that no scene file has, and the text of the scene file."""
+    """Return the data that no scene file has, for JSON, and the text of the scene file."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

@@ -35,7 +35,7 @@ def number(where: str, value: object) -> float:
 
 
 def converted(value: object) -> float | str:
-    """Return a real number as a float; for anything else, or beyond binary64, a phrase."""
+    """Return a real number as a float; for anything else, or beyond binary64, its description."""
     if type(value) is float:
         return value
     if is_no_number(value):
@@ -51,7 +51,7 @@ def converted(value: object) -> float | str:
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, boolean, array or the like, which float() may accept."""
+    """Return whether a value is text, boolean, an array or the like, which float() might accept."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])

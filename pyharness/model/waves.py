@@ -1,7 +1,7 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver divides amplitudes by a moment and rounds: for two opposite amplitudes with a relative
-difference of 1e-10, only six digits of the sum would be correct. After an exact sum, all are.
+A solver divides amplitudes by a moment and rounds. The sum of two opposite amplitudes with a
+relative difference of 1e-10 would then have only six correct digits; after an exact sum, all are.
 Merged laws have at most one sine and one cosine per frequency, none of frequency 0.
 """
 
@@ -77,7 +77,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a torque law merged, in exact fractions."""
+    """Return a merged torque law in exact fractions."""
     constant = _exact(law.constant)
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
@@ -137,7 +137,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
     """Return the constants, sines and cosines of m torque laws, merged in each finite law.
 
     Shapes are (m, 3), (m, k, 4) and (m, l, 4), or one row for all; a wave is three amplitudes and a
-    frequency (rad/s). Laws with fewer waves are filled up with zeros.
+    frequency (rad/s). Laws with fewer waves than others are padded with zeros.
     """
     concerned = _mergeable_rows(sines, cosines)
     if not concerned.any():

@@ -84,8 +84,8 @@ def solve(
         space, require it.
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        to within the tolerance. This takes further integrations. With a fixed step, `sol` is a
-        cubic on each step.
+        to within the tolerance. Under a recorded torque `sol` has the steps of the integration;
+        else further integrations are needed. With a fixed step it is a cubic on each step.
     events : callable, Event, or list of these
         Functions of `(t, omega)` or `(t, omega, attitude)`, or events of `pyharness.events`, whose
         roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are

@@ -29,10 +29,10 @@ NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
-For users who look for an example: each has one question, a short program that uses public functions
-only, a picture, and the answer in numbers. The programs run as they are; in a script,
-`figure.savefig("picture.png")` writes the figure. `python -m docs.gallery.build` writes outputs,
-pictures, and notebooks to `build/notebooks`; the web pages have the notebooks too.
+Each example has a question, a short program that uses public functions only, a picture, and the
+answer in numbers. The programs run as they are; in a script, `figure.savefig("picture.png")` writes
+the figure. `python -m docs.gallery.build` writes outputs, pictures, and notebooks to
+`build/notebooks`; the web pages have the notebooks too.
 """
 
 

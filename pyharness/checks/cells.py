@@ -1,6 +1,6 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-A cell is a combination of a program, a case of Table 1, defects and readings.
+A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings.
 """
 
 from collections.abc import Iterator
@@ -43,7 +43,7 @@ def of_cell(suite: str, listing: Listing, case: int) -> Name:
 
 
 def random_programs(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks in scenes drawn at random, with random listings and stop tests."""
+    """Yield a deferred check for each draw of a random scene, listing and stop test."""
     for number in range(chosen.draws):
         yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
@@ -60,7 +60,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
     """Return the check that Fortran and twin agree or, if `is_listed`, that they still differ.
 
-    `options` are the stop constant (1/s) and whether the stop test may end the run.
+    `options` are the stop test's constant (1/s) and whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))

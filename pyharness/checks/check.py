@@ -1,4 +1,4 @@
-"""Checks: names, results, and the selection of those to compute."""
+"""Names and results of checks, and the selection of the checks to run."""
 
 import math
 import traceback
@@ -23,16 +23,16 @@ BITS = Basis(
     "IEEE 754 determines the result of each operation; assumes that both sides perform the same "
     "operations in the same order (`checks/check.py`)",
 )
-"""Basis of the limit 0 of differences between results that must agree bit for bit."""
+"""Basis of the limit 0 for differences between results that must agree bit for bit."""
 
 
 @dataclass(frozen=True)
 class Name:
     """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
-    `suite` is a kind of checks of `verify` or a trial of `stress`, `subject` a program or method,
-    `circumstance` a problem, `setting` a tolerance, step size or listing, and `quantity` the number
-    that is compared. `options` are added to the command that repeats the check.
+    `suite` is a kind of checks of `verify` or a trial of `stress`. `subject` is a program or
+    method, `circumstance` a problem, `setting` a tolerance, step size or listing, `quantity` the
+    number that is compared. `options` are appended to the command that repeats the check.
     """
 
     suite: str
@@ -130,7 +130,7 @@ class Check:
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a dictionary for JSON, with the fields that a subclass adds."""
+        """Return the check as a dictionary for JSON, including the fields that a subclass adds."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -144,7 +144,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """The result of a check in a random scene, with three quantities by which the report groups."""
+    """The result of a check in a random scene, with three quantities by which reports group it."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan  # requested tolerance
@@ -168,7 +168,7 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield all finished and the requested deferred checks.
+    """Yield the finished checks, and those deferred checks that `only` requests.
 
     An exception becomes a failed check, unless its type is in `raised`.
     """
@@ -196,8 +196,8 @@ def run_suites(
 ) -> Iterator[Check]:
     """Yield the requested checks of all suites; an exception becomes a failed check.
 
-    NotBuiltError is raised again. So is InputError in the suites `of_the_user`, where the user's
-    input causes it.
+    NotBuiltError is raised again. So is InputError from the suites `of_the_user`, whose input is
+    the user's.
     """
     for suite, attempts in suites.items():
         if not may_hold(suite, only):

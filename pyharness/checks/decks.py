@@ -1,7 +1,8 @@
 """Checks of the Fortran port against the decks, which are compiled from the author's cards.
 
-The decks depend on neither the port nor the twins. TAPE5 is compared bit for bit, the printed page
-as text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
+The decks depend on neither the port nor the twins. TAPE5, the file of all steps, is compared bit
+for bit, the printed page as text. An overflow ends a run of the port; the deck continues, but must
+not produce finite omega.
 """
 
 from collections.abc import Iterator
@@ -27,7 +28,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and corrected listings, and each with every single change."""
+    """Return the original and the corrected listing, and each with every single change."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]

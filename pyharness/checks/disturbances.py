@@ -1,6 +1,6 @@
 """Amplification of perturbations by a step of each program, measured by running it.
 
-`theory.amplification` derives it exactly from the schemes, so that limits allow only for rounding.
+`theory.amplification` derives it exactly from the schemes, so that limits allow for rounding only.
 J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
@@ -52,7 +52,7 @@ ROUNDED = Basis(
 
 @dataclass(frozen=True)
 class Probe:
-    """A vector or matrix, measured by running a program and derived by theory."""
+    """A vector or matrix, measured by running a program and derived from theory."""
 
     found: Array  # as measured
     derived: Array  # of the same shape
@@ -92,8 +92,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of a first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of known degree, so that differences over enough neighbours are exact
-    except for rounding.
+    A step is a polynomial of known degree. Its derivative from differences over enough neighbours
+    is therefore exact except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -136,7 +136,7 @@ def later_steps(scene: Scene, listing: Listing) -> Probe:
 def complex_step(listing: Listing, step: int, z: complex) -> Probe:
     """Return the growth factor of a collocation step on x' = z x, measured and derived.
 
-    It is step `step`, of 1 s, of a run of the Python port.
+    The step, of 1 s, is number `step` of a run of the Python port.
     """
     program = listing.program
     moved = _moved(listing, step)
@@ -157,9 +157,9 @@ def complex_step(listing: Listing, step: int, z: complex) -> Probe:
 def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
-    z is bisected along `direction`, -1 or 1j, over runs of a spinning top. With the defect
-    `base-not-restored`, omega may have a constant part that would hide the growth; therefore its
-    change from step to step is measured.
+    z, the step size times an eigenvalue of J, is bisected along `direction`, -1 or 1j, over runs of
+    a spinning top. With the defect `base-not-restored`, omega may have a constant part that would
+    hide the growth; therefore its change from step to step is measured.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -229,7 +229,7 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 def _differentiated(
     stepped: Callable[[Array], Array], omega: Sequence[float], count: int
 ) -> tuple[Array, float, float]:
-    """Return the derivative, the reach of its differences (rad/s), and its rounding factor."""
+    """Return the derivative, its neighbours' largest distance (rad/s), and its rounding factor."""
     base = np.array(omega)
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count

@@ -29,8 +29,8 @@ class Divergence:
     """The smallest step size (s) for which runs diverge, measured (`found`) and predicted.
 
     A run diverges if it overflows or a component exceeds twice its true maximum; `found` is 0 if
-    the smallest step tried diverges. By linear stability, the wobble about axis 3 doubles with
-    `predicted`. `limit` bounds their relative difference.
+    the smallest step tried diverges. With the step `predicted`, linear stability lets the wobble
+    about axis 3 double. `limit` bounds the relative difference of the two.
     """
 
     found: float
@@ -41,7 +41,7 @@ class Divergence:
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
 ) -> Divergence:
-    """Return the divergent steps of a body that spins about its stable axis 3 for `time` (s)."""
+    """Return the divergent step sizes of a body that spins about stable axis 3 for `time` (s)."""
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
     spin = abs(scene.omega[2])
@@ -63,9 +63,9 @@ def divergence(
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
-    """Return the smallest step (s) with which a run exceeds twice the largest true omega.
+    """Return the smallest step size (s) with which a run exceeds twice the largest true omega.
 
-    Return 0 if it is at most `smallest` (s), infinity if there is none.
+    Return 0 if it is at most `smallest` (s), and infinity if no run does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

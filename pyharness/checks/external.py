@@ -1,7 +1,7 @@
 """Checks of every method against published results that were not computed here.
 
-The limit is the sum of the accuracy of the published number, the method's error, and the effect of
-rounding the problem's numbers to binary64.
+The limit is the sum of three parts: the accuracy of the published number, the method's error, and
+the effect of rounding the problem's numbers to binary64.
 """
 
 import math
@@ -97,7 +97,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without result, which may refuse only a user's problem."""
+    """Return the check of a method without result; it may refuse only a user's problem."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -132,10 +132,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the changes of attitude by rounding the scene's numbers, at each time (rad).
+    """Return the changes of attitude from rounding the scene's numbers, at each time (rad).
 
-    The magnitudes of first-order changes are added. Without a solution, only quaternions are
-    rounded.
+    The magnitudes of first-order changes are added. Without a solution, only the rounding of
+    quaternions counts.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -176,7 +176,7 @@ def _as_far_as_solved(
 ) -> tuple[list[_Row], str]:
     """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    If `solve` refuses all values together, it may still solve the earlier times.
+    If it refuses all values together, it may still solve those at earlier times.
     """
     try:
         return solve(values), ""
@@ -229,9 +229,9 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
-    The step is halved until the estimated error, twice the last change over 2**order - 1, is below
-    a tenth of the published accuracy or is rounding: half a unit in the last place per step. Return
-    None if even the longest step is singular.
+    The step is halved until the estimated error is below a tenth of the published accuracy, or
+    below rounding: half a unit in the last place per step. The estimate is twice the last change,
+    divided by 2**order - 1. Return None if even the longest step is singular.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -282,14 +282,14 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at both ends (rad/s), so that limits are not too wide."""
+    """Return the largest abs(omega) at both ends (rad/s), which keeps limits narrow."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return the change of omega by rounding a scene's numbers (rad/s), by printed time.
+    """Return the change of omega from rounding a scene's numbers (rad/s), by printed time.
 
-    It is zero beyond the last solution; the method's check reports why.
+    It is zero at times without a solution; each method's check reports why.
     """
 
     def solve(values: Sequence[Value]) -> list[Array]:
@@ -306,7 +306,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the change of omega by rounding the scene's numbers (rad/s), to first order."""
+    """Return the change of omega from rounding the scene's numbers (rad/s), to first order."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

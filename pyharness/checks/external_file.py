@@ -75,8 +75,8 @@ class Problem:
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    The accuracy is half a unit of the last digit, or the stated error `good_to` if that is larger.
-    Raise InputError if `text` is not a number or too large for binary64.
+    The accuracy is half a unit of the last digit or, if larger, the stated error `good_to`. Raise
+    InputError if `text` is not a number or too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")

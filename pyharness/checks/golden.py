@@ -1,7 +1,7 @@
 """The golden record: the trajectories of this version, as exact text.
 
-Each program or method has a file. An entry has the command of a trajectory, how the run ended, a
-digest of all rows, and the first, tenth and last row as hexadecimal floats.
+Each program or method has a file. An entry describes one trajectory: the command that prints it,
+how the run ended, a digest of all rows, and the first, tenth and last row as hexadecimal floats.
 """
 
 import hashlib
@@ -62,7 +62,7 @@ class Recorded:
     tolerance: float | None  # requested of the method; None if every bit is compared
 
     def run(self) -> Trajectory:
-        """Return the trajectory, computed anew."""
+        """Return the trajectory, newly computed."""
         if self.source in PROGRAMS:
             listing = (Listing.original if self.name.endswith("original") else Listing.corrected)(
                 self.source
@@ -72,7 +72,7 @@ class Recorded:
 
 
 def recorded() -> Iterator[Recorded]:
-    """Yield the trajectories to record, by each method and each version of each program."""
+    """Yield the trajectories to record, by each method and by each version of each program."""
     for case in case_numbers():
         scene = case_scene(case)
         command = f"python -m pyharness run --case {case}"
@@ -92,8 +92,8 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
     Methods with a tolerance must agree within twice the tolerance, because processors and compilers
-    round differently. All others must agree bit for bit, unless another mathematical library
-    computes waves: then within the amplified rounding errors.
+    round differently. All others must agree bit for bit or, if another mathematical library
+    computes the torque's waves, within the amplified rounding errors.
     """
     if not chosen.record.is_dir():
         return

@@ -1,7 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
-Errors of the programs of the thesis are reported without a bound. The flow of a scene has its error
-amplification and rounding errors.
+Errors of the programs of the thesis are reported without a bound. The `flow` of a scene is its
+error amplification and rounding errors. Methods without a tolerance, `auto` and `quick` run as
+prepared solvers, whose refusals are returned; other methods raise InputError.
 """
 
 import math
@@ -98,11 +99,11 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
 
-    By default, the limit is the sum of the tolerance, amplified (for a fixed step without torque, a
-    bound from the order), the rounding error, amplified, and the error of the true solution. There
-    is no limit if the first is unknown, or if the sum leaves fewer than two digits of omega.
-    Without torque, energy and momentum always have a limit, because the flow does not amplify their
-    errors. A method fails if it refuses a scene that it must solve.
+    By default, the limit is the sum of three errors: the tolerance and rounding, both amplified,
+    and the error of the true solution. For a fixed step without torque, a bound from the order
+    replaces the tolerance. There is no limit if neither is known, or if the sum leaves fewer than
+    two digits of omega. Without torque, energy and momentum always have a limit, because the flow
+    does not amplify their errors. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -119,12 +120,7 @@ def check_methods(
 
 
 def run_method(name: str, scene: Scene, time: float, tolerance: float | None) -> End:
-    """Return omega at `time` (s) by the method `name`, and how the run ended.
-
-    Without a tolerance, a method runs as a solver prepared with the scene's step size; `auto` and
-    `quick` are always prepared. Refusals of prepared solvers are returned; other methods raise
-    InputError.
-    """
+    """Return the state at `time` (s); without tolerance, a method uses the scene's step size."""
     if name in ("auto", "quick") or tolerance is None:
         return prepared_candidate(name, tolerance or 1.0).end(scene, time)
     return method_candidate(name, tolerance).end(scene, time)
@@ -137,8 +133,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `closed-form` may if there is no closed form, `quick` always, and series if the phase of a wave
-    exceeds 1e8 radians.
+    `closed-form` may if there is no closed form, `quick` always, and series if the phase of a
+    torque's wave exceeds 1e8 radians.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -151,8 +147,8 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error, relative to the largest omega.
 
-    It is None if no bound on the steps is known, infinite if it leaves fewer than two digits of
-    omega.
+    It is None without a bound on the errors of steps, and infinite if it leaves fewer than two
+    digits of omega.
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
@@ -220,8 +216,8 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
 
     The error is relative to `largest` (rad/s). Energy and squared momentum are sums of q w**2 over
     the components w, where q is the moment or its square. An error e of every component changes
-    such a sum by at most 2 e times the sum of q abs(w), so that the observed change requires at
-    least e.
+    such a sum by at most 2 e times the sum of q abs(w). The observed change therefore bounds e from
+    below.
     """
     assert scene.moments is not None
     if not np.isfinite(omega).all():

@@ -1,4 +1,7 @@
-"""Comparison of a method's result with the true solution, and limits of the error."""
+"""Comparison of a method's result with the true solution, and limits of the error.
+
+Errors and limits are relative to the largest omega, or angles (rad).
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -85,7 +88,7 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); `method` determines the limit."""
+    """Return a deferred run of a candidate to `time` (s); `method` selects the limit."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -110,7 +113,7 @@ class Truth:
     exact : bool
         Whether it is a torque-free closed form: `data` is known, energy and momentum are conserved.
     scene, reference, effort : Scene, Reference and float, or None
-        The scene, its reference solution and the factor on the work limit, if that was used.
+        The scene, its reference solution and the factor on the work limit, if a reference was used.
     """
 
     time: Array
@@ -199,11 +202,7 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit of a method's error: its steps, its rounding, and the truth's error.
-
-    It is relative to the largest omega, or an angle (rad). So is `made`, the sum of the errors of
-    the steps, which `growth` multiplies.
-    """
+    """Return the limit: the steps' error `made` times `growth`, plus rounding and truth's error."""
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
     return replace(truth.flow, amplification=growth).limit(made, steps) + truth.relative_error
@@ -215,7 +214,7 @@ def lively(growth: float) -> float:
 
 
 def linear(limit: float) -> float:
-    """Return the limit, or infinity above `LINEAR`, where linearised equations fail."""
+    """Return the limit, or infinity above `LINEAR`, where the linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -244,7 +243,7 @@ AS_STATED = Policy(_granting(lambda growth: 1.0), FLOW, has_no_form)
 IF_CALM = Policy(_granting(lively), FLOW)
 """Policy whose limit is the tolerance, plus rounding amplified by the flow.
 
-The tolerance is multiplied by the error amplification only if this exceeds `LIVELY`.
+The tolerance is amplified too if the error amplification exceeds `LIVELY`.
 """
 AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 """Policy whose limit is the tolerance plus rounding, both amplified by the flow."""

@@ -1,7 +1,7 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad). A
-prepared solver is set up once by `prepare` for a scene and many calls.
+Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad).
+`prepare` sets up a prepared solver once, for many calls on one scene.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -60,7 +60,7 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 
 
 def prepared(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of prepared solvers, to positive and negative times.
+    """Yield deferred checks of prepared solvers, at positive and negative times.
 
     With the scene's step size, they must agree bit for bit with the unprepared method.
     """

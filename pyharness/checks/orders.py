@@ -1,7 +1,7 @@
 """Checks of methods' orders: powers of the step size with which errors decrease.
 
-Programs are compared with `solve_ivp`. Methods with a fixed step are compared with the reference.
-So is the programs' translational velocity, which no other method computes.
+Programs are compared with `solve_ivp`. Methods with a fixed step are compared with the reference,
+and so is the programs' translational velocity, which no other method computes.
 """
 
 from collections.abc import Callable, Iterator
@@ -89,8 +89,8 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    The order is only reported if the scene is too fast or sensitive for at most 4096 steps, or has
-    a table: steps do not end where a table changes, which lowers the order.
+    The order is only reported if the scene is too fast or sensitive for at most 4096 steps, or the
+    torque has a table. Steps do not end where a table changes, which lowers the order.
     """
     method = name.setting or name.subject
     run, due = method_candidate(method, 1.0), METHODS[method].order

@@ -236,7 +236,7 @@ _LEAST = 1e-13
 
 
 def regions_picture(found: Regions) -> Picture:
-    """Return the regions of stability in the plane of z, step size times eigenvalue."""
+    """Return a picture of the stability regions in the plane of z, step size times eigenvalue."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 5.8), dpi=100, layout="constrained")

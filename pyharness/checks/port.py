@@ -1,7 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-Results must agree bit for bit in all cells and in random scenes. `docs/how-to/ports.md` describes
-the protocol.
+A twin is our port to Python. Results must agree bit for bit in all cells (a program, a case,
+defects and readings) and in random scenes. `docs/how-to/ports.md` describes the protocol.
 """
 
 import math
@@ -37,8 +37,8 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run to request from a port.
 
-    `of` is the name of its check, and `options` of ``verify --port`` request it alone. `lipschitz`
-    is the constant of the stop test (1/s).
+    `of` is the name of its check; with `options`, ``verify --port`` requests this run alone.
+    `lipschitz` is the constant of the stop test (1/s).
     """
 
     name: str
@@ -65,7 +65,7 @@ class PortCheck(Check):
     """The comparison of a port with the Python twin in one run.
 
     `difference` has the first step that differs, with the value of each variable; `seconds` is the
-    time of the answer.
+    time until the port's answer.
     """
 
     seconds: float | None = None
@@ -73,7 +73,7 @@ class PortCheck(Check):
 
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
-    """Return the cells whose names begin with an element of `cells`, or all if it is empty."""
+    """Return the cells whose names begin with an element of `cells`; all if it is empty."""
     return [
         Cell(
             cell_name(listing, case), of_cell("port", listing, case),
@@ -89,9 +89,9 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
 def random_cells(
     seed: str, draws: int, cells: Sequence[str] = (), programs: Sequence[str] = PROGRAMS
 ) -> list[Cell]:
-    """Return runs in random scenes, named as ``random/7/two-term``, ordered by number.
+    """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has leading parts of names, or is empty for all; its numbers may exceed `draws`.
+    `cells` has leading parts of names, and is empty for all. Its numbers may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -107,10 +107,10 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port, started by `command`, returns the same bits in all runs.
+    """Yield checks that a port, started by `command`, returns the twin's bits in all runs.
 
-    An invalid answer fails and ends the comparison. `patience` is the longest wait (s). Raise
-    InputError if `command` is empty.
+    An invalid answer fails and ends the comparison. `patience` is the longest wait (s) for an
+    answer. Raise InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -169,7 +169,7 @@ def _port_check(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of the differences of a port's answer from the twin's run."""
+    """Return descriptions of how a port's answer differs from the twin's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     step = _first_step(wanted, given)
@@ -205,7 +205,7 @@ def _apart(due: Any, row: Any) -> list[float]:
 
 
 def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
-    """Return the first step that differs, as hexadecimal texts, because JSON has no inf and nan."""
+    """Return the values in the first step that differs, in hexadecimal: JSON has no inf and nan."""
     step = _first_step(wanted, given)
     if step is None:
         return None

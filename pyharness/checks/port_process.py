@@ -30,7 +30,7 @@ _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a po
 
 
 class PortError(Exception):
-    """An error raised if a port gives no valid answer; its message is one line."""
+    """An error raised if a port or integrator gives no valid answer; its message is one line."""
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
@@ -125,9 +125,9 @@ class PortProcess:
             file.close()
 
     def ask(self, line: bytes) -> bytes:
-        """Send the request `line` and return the answer, each a line without a line feed.
+        """Send the request `line` and return the answer, both without a line feed.
 
-        Raise PortError for a late, too long or second line.
+        Raise PortError if the answer is late, too long, or more than a line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -26,7 +26,7 @@ ENDINGS = ("complete", "stopped", "overflow")
 class Answer:
     """A port's result of one run.
 
-    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`; `ier` has the
+    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`. `ier` has the
     error code of each step, or is None for a program that prints none.
     """
 
@@ -55,7 +55,7 @@ def request(
 
 
 def requested_scene(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the dictionary for the field `scene` of a request."""
+    """Return a scene as a dictionary, the field `scene` of a request."""
     return {
         **scene_record(scene),
         "masses": scene.masses,
@@ -88,7 +88,7 @@ def read_answer(line: bytes, steps: int) -> Answer:
 
 
 def read_object(line: bytes) -> dict[str, Any]:
-    """Return the JSON object in another process's output; raise PortError otherwise."""
+    """Return the JSON object in `line`; raise PortError if it has none."""
     try:
         given = json.loads(line)
     except (ValueError, RecursionError) as error:
@@ -133,7 +133,7 @@ def read_whole(where: str, value: object) -> int:
 
 
 def read_number(where: str, value: object) -> float:
-    """Return a number, from JSON or decimal or hexadecimal text; raise PortError otherwise."""
+    """Return a number, from JSON or from decimal or hexadecimal text; raise PortError otherwise."""
     if type(value) is float:
         return value
     try:

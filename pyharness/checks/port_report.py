@@ -17,7 +17,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, at least one."""
+    """Return the report of a port's checks, of which there is at least one."""
     title = [f"{command}: against the twins, bit for bit"]
     if seed:
         title.append(f"seed of the random scenes: {seed}")

@@ -1,9 +1,9 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
-`solve` or a prepared solver, with one method. A tolerance applies to the error of omega, relative
-to the largest omega until the last time, or to the attitude error (rad). With the error
-amplification K, rounding alone causes errors of 2e-15 K.
+`solve` or a prepared solver, with one method. Its tolerance limits the error of omega, relative to
+the largest omega until the last time, or the attitude error (rad). With the error amplification K,
+rounding alone causes errors of 2e-15 K.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -64,7 +64,7 @@ Entrances = Mapping[str, Callable[[], MethodRun]]
 def truth_of(drawn: Draw) -> Truth:
     """Return the true omega of a draw at 0.4 of its end time and at its end time.
 
-    Raise InputError if omega is unbounded, too fast, or lost to rounding.
+    Raise InputError if the motion is unbounded or too fast, or rounding leaves no digit of omega.
     """
     times = [_EARLIER * drawn.time, drawn.time]
     path = integer_series(drawn.scene, times)
@@ -78,9 +78,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` may not; closed forms may only near the limits of binary64, `quick` always. Other methods
-    may for `_MAY_REFUSE` (diverging or too fast), and if the amplification exceeds `_CALM`; SciPy's
-    also for too fine a tolerance.
+    `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64. The
+    others may for the kinds in `_MAY_REFUSE` (diverging or too fast), and if the amplification
+    exceeds `_CALM`; SciPy's also for too fine a tolerance.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -107,12 +107,12 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 POLICY = Policy(_limit, CAMPAIGN, may_refuse)
 """Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
 
-The tolerance is amplified only above an error amplification of `LIVELY`.
+The tolerance is multiplied by the error amplification too if this exceeds `LIVELY`.
 """
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega from every entry point; one for a scene without true solution."""
+    """Yield checks of omega from every entry point; without true solution, one for the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -162,7 +162,7 @@ def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrance
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
-    """Return a deferred run by name of the entry point; slow methods run in few draws."""
+    """Return deferred runs by name of the entry point; slow methods run in few draws."""
     forms = ["closed-form"] if closed_form(drawn.scene) else []
     names = ["auto", "taylor", f"gauss-{drawn.stages}", *forms]
     if number // 2 % _EVERY_SLOW == 0 and not thin:

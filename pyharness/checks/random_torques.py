@@ -1,6 +1,6 @@
 """Checks of methods in random scenes whose torque depends on omega or attitude.
 
-Torques are sums of recorded functions or of ready terms. The reference's series for them
+Torques are sums of recorded functions or of ready-made terms. The reference's series for them
 (`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
@@ -69,7 +69,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
 def _entrances(
     scene: Scene, time: float, source: Random, is_slow: bool
 ) -> dict[str, Callable[[], MethodRun]]:
-    """Return a deferred run by name of the entry point, at tolerances from 1e-3 to the finest."""
+    """Return deferred runs by name of the entry point, at tolerances from 1e-3 to the finest."""
     times, digits = (_EARLIER * time, time), source.random()
     slow = _SLOW if is_slow else ()
 
@@ -110,10 +110,10 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 
 POLICY = Policy(_limit, CAMPAIGN, _may_refuse)
-"""Policy whose limit is the sum of three terms.
+"""Policy whose limit adds tolerance, amplified rounding and the error of the true solution.
 
-They are the tolerance, `ROUNDING` times the error amplification, and the error of the true
-solution. The tolerance is amplified only above an error amplification of `LIVELY`.
+The rounding is `ROUNDING` times the error amplification. The tolerance is amplified too if the
+error amplification exceeds `LIVELY`.
 """
 
 

@@ -1,4 +1,4 @@
-"""The report of checks: failures, a summary by kind, the JSON record, the JUnit cases."""
+"""The report of checks: failures, a summary by kind, the JSON record, and the JUnit cases."""
 
 import math
 from collections import Counter
@@ -114,7 +114,7 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks, with the commands that repeat them; on all if few."""
+    """Return lines on failed checks, with the commands that repeat them; on all checks if few."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
@@ -147,8 +147,8 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratios of error to tolerance, by entry point and tolerance.
 
-    `rounding` times the amplification is subtracted from the error. The columns are three ranges of
-    the amplification, each with the number of samples.
+    `rounding` times the error amplification is subtracted from the error. The columns are three
+    ranges of the amplification, each with the number of samples and the worst ratio.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -169,7 +169,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the references: largest proved error, largest estimate, and warnings."""
+    """Return lines on the references: the largest proved error, largest estimate, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

@@ -1,4 +1,4 @@
-"""Stress trials of a scene from the user, with any torque that can be recorded.
+"""Stress trials of a user's scene, with any torque that can be recorded.
 
 They apply to every scene: errors against the reference, and transformations that must not change
 the motion.
@@ -56,9 +56,9 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name; `options` are those of the command that repeats them.
+    """Return the trials of a scene by name; the command that repeats them has the `options`.
 
-    Raise InputError if the torque is opaque, or needs an attitude that is missing.
+    Raise InputError if the torque is opaque, or needs an attitude that the scene does not have.
     """
     if isinstance(scene.torque, StateTorque):
         system(scene)  # raises InputError for an opaque torque

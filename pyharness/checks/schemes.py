@@ -33,7 +33,7 @@ _ONE_STEP = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """The values of a stage, or collocation point, in every step: omega and velocity."""
+    """Omega and velocity at a stage, or collocation point, of every step."""
 
     # shape (n, 6); arguments (rad/s, m/s) and values (rad/s2, m/s2) of the right-hand sides
     state: Array
@@ -124,7 +124,7 @@ def _beginning(scene: Scene, run: Trajectory) -> Stage:
 def _stage(scene: Scene, part: float, state: Array) -> Stage:
     """Return rates at the fraction `part` of every step, with bounds on their rounding errors.
 
-    They follow from equations 16-18 and dV/dt = F/m - omega x V.
+    They follow from equations 16-18 of the thesis and dV/dt = F/m - omega x V.
     """
     omega, velocity = state[:, :3], state[:, 3:]
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)

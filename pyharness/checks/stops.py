@@ -1,9 +1,9 @@
-"""Checks of the Runge-Kutta program's stop test against eq. 19, recomputed along its run.
+"""Checks of the Runge-Kutta program's stop test against eq. 19 of the thesis, along its run.
 
-A run stops if a quotient, the change of K (right-hand side) divided by the change of U (state)
-within a step, exceeds the stop constant. As Fortran and twin could both test a wrong quotient, all
-quotients are computed from the scheme. The program is run with constants just below and above each
-new maximum.
+A run stops if a quotient exceeds the stop constant: the change of K (right-hand side) divided by
+the change of U (state) within a step. As Fortran and twin could both test a wrong quotient, all
+quotients are recomputed from the scheme. The program is run with constants just below and above
+each new maximum.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,7 +37,7 @@ Stages = tuple[Stage, Stage, Stage, Stage]
 
 @dataclass(frozen=True, eq=False)
 class Quotients:
-    """The quotients that the program compares with its stop constant, in that order."""
+    """The quotients that the program compares with its stop constant, in the program's order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m); bound on the difference of two computations, 1/s

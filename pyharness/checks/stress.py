@@ -18,17 +18,14 @@ SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
 named = partial(Name, command="stress")
-"""Return a `Name` whose command is the verb `stress`.
-
-The arguments are those of `Name`.
-"""
+"""Return a `Name`, from the same arguments, whose command is `stress`."""
 
 
 @dataclass(frozen=True)
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `bound` is a text on the limits; `attempts` takes leading parts of requested ids.
+    `bound` is a text on the limits; `attempts` takes the leading parts of requested ids.
     """
 
     name: str
@@ -53,7 +50,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the worst check by ``trial/method``, among those with a limit and a scene."""
+    """Return the worst check by ``trial/method``, among checks with a limit and a scene."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

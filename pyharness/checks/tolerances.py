@@ -1,6 +1,6 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, in right-hand sides, determines the affordable tolerances, and bounds no error.
+A work limit, in right-hand sides, determines which tolerances are affordable; it bounds no error.
 """
 
 import math
@@ -42,11 +42,7 @@ def of_case(name: str, thin: bool) -> list[float]:
 
 
 def finest(name: str, scene: Scene, time: float) -> float:
-    """Return the finest tolerance at which a method is checked until `time` (s) in a scene.
-
-    It is the smallest that `solve` accepts, else the finest of `_LADDER` that `solve_ivp` meets,
-    else 1.
-    """
+    """Return the finest tolerance at which a method is checked until `time` (s), at most 1."""
     met = finest_of(name, scene, time)
     claimed = REGISTRY[name].finest
     return claimed if met <= claimed else min((t for t in _LADDER if t >= 1.1 * met), default=1.0)
@@ -63,8 +59,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    They are the finest within the work limit, and 1e-6 if affordable. None stands for the scene's
-    step size, for methods with a fixed step and Gauss collocation.
+    They are the finest within the work limit, and 1e-6 if affordable. For methods with a fixed step
+    and Gauss collocation, None stands for the scene's step size.
     """
     if name in FIXED_STEP:
         return [None]

@@ -1,6 +1,6 @@
 """Checks of our arithmetic of machine words, by test vectors and runs of the programs.
 
-It reproduces a machine's mantissa length and rounding, such as 48 bits for the CDC.
+The arithmetic reproduces a machine's mantissa length and rounding, such as 48 bits for the CDC.
 """
 
 from collections.abc import Iterator
@@ -32,10 +32,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    Test vectors are CDC instructions with expected results. In cells, our 53 bits must agree with
-    floats, and the program compiled for each word with the twin in that word. If `chosen.only` is
-    empty, the former are compared in listings with at most one change, original and corrected, the
-    latter in the last two alone.
+    Test vectors are CDC instructions with expected results. In each cell (a program, a case,
+    defects and readings), our 53 bits must agree with floats, and the program compiled for each
+    word with the twin in that word. If `chosen.only` is empty, listings are fewer: for the floats
+    those with at most one change, original and corrected; for the words the last two.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():

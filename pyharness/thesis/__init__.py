@@ -1,1 +1,1 @@
-"""Cards, Python ports (twins) and compiled runs of the three programs of the appendix."""
+"""Cards, Python ports (twins) and compiled runs of the three programs in the thesis's appendix."""

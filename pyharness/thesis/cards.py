@@ -2,7 +2,7 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
 number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
-the twin's lines of each card. `data/apparatus.toml`, the critical apparatus, explains the
+the twin's lines for each card. `data/apparatus.toml`, the critical apparatus, explains the
 deviations of the scan.
 """
 
@@ -34,9 +34,9 @@ class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
     `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
-    occurrence of its characters after the one before. `printed` is another number that the scan
-    shows, with the apparatus entry that explains it; `lost` the entry about a card that the scan
-    lacks; else None.
+    occurrence of its characters after the one before. `printed` is the number in the scan, if it is
+    another, and the apparatus entry that explains it. `lost` is the entry about a card that the
+    scan lacks, else None.
     """
 
     program: str
@@ -81,7 +81,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return the text with the scan's names where ours are a normalization."""
+        """Return the text with the scan's names where ours are normalised."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -192,10 +192,9 @@ def find(program: str, number: int) -> Card:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names; all cards if it is empty.
+    """Return the cards that `asked` names, or all if empty; raise InputError for other items.
 
-    Items are programs, numbers and ranges: ``two-term``, ``1660``, ``1040-1090`` (of every program
-    that has such cards), ``two-term:1660``. Raise InputError for any other item or an empty range.
+    Items: ``two-term``, ``two-term:1660``; ``1660``, ``1040-1090`` (cards of any program).
     """
     found: dict[Card, None] = {}
     for each in list(asked) or PROGRAMS:
@@ -266,7 +265,7 @@ def passages(
 ) -> Iterator[tuple[str, Difference | None]]:
     """Yield each passage of a card's text with its difference from the scan, or None.
 
-    `differences` are all those of the card, in order; otherwise raise ValueError.
+    `differences` must be all of the card's, in order; otherwise raise ValueError.
     """
     # Differences ignore blanks.
     places = [n for n, letter in enumerate(text) if not letter.isspace()]

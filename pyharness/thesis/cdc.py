@@ -48,9 +48,9 @@ def _sum(p: int, rounds: bool) -> Operation:
 def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
-    The frame is in units of 2**(e - p), e the larger exponent; coefficients have p bits. The
-    smaller operand is shifted and truncated. As in RX, if `rounds`, half a unit in the last place
-    is first added to each operand.
+    The frame is in units of 2**(e - p), where e is the larger exponent; coefficients have p bits.
+    The smaller operand is shifted and truncated. If `rounds`, half a unit in the last place is
+    first added to each operand, as RX does.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe

@@ -28,7 +28,8 @@ def all_listings(program: str) -> Iterator[Listing]:
 def all_cells() -> Iterator[tuple[Listing, int]]:
     """Yield every pair of a listing and a case number, for all programs.
 
-    For a case with an initial torque, each listing also comes with the conjecture `initial-torque`.
+    For a case with an initial torque, each listing also occurs with the conjecture
+    `initial-torque`.
     """
     cases = {case: initial_torque(case_scene(case)) is not None for case in case_numbers()}
     for program in PROGRAMS:
@@ -46,11 +47,7 @@ def cell_name(listing: Listing, case: int) -> str:
 
 
 def listing_name(listing: Listing) -> str:
-    """Return a name, without blanks, for a listing.
-
-    It is ``corrected``, ``original`` and readings, each after a colon, or all active names, joined
-    by ``+``.
-    """
+    """Return a listing's name, as in ``original``, ``corrected:reading`` or ``defect+defect``."""
     if listing.label == "custom":
         return "+".join(sorted(listing.active))
     return ":".join([listing.label, *sorted(listing.readings)])

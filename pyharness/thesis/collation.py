@@ -51,7 +51,7 @@ def witness_lines() -> dict[str, str]:
 def unexplained(scan: str) -> list[str]:
     """Return a sentence for each line in which a scan of the thesis disagrees with our tables.
 
-    Raise InputError for a text without the appendix.
+    Raise InputError if the text has no appendix.
     """
     _, heading, appendix = scan.rpartition(HEADING)
     if not heading or not re.search(r"^\s*\d+-", appendix, re.MULTILINE):

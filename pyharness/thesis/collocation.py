@@ -1,6 +1,6 @@
 """Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
 
-In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34), whose
+In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its
 derivative equals the right-hand side at as many collocation points as there are terms after x(0)
 (eq. 36). A first estimate assumes a constant right-hand side; one correction evaluates it at the
 points along the estimate.
@@ -31,8 +31,8 @@ def integrate(
     """Run a collocation program on a scene, and return its trajectory.
 
     `points_of` returns the collocation points (s) from DT, the step as the program computes it.
-    `rates` returns the right-hand sides at point k (0 for the start), from the torques over the
-    moments (1/s2) at the start and all points, k, and the unknowns.
+    `rates` returns the right-hand sides at point k (0 for the start). Its arguments are the torques
+    over the moments (1/s2) at the start and all points, k, and the unknowns.
     """
     h = scene.step_size
     dt = h
@@ -93,7 +93,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
 
-    The terms are added in this order, because the rounding errors depend on it.
+    The terms are added in this order, on which the rounding errors depend.
     """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]

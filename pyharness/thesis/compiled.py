@@ -41,7 +41,7 @@ def read_rows(
     `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
     velocity (m/s). `ier` has at least n codes. `stop_variable` is the number in `STOP_VARIABLES`,
     from 1, of the variable that failed the stop test, or 0. `stop_quotient` is the change of the
-    right-hand side over that of the variable (1/s).
+    right-hand side divided by the variable's (1/s).
     """
     n = len(rows)
     is_stopped = stop_variable > 0

@@ -23,7 +23,7 @@ from pyharness.thesis.word import Word
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the compiled program of a listing in a word; the result is that of `in_word.run`.
+    """Run a listing's compiled program in the arithmetic `word`; the result is `in_word.run`'s.
 
     Raise InputError if the compiler does not support the word, or angles of the torque are too
     large for its sine; NotBuiltError if the extension is not built.
@@ -63,7 +63,7 @@ def run(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the compiled programs support, none if not built."""
+    """Return the names of the words that the compiled programs support; none if not built."""
     try:
         from pyharness import _build
     except ImportError:

@@ -18,10 +18,10 @@ class Row(NamedTuple):
     """An operation, and whether the decks and the thesis agree on it.
 
     `what` names the operation. `cards` has the numbers by program, as in ``750-770, 800``. `decks`
-    is ``agree`` if all decks with the operation have the same statements, ``names`` if only names
-    differ, ``order`` if only names and order, else ``differ``; ``-`` if no deck has it. `thesis` is
-    ``agrees``, ``differs`` or ``silent``; `text` and `says` are place and statement. `entries` of
-    the apparatus, or `reason`, explain a disagreement.
+    is ``agree`` if all decks with the operation have the same statements. It is ``names`` if only
+    names differ, ``order`` if only names and order, else ``differ``; ``-`` if no deck has it.
+    `thesis` is ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, and `says`
+    its statement. `entries` of the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str

@@ -56,10 +56,12 @@ def deck_text(
 
     By default it is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
     with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
-    DO statement. `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7,
-    "gfortran" also adaptations to a modern compiler; column 73 marks these cards. `terms`, 3 or 5,
-    requests the conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card
-    can express the request.
+    DO statement.
+
+    `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7, "gfortran" also
+    adaptations to a modern compiler; column 73 marks these cards. `terms`, 3 or 5, requests the
+    conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card can express
+    the request.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -95,7 +97,7 @@ def card_steps(program: str) -> int:
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return each card of the corrected program by number, including inserted ones."""
+    """Return the cards of the corrected program by number, including inserted ones."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 

@@ -32,7 +32,7 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return force over mass (m/s2); by `three-masses` each axis has its own mass."""
+    """Return force over mass (m/s2); with `three-masses` each axis has its own mass."""
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 

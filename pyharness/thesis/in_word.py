@@ -1,4 +1,4 @@
-"""Runs of a twin in a floating-point format of `word.py`."""
+"""Runs of a twin in an arithmetic of `word.py`, such as the 48 bits of the CDC."""
 
 import copy
 import importlib
@@ -18,7 +18,7 @@ Of = TypeVar("Of", Scene, TorqueLaw)
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the twin of a listing in a word; no argument is checked.
+    """Run the twin of a listing in the arithmetic `word`; no argument is checked.
 
     The results are rounded to floats; the attribute `exact` has them as numbers of the word.
     """
@@ -30,7 +30,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene with all its numbers, except counts, in a word."""
+    """Return a copy of a checked scene, with all numbers except counts converted to `word`."""
     law = scene.law
 
     def those(values: Any) -> Any:
@@ -52,7 +52,7 @@ def scene_in(scene: Scene, word: Word) -> Scene:
 
 
 def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a changed copy, without checks, which would convert the values to floats."""
+    """Return a changed copy without checks, which would convert the values to floats."""
     changed = copy.copy(frozen)
     vars(changed).update(fields)
     return changed

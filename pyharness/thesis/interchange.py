@@ -31,7 +31,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the array of numbers that bytes from `to_bytes` represent."""
+    """Return the array of numbers in bytes that `to_bytes` has made."""
     size = n_bytes(word)
     written = given.tobytes(order="F")
     found = np.empty(len(written) // size, dtype=object)

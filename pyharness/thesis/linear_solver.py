@@ -22,7 +22,7 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite rows by LU factors; return the index of each row exchanged, None if singular."""
+    """Overwrite rows with LU factors; return each exchanged row's index, or None if singular."""
     n = len(a)
     pivots = []
     scale = []

@@ -1,7 +1,7 @@
 """Counts of the floating-point operations in a step of a program, from its cards.
 
 The author's statements are interpreted with numbers that count operations; LEQT1F is our own
-version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each; subscripts, jumps, ABS
+version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each. Subscripts, jumps, ABS
 and WRITE do not count.
 """
 
@@ -35,7 +35,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter that stores the result of each distinct operation."""
+    """A counter of operations that stores the result of each distinct one."""
 
     def __init__(self, times: Mapping[str, int]) -> None:
         self.times, self.written = times, 0
@@ -120,8 +120,8 @@ class _Array(defaultdict[tuple[int, ...], Any]):
 def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> Count:
     """Return the operations of a listing's program in its first step.
 
-    The scene is the case on the published cards. `times` has the weight of each operation, for
-    example its unit time on a machine.
+    The scene is the case on the published cards. `times` has the weight of each operation, such as
+    its unit time on a machine.
     """
     statements = list(_statements(deck_text(listing)))
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
@@ -140,7 +140,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return a copy of numbers from before a step, with `counter`; other values unchanged."""
+    """Return numbers from before a step as copies with `counter`, and other values unchanged."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)

@@ -1,4 +1,4 @@
-"""Lines of the Fortran ports and of the twins, and their cards.
+"""Lines of the Fortran ports and of the twins, and the corresponding cards.
 
 The port names its cards in comments; `data/cards/places.toml` names the lines of the twin.
 """
@@ -41,7 +41,7 @@ def port_lines(program: str) -> Iterator[tuple[Place, str]]:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the defect or reading on which a port's line depends, and whether it is active.
 
-    None means that the line depends on no single switch.
+    Return None if the line depends on no single switch.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

@@ -30,8 +30,8 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    The moments and torques of `scene`, which must have moments, are followed by a line for each
-    row, the last one for the step that failed the stop test. Lines have no trailing blanks.
+    After the moments and torques of `scene`, which must have moments, it has a line for each row,
+    the last one for the step that failed the stop test. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None

@@ -2,8 +2,8 @@
 
 A number m 2**e is a pair of integers (m, e); m has p bits, or fewer if subnormal. If m is 0, e is
 the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an `Operation` have m other than 0.
-No library has all these rules: mpmath and gmpy2 have no limited exponents, SoftFloat and numpy only
-IEEE 754, and none has the rules of the CDC machines (`cdc.py`).
+No library has all these rules: mpmath and gmpy2 do not limit exponents, SoftFloat and numpy have
+only IEEE 754, and none has the rules of the CDC machines (`cdc.py`).
 """
 
 import math

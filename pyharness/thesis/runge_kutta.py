@@ -107,9 +107,9 @@ def lipschitz_test(
     """Return a variable that violates eq. 19, and its quotient (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. Norms over omega are compared; by the defect `lipschitz-per-component` single components,
-    and by `lipschitz-tests-velocity` the velocity too. The quotient is infinite if the unknowns do
-    not change.
+    step. Norms over omega are compared; with the defect `lipschitz-per-component` single
+    components, and with `lipschitz-tests-velocity` the velocity too. The quotient is infinite if
+    the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

@@ -181,8 +181,7 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        `operation` is applied to floats that represent the operands. A finite result other than
-        zero means that zero was added.
+        It is applied to the `_shadow` of each; a finite result other than 0 means that 0 was added.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -219,7 +218,7 @@ class Word:
 
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
     (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
-    follows as in IEEE 754; `largest` is by default that of binary64 if p is at most 53, else of
+    follows as in IEEE 754. `largest` is by default that of binary64 if p is at most 53, else of
     binary128. With `cut_literals`, converted values are truncated. Raise InputError for an unknown
     rule, or p below 4.
     """

@@ -1,1 +1,1 @@
-"""Reference solutions of scenes in multiple precision, with bounds of their errors."""
+"""Reference solutions of scenes in multiple precision, with bounds on their errors."""

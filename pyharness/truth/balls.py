@@ -1,7 +1,7 @@
 """Number types of the enclosures: balls, power series of balls, complex balls, and functions.
 
-A ball is an interval with a middle and a radius. Each operation of python-flint returns a
-ball that contains the exact result for all numbers in its operands.
+A ball is an interval, stored as middle and radius. Each operation of python-flint returns a ball
+that contains the exact result for all numbers in its operands.
 """
 
 from bisect import bisect_left, bisect_right
@@ -28,7 +28,7 @@ def fraction(x: Any) -> Fraction:
 
 
 def balls(row: Sequence[Any]) -> Balls:
-    """Return the exact middles of a row, with the largest of their radii."""
+    """Return the exact middles of a row, with the largest of its radii."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
@@ -61,7 +61,7 @@ def _cosine(x: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return the functions of tapes for a step after (or before) `time` (s).
+    """Return the functions of tapes (recorded operations) for a step after or before `time` (s).
 
     A table is replaced by its piece in the step.
     """

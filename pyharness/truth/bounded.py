@@ -33,10 +33,11 @@ Row = Sequence[float | Fraction]
 
 
 class ErrorBound(NamedTuple):
-    """A statement on the error of the reference at all its times.
+    """Bounds on the error of the reference at all its times.
 
-    `value` bounds any component of omega (rad/s), and `angle` the attitude (rad); the bases are
-    "proved" or "estimated". `warning` is a sentence if the proved error exceeds the estimate.
+    `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis:
+    "proved", or "estimated" for the reference's own estimate. `warning` is a sentence if the proved
+    error exceeds the estimate.
     """
 
     value: float
@@ -46,16 +47,16 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound of omega, two digits rounded up, with unit and basis."""
+        """Return the bound for omega, rounded up to two digits, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
-        """Return the statement relative to `scale` (rad/s) unless it is 0; the angle is kept."""
+        """Return the bound divided by `scale` (rad/s) unless that is 0; the angle is kept."""
         return self._replace(value=self.value / scale) if scale else self
 
     @property
     def larger(self) -> "ErrorBound":
-        """Return a statement on the larger of the errors of omega and attitude."""
+        """Return one bound for both omega and attitude, the larger of the two."""
         turned = self.turned
         return (
             self
@@ -65,13 +66,13 @@ class ErrorBound(NamedTuple):
 
     @property
     def turned(self) -> "ErrorBound | None":
-        """Return the statement on the attitude alone (rad), or None without attitude."""
+        """Return the bound for the attitude alone (rad), or None without attitude."""
         if self.angle is None or self.angle_basis is None:
             return None
         return ErrorBound(self.angle, self.angle_basis, warning=self.warning)
 
     def record(self) -> dict[str, Any]:
-        """Return the statement as a JSON dictionary."""
+        """Return the bound as a dictionary for JSON."""
         turned = {"angle": self.angle, "angle_basis": self.angle_basis}
         return {
             "value": self.value,
@@ -97,9 +98,9 @@ def bound_of(
     any_torque: bool = False,
     effort: float | None = None,
 ) -> ErrorBound:
-    """Return a statement on the error of the reference `known` of a scene.
+    """Return the error bound of the reference `known` of a scene.
 
-    With `before_rounding`, it is on omega plus `remainder`, the part that rounding to binary64
+    If `before_rounding`, it is for omega plus `remainder`, the part that rounding to binary64
     removed.
     """
     exact = before_rounding and known.remainder is not None
@@ -129,13 +130,15 @@ def error_bound(
     any_torque: bool = False,
     effort: float = 1.0,
 ) -> ErrorBound:
-    """Return a statement on the error of values of the reference at `times` (s).
+    """Return the error bound of values of the reference at `times` (s).
 
-    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4);
-    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates. Omega is proved if the scene has
-    a certificate, which needs no library. With python-flint the attitude is proved in torque-free
-    motion, and with `any_torque`, both under any recorded torque. The limit of a proof is about
-    half a second times `effort`.
+    `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
+    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, which remain where nothing is
+    proved.
+
+    Omega is proved if the scene has a certificate, which needs no library. With python-flint the
+    attitude is proved in torque-free motion, and with `any_torque`, both under any recorded torque.
+    The limit of a proof is about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -168,7 +171,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return a statement that holds for all statements in `found`, at least one."""
+    """Return a bound for all of the bounds in `found`, at least one."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -285,7 +288,7 @@ def _extreme_angles(
 
     The error is twice the angle between the lines of two quaternions. The sine s of the angle to
     the ball's middle is exact before rounding, and arcsin(s) < s (1 + s**2) for s <= 1/2. Four
-    radii r have the norm 2 r: middle and true line differ by at most arcsin(2 r) < 4 r.
+    radii r have the norm 2 r, so that middle and true line differ by at most arcsin(2 r) < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

@@ -64,7 +64,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """The errors grow so much that `digits` more digits are needed."""
+    """Signal that errors grow so much that `digits` more digits are needed."""
 
     def __init__(self, digits: float) -> None:
         super().__init__()
@@ -174,7 +174,7 @@ class _Run:
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
         """Compute the steps up to the last time, and the balls of omega.
 
-        Raise _AmplifiedError if the radius grows too fast after the fraction `early` of the time.
+        Raise _AmplifiedError if, after the fraction `early` of the time, the radius grows too fast.
         """
         system, clock = self._system, self._clock
         middle = [int(Fraction(x) * (1 << self._bits)) for x in self._record["omega"]]
@@ -223,7 +223,7 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return by how many digits the last radius will be too large, by extrapolation."""
+        """Return, by extrapolation, how many digits too large the last radius will be."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))
@@ -234,7 +234,7 @@ class _Run:
         return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
 
     def _source(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> int:
-        """Return a bound of the error of one step without amplification."""
+        """Return a bound on the error of one step without amplification."""
         _, residuals, wave_residual = expansion
         forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
         return radius + self._system.norm(residuals) + forced

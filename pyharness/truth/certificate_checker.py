@@ -5,13 +5,15 @@ with integers, and with fractions where it reads numbers. Its arguments are file
 it prints the scenes and rows that they prove. The exit status is 1 unless all certificates hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
-torque. In a step of length h, the solution is approximated by a polynomial p(s), s from 0 to 1,
-whose coefficients are those of the Taylor series, rounded down. The proof does not depend on them,
-because it bounds the residual d = p' - h f(p) of the polynomial itself. The error e = y - p obeys
-|e|' <= h mu |e| + |d|, where mu bounds the logarithmic norm of the Jacobian of f in a tube around p
-(Dahlquist 1958). The resulting bound of |e| holds while |e| is less than the radius of the tube.
-If the bound itself is less, it holds on the whole step, because |e| is continuous. At the time of a
-row, the solution therefore differs from the polynomial of a step by at most the radius of the step.
+torque. In a step of length h, a polynomial p(s), s from 0 to 1, approximates the solution. Its
+coefficients are those of the Taylor series, rounded down. The proof does not depend on them,
+because it bounds the residual d = p' - h f(p) of the polynomial itself.
+
+The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958). Here mu bounds the logarithmic
+norm of the Jacobian of f in a tube around p. The resulting bound of |e| holds while |e| is less
+than the radius of the tube. If the bound itself is less, it holds on the whole step, because |e| is
+continuous. At the time of a row, the solution therefore differs from the polynomial of a step by at
+most the radius of the step.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -80,7 +82,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return Taylor series, and bounds of the residuals of omega and waves, over 2**bits."""
+        """Return Taylor series, and bounds on the residuals of omega and waves, over 2**bits."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1. This changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -115,12 +117,12 @@ class System:
         return series, residuals, wave_residual
 
     def norm(self, errors: Sequence[int]) -> int:
-        """Return a bound of the norm of three errors of omega."""
+        """Return a bound on the norm of three errors of omega."""
         parts = [over(abs(x) << SCALE_BITS, s) for x, s in zip(errors, self.scales, strict=True)]
         return isqrt(sum(x * x for x in parts)) + 1
 
     def forced(self, h: int) -> int:
-        """Return a bound of h times the norm of the Jacobian of omega' by the waves, over UNIT."""
+        """Return a bound on h times the norm of the Jacobian of omega' by the waves, over UNIT."""
         total = 0
         for (common, (_, _, _, *amplitudes)), scale in zip(self.rows, self.scales, strict=True):
             push = sum(map(abs, amplitudes)) * abs(h) << SCALE_BITS
@@ -128,7 +130,7 @@ class System:
         return total
 
     def growth(self, series: Sequence[Sequence[int]], tube: int, h: int) -> int:
-        """Return a bound of h mu, for the Jacobian of omega' by omega, over UNIT."""
+        """Return a bound on h mu, for the Jacobian of omega' by omega, over UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
             # The mean is a sharper bound but costs time, which a small factor does not justify.
@@ -166,7 +168,7 @@ class System:
 
 
 def mean(polynomial: Sequence[int]) -> int:
-    """Return a bound of the mean absolute value of a polynomial on [0, 1]."""
+    """Return a bound on the mean absolute value of a polynomial on [0, 1]."""
     # The mean absolute value of the first terms is at most their root mean square.
     head, total = polynomial[:12], 0
     for k in range(2 * len(head) - 1):
@@ -176,7 +178,7 @@ def mean(polynomial: Sequence[int]) -> int:
 
 
 def exponential(x: int) -> int:
-    """Return a bound of exp(x), x from 0 to 2; both over UNIT."""
+    """Return a bound on exp(x), x from 0 to 2; both over UNIT."""
     total = term = UNIT
     for k in range(1, 20):
         term = over(term * x, k * UNIT)
@@ -245,7 +247,7 @@ def check(certificate: dict[str, Any]) -> int:
 
 
 def check_file(name: str) -> tuple[dict[str, Any] | None, str]:
-    """Return a certificate and "", or if it does not hold, None and the reason."""
+    """Return a certificate and ""; if it does not hold, None and the reason."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         return dict(pairs) if len(dict(pairs)) == len(pairs) else {"a key occurs twice": None}

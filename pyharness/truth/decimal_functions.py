@@ -56,7 +56,7 @@ def _arctan_inverse(n: int) -> Decimal:
 
 
 def product(x: Row, reversed_y: Row) -> Decimal:
-    """Return a Taylor coefficient of the product of two series, the second one reversed."""
+    """Return the Taylor coefficient of a product of two series, the second one reversed."""
     if x and not x[-1]:
         # Polynomials, such as those of time, end in many zeros, which change no digit of the sum.
         n = len(x) - 1

@@ -1,6 +1,6 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-A list `coefficients` has the Taylor coefficients of each unknown.
+The list `coefficients` has the Taylor coefficients of each unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -46,9 +46,10 @@ def taylor_series(
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     Rows are missing from where omega grows without bound or the torque is singular. The quaternion
-    has the norm of the scene's. `coefficients` are A, B, C; `order` is the degree, larger for high
-    powers in the torque; `tolerance` is local and relative. `effort` is a factor on a work limit of
-    some ten seconds; None means 100 000 steps, fewer if the torque depends on the state.
+    has the norm of the scene's. `coefficients` are A, B, C; `order` is the degree, which high
+    powers in the torque may increase; `tolerance` is local and relative. `effort` is a factor on a
+    work limit of some ten seconds; None means 100 000 steps, fewer if the torque depends on the
+    state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     if equations.least_order > order:
@@ -121,7 +122,7 @@ class _Limit:
     def check(self, step: int, stops: int, begin: Decimal, length: Decimal, rest: Decimal) -> None:
         """Raise InputError if the number of steps, so far or by forecast, exceeds the limit.
 
-        `stops` counts the steps that ended early at a change of a table, and `step` all others.
+        `stops` counts the steps that ended early at a change of a table, `step` all others.
         `begin`, `length` (of the next step) and `rest` are in s.
         """
         if step + stops >= self._most:
@@ -146,8 +147,8 @@ class _Limit:
         """Return the expected number of steps until the end.
 
         `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
-        is assumed to remain. If the number of steps grew with a power of time above 1.3, this
-        power, at most 3, is extrapolated.
+        of a step is assumed to remain. If the number of steps grew with a power of time above 1.3,
+        this power, at most 3, is extrapolated.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -233,8 +234,8 @@ def _is_continued(
 ) -> bool:
     """Return whether the derivatives at the end of a step are those of the Taylor series.
 
-    A pulse of the torque within the step may be invisible at its beginning. The last of the
-    equations shows what rounding changes.
+    A pulse of the torque within the step may be invisible at its beginning. The last element of
+    `equations` determines the effect of rounding, which is allowed.
     """
     slopes = _derivatives(series, length)
 
@@ -287,7 +288,7 @@ class _Equations:
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
 
-        Where a table changes, they hold after `time` if `forward`, else before.
+        Where a table changes, they hold after `time` if `forward`, else before it.
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
@@ -342,7 +343,7 @@ class _Equations:
     def _torque_series(
         self, time: Decimal, order: int, series: list[Row], forward: bool
     ) -> Callable[[int], Row]:
-        """Return a function for coefficient k of torque over moments, called with k = 0, 1, ..."""
+        """Return a function for coefficient k of torque over moments; call it with k = 0, 1, ..."""
         if self._tape is not None:
             tape, moments = self._tape, self._moments
             tape.begin(time, series[:3], series[-4:] if self._attitude else [], forward)
@@ -395,8 +396,8 @@ def _rates_by_momentum(
 ) -> Row:
     """Return Taylor coefficient k of the derivative of omega, from L' = N - omega x L.
 
-    `torque` is coefficient k of N. `momentum`, `series` and `inertia` have coefficients 0 to k of
-    L = I omega, omega and I; `backward` has those of omega reversed.
+    `torque` is coefficient k of N. `momentum` (L = I omega), `series` (omega) and `inertia` (I)
+    have coefficients 0 to k; `backward` has those of omega reversed.
     """
     right = []
     for i in range(3):

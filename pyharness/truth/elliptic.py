@@ -22,9 +22,9 @@ _DIGITS = 90
 def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> Row:
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
-    With `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on
-    the state, or an unsteady motion may be unbounded: it is bounded if A, B, C belong to moments,
-    or one is above and one below 0.
+    If `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on the
+    state, or an unsteady motion may be unbounded. It is bounded if A, B, C belong to moments, or
+    one is above and one below 0.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
@@ -72,8 +72,8 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
 
-    Scaled components obey x' = y z, y' = -z x, z' = x y. Fractions p = x**2 + y**2 and q = z**2 +
-    y**2 (1/s**2) are compared, because on the separatrix, p = q, a rounding error would cause
+    Scaled components obey x' = y z, y' = -z x, z' = x y. p = x**2 + y**2 and q = z**2 + y**2
+    (1/s**2) are compared as fractions: on the separatrix, p = q, a rounding error would cause
     flips.
     """
     s1, s2, s3 = (abs(each) for each in a)
@@ -92,7 +92,7 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
 
 
 def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
-    """Return omega (rad/s) at `time` (s) for a first or third coefficient 0, a negative second."""
+    """Return omega (rad/s) at `time` (s) if the second coefficient is negative and another is 0."""
     axis = 0 if not a[0] else 2
     other = 2 - axis
     # With u the component about the axis `other` and v the component about the second axis,

@@ -21,7 +21,7 @@ class Enclosure:
     """Balls that contain the solution of one scene at requested times; None if not requested.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega, and of the quaternion without normalisation, by omega at time 0.
+    derivatives of omega and of the quaternion, without normalisation, by omega at time 0.
     """
 
     time: tuple[float, ...]  # s
@@ -39,7 +39,7 @@ class Enclosure:
         return max((rounded_up(each.radius) for each in self.omega), default=0.0)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a JSON dictionary for each time, with decimals as strings.
+        """Return a dictionary for JSON for each time, with decimals as strings.
 
         Each radius includes the rounding error of the decimals.
         """
@@ -69,7 +69,7 @@ def with_energy(scene: Scene, found: Enclosure) -> Enclosure:
 
 
 def row_of(time: float, omega: Balls) -> dict[str, Any]:
-    """Return the balls of omega at `time` (s) as a JSON dictionary."""
+    """Return the balls of omega at `time` (s) as a dictionary for JSON."""
     texts, radius = decimals(omega)
     return {"time": time, "omega": texts, "radius": radius}
 
@@ -82,7 +82,7 @@ def decimals(balls: Balls) -> tuple[list[str], float]:
 
 
 def rounded_up(x: Fraction) -> float:
-    """Return a binary64 number of four digits that is at least `x`, which is not negative."""
+    """Return a binary64 number of four digits that is at least `x`; `x` is not negative."""
     # One factor exceeds the rounding errors of the conversion to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
@@ -93,7 +93,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a radius to the allowed radius.
 
-    Allowed is 10**-digits times the largest component of omega, or 1 rad/s if that is smaller.
+    Allowed is 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
     """
     largest = Fraction(0)
     for middle, radius in omega:

@@ -28,7 +28,7 @@ class Equations:
 
     The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
     `transition`, the derivatives of omega and attitude by omega at time 0, row by row. `blocks` are
-    the slices of the present groups, `scales` the units of errors.
+    the slices of the groups that are present, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -68,7 +68,7 @@ class Equations:
         self._push = [arb(force) / arb(scene.masses[0]) for force in scene.forces]
 
     def at(self, begin: Fraction, forward: bool) -> Rates:
-        """Return the right-hand side for a step after (or before) `begin` (s)."""
+        """Return the right-hand side for a step after `begin` (s), or before unless `forward`."""
         functions = functions_at(begin, forward)
 
         def rates(time: Any, state: Sequence[Any]) -> list[Any]:
@@ -124,7 +124,7 @@ class Equations:
 
 
 def _tapes(scene: Scene) -> list[Tape]:
-    """Return tapes with the sum of the torque; a law has one per wave, to avoid rounded sums."""
+    """Return tapes whose sum is the torque; a law has one per wave, to avoid rounded sums."""
     law = scene.torque
     if isinstance(law, TorqueLaw):
         laws = [TorqueLaw(law.constant, law.rate, frame=law.frame)]

@@ -2,7 +2,7 @@
 
 Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
 1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by comparing fractions, never
-balls: a scene's binary64 numbers are exact. Import this module only where python-flint is
+balls, because a scene's binary64 numbers are exact. Import this module only where python-flint is
 installed.
 """
 
@@ -36,7 +36,7 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more contain the unit quaternion from body to space, scalar first and
-    continuous in time. Radii are at most 10**-`digits`, for omega in rad/s and times the largest
+    continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, and times the largest
     initial component if that exceeds 1 rad/s. Raise InputError if there is a torque, motions may be
     unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
     """
@@ -104,14 +104,15 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn and n the direction of the angular momentum L, both in
-    the body, and T the kinetic energy; n e = c dn(u) with c > 0. The attitude is the product of a
-    constant, the rotation by psi about e, and the smallest rotation from n to e. Euler's equations
-    give psi' = (2 T/L + omega e)/(1 + n e). Like dn, psi' has the periods 2K and 4iK' in complex u;
-    its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy, and the residues of psi'/(2
-    rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of theta4((u - iy)/2K | 2
-    tau), or of its conjugate, has the same periods, poles and residues; the difference is thus
-    constant.
+    Let e be the direction of the axis of dn and n that of the angular momentum L, both in the body.
+    Then n e = c dn(u) with c > 0. T is the kinetic energy. The attitude is the product of a
+    constant, the rotation by psi about e, and the smallest rotation from n to e.
+
+    Euler's equations give psi' = (2 T/L + omega e)/(1 + n e). Like dn, psi' has the periods 2K and
+    4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the
+    residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of
+    theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles and residues. The
+    difference of the two is thus constant.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ Balls = list[arb]
 def omega_on_ellipse(axis: int, a: list[Fraction], w: list[Fraction], t: Fraction) -> Balls:
     """Return omega (rad/s) at `t` (s), initially `w`, if the coefficient of `axis` is 0.
 
-    That component is constant; the others move on an ellipse.
+    The component about `axis` is constant; the others move on an ellipse.
     """
     j, k = axis - 2, axis - 1
     angle = ball(-a[j] * a[k] * (w[axis] * t) ** 2).sqrt()

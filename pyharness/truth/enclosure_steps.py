@@ -1,12 +1,14 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
 In each step a polynomial p approximates the solution of y' = f(t, y). Its residual p' - f(t, p) is
-bounded on the whole step in ball arithmetic; the proof does not depend on how p was computed. The
-vector r of the norms of blocks of y - p, such as omega and attitude, obeys r' <= M r + d, where d
-bounds the residual. On its diagonal, M has bounds of the logarithmic norms of the diagonal blocks
-of the Jacobian near p, or 0 if negative; elsewhere, bounds of the norms of the other blocks. Since
-M is not negative, r(h) is at most exp(h M) (r(0) + h d). For one block this is theorem I.10.6 of
-Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I.
+bounded on the whole step in ball arithmetic; the proof does not depend on how p was computed.
+
+The unknowns form blocks, such as omega and attitude. The norms of the blocks of y - p form the
+vector r, which obeys r' <= M r + d, where d bounds the residual. The diagonal of M bounds the
+logarithmic norms of the diagonal blocks of the Jacobian near p, and is not negative. The rest of M
+bounds the norms of the other blocks. Since M is not negative, r(h) <= exp(h M) (r(0) + h d). For
+one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
+Equations I.
 """
 
 import math
@@ -98,7 +100,7 @@ def _kept_length() -> Iterator[None]:
 
 
 class _NoStepError(Exception):
-    """The step is too long for a proof."""
+    """Signal that a step is too long for a proof."""
 
 
 @dataclass
@@ -124,7 +126,7 @@ def _terms(x: Any, count: int) -> list[Any]:
 
 
 def _expanded(rates: Rates, begin: Any, middle: Sequence[Any], order: int) -> list[list[Any]]:
-    """Return Taylor coefficients 0 to `order` as exact balls, one per iteration of Picard."""
+    """Return Taylor coefficients 0 to `order` as exact balls; each Picard iteration adds one."""
     found = [[x] for x in middle]
     for k in range(order):
         ctx.cap = k + 1
@@ -203,7 +205,7 @@ class _Proof:
         return Fraction(mantissa, 2**_LENGTH_BITS) * Fraction(2) ** exponent
 
     def _radii(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
-        """Return bounds of the error of each block during a step `h` (s)."""
+        """Return bounds on the error of each block during a step `h` (s)."""
         length, state = abs(ball(h)), self.state
         begin = ball(state.time)
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
@@ -246,10 +248,10 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds of the terms from number `count` of the rates along the polynomials.
+        """Return bounds on the terms from number `count` of the rates along the polynomials.
 
-        If the rates are at most M on a disc whose radius is c steps, term number k is at most M
-        c**-k at the end of the step, by Cauchy's estimate. The bounds are geometric series.
+        Let the rates be at most M on a disc whose radius is c steps. By Cauchy's estimate, term
+        number k is at most M c**-k at the end of the step. The bounds are geometric series.
         """
         length = abs(ball(h))
         best: list[Any] | None = None
@@ -296,7 +298,7 @@ class _Proof:
 
 
 def _log_norm(part: list[list[Any]]) -> Any:
-    """Return a bound, at least 0, of a matrix's logarithmic norm, by Gershgorin's circles."""
+    """Return a bound, at least 0, on a matrix's logarithmic norm, by Gershgorin's circles."""
     largest = arb(0)
     for i, row in enumerate(part):
         others = sum((_upper(abs(x + part[j][i]) / 2) for j, x in enumerate(row) if j != i), arb(0))

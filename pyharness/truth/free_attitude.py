@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle; one period
-is therefore integrated by Taylor series. Near the separatrix errors of omega grow exponentially;
-segments therefore start from omega of `elliptic.py`. No code is shared with the closed form that
-this module checks.
+In each period of omega the body rotates about the angular momentum by the same angle, so that the
+integration by Taylor series covers only one period. Near the separatrix errors of omega grow
+exponentially; segments therefore start from omega of `elliptic.py`. No code is shared with the
+closed form that this module checks.
 """
 
 import decimal

@@ -32,7 +32,7 @@ Series = list[int]
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The solution of one scene at the requested times, and at many times between."""
+    """The solution of one scene at the requested times, and at many times between them."""
 
     time: Array  # shape (n,); as requested, s
     omega: Array  # shape (n, 3); rounded to binary64, rad/s
@@ -41,7 +41,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """The unit of omega must be multiplied by 2**power."""
+    """Signal that the unit of omega must be multiplied by 2**power."""
 
     def __init__(self, power: int) -> None:
         super().__init__()
@@ -144,8 +144,8 @@ def _fixed(value: Fraction) -> int:
 class _Wave:
     """All torque terms of one frequency, as two unknowns: a sine and a cosine.
 
-    If the angle at the last time is below 1 rad, the unknown is the sine divided by this angle, so
-    that a sine of large amplitude has all its digits.
+    If the angle at the last time is below 1 rad, the unknown is the sine divided by this angle. A
+    sine of large amplitude then has all its digits.
     """
 
     to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
@@ -168,7 +168,7 @@ def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
 class _Equations:
     """Equations 13-15 of the thesis for one scene, as recurrences of Taylor terms.
 
-    The unit of time is `span`, the last time (s), that of omega `unit` (rad/s).
+    The unit of time is `span`, the last time (s), the unit of omega `unit` (rad/s).
     """
 
     def __init__(self, scene: Scene, span: Fraction, unit: Fraction) -> None:

@@ -1,4 +1,4 @@
-"""Reference solutions of scenes, with bounds of their errors.
+"""Reference solutions of scenes, with estimates of their errors.
 
 A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by the
 Taylor series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. The
@@ -52,12 +52,12 @@ class Reference:
 
     @property
     def angle_error(self) -> float:
-        """Return a bound of the attitude's error (rad): the estimate plus rounding."""
+        """Return the attitude's estimated error (rad), including rounding."""
         return self.angle_estimate + 4.0 * _HALF_ULP
 
     @property
     def error(self) -> float:
-        """Return a bound of omega's error (rad/s): the estimate plus the largest rounding error."""
+        """Return omega's estimated error (rad/s), including the largest rounding error."""
         largest = float(np.max(np.abs(self.omega), initial=0.0))
         return self.estimate + _HALF_ULP * largest
 
@@ -72,12 +72,14 @@ def reference(
     """Return the reference solution of `scene` at `times` (s).
 
     The times have one sign and lead away from 0; the first may be 0. The estimated error is the
-    largest difference of two integrations with different order and steps; with `precise`, four
-    times that. A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified
-    too much. `effort` is a factor on a work limit of some ten seconds, forecast from the first
-    steps; None means 100 000 steps. Attitudes always result from the series. A torque that depends
-    on the state must be recorded; the rows end before it is singular. Raise InputError if the times
-    are not in order, a changing moment reaches 0, or the series is impossible or too long.
+    largest difference of two integrations with different order and steps; if `precise`, four times
+    that. A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified too
+    much. Attitudes always result from the series.
+
+    `effort` is a factor on a work limit of some ten seconds, forecast from the first steps; None
+    means 100 000 steps. A torque that depends on the state must be recorded; the rows end before it
+    is singular. Raise InputError if the times are not in order, a changing moment reaches 0, or the
+    series is impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)
@@ -146,7 +148,7 @@ def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
 
 
 def _digits_before_the_point(scene: Scene, time: Decimal) -> int:
-    """Return an upper bound of the digits before the point of all numbers up to `time` (s)."""
+    """Return an upper bound on the digits before the point of all numbers up to `time` (s)."""
     law = scene.body_torque
     omega = max(Decimal(abs(w)) for w in scene.omega)
     rate = max(map(abs, exact_coefficients(scene))) * omega

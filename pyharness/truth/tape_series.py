@@ -1,7 +1,7 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
-The recurrences, order by order together with the solution, are those of Jorba and Zou 2005,
-Experimental Mathematics 14.
+A tape is a list of operations, whose results are in numbered slots. The recurrences, order by order
+together with the solution, are those of Jorba and Zou 2005, Experimental Mathematics 14.
 """
 
 from bisect import bisect_left, bisect_right
@@ -35,7 +35,7 @@ class _Power(NamedTuple):
     """A product of many factors.
 
     `factors` counts how often each slot is a factor. `scale` is the decimal logarithm of the
-    product's largest coefficient. `divisors` are the slots relative to which it is small or large.
+    product's largest coefficient. `divisors` are slots with which its size is compared.
     """
 
     factors: Counter[int]
@@ -62,11 +62,11 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order at which the tape's powers show.
+    the lowest order at which the tape's powers are visible.
     """
 
     def __init__(self, tape: Tape, change: Decimal = Decimal(0)) -> None:
-        """Store the operations; `change` is relative, of the terms of sums with changing sign."""
+        """Store the operations; `change` is relative, of the terms of sums, with alternate sign."""
         self._operations = [(each, _sum(each.linear, change)) for each in tape.operations]
         self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
@@ -124,7 +124,7 @@ class TapeSeries:
         return sum((factor * self._slots[slot][k] for factor, slot in terms), start)
 
     def _coefficient(self, operation: Operation, linear: _Sum, slot: int, k: int) -> Decimal:
-        """Return Taylor coefficient k of an operation; its series has 0 to k - 1."""
+        """Return Taylor coefficient k of an operation; its series has coefficients 0 to k - 1."""
         kind, operands, _, table = operation
         if kind == "linear":
             return self._combined(linear, k)
@@ -187,8 +187,8 @@ class TapeSeries:
 
         An exponential, or the derivative of a hyperbolic tangent, may be invisible at the beginning
         of a step and large a little later. Its argument therefore changes by at most half the
-        order, unless the function stays invisible; so do the terms of a product of many factors, in
-        the mean. A divisor has no zero in the circle around the beginning.
+        order, unless the function remains invisible; so do the terms of a product of many factors,
+        in the mean. A divisor has no zero in the circle around the beginning.
         """
         for operation, _ in self._operations:
             most = self._largest_change(operation)
@@ -205,7 +205,7 @@ class TapeSeries:
         return length
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
-        """Return whether a product is visible in a step, but perhaps not in the computed terms.
+        """Return whether a product may be visible in a step, but not in the computed terms.
 
         The mean order of a product's terms is the sum of the mean orders of its factors.
         """
@@ -222,7 +222,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return by how much an operation's last operand may change in a step; None is no limit."""
+        """Return the largest change of an operation's last operand in a step; None is no limit."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -254,7 +254,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products that are no factors of larger ones, and the most factors."""
+    """Return the products that are no factors of larger ones, and the largest number of factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}
@@ -281,7 +281,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return by slot the divisors, and arguments of roots, that contain it."""
+    """Return by slot the divisors of quotients, and arguments of roots, that depend on it."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -307,7 +307,7 @@ def _sum(linear: Linear | None, change: Decimal) -> _Sum:
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
-    """Return coefficients 0 to 3 of the piece of a table after (or before) `time` (s)."""
+    """Return coefficients 0 to 3 of a table's piece after (or before) `time` (s)."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece])
     s = time - breaks[piece]

@@ -1,4 +1,4 @@
-"""Order of the times at which a reference or a proof is requested."""
+"""Check of the order of the times at which a reference or a proof is requested."""
 
 import itertools
 import math

@@ -101,7 +101,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of the different results: counts and ending or, if those agree, rows."""
+    """Return the names of the results that differ: counts and ending or, if these agree, arrays."""
     counts = (
         ("steps", first.steps, second.steps),
         ("evaluations", first.evaluations, second.evaluations),

@@ -1,4 +1,4 @@
-"""Batches of scenes that differ in arrays of quantities."""
+"""Batches of scenes; arrays hold the quantities in which the scenes differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -33,10 +33,10 @@ _EFFORT = 1e9  # in effect no work limit: the caller has requested the whole bat
 class Solver:
     """The method, or the program of the thesis, that solves a batch; the other is None.
 
-    `t_end` (s) is by default the step size times the number of steps. For programs alone, `listing`
-    selects the active defects (``original``, ``corrected``), `reading` the interpretation of
-    doubtful cards, `lipschitz` the limit (1/s) of the stop test, and `may_stop` whether this test
-    ends a run.
+    `t_end` (s) is by default the step size times the number of steps. The rest is for programs:
+    `listing` selects the active defects (``original``, ``corrected``), `reading` the interpretation
+    of doubtful cards. `lipschitz` is the limit (1/s) of the stop test, and `may_stop` whether this
+    test may end a run.
     """
 
     method: str | None = "auto"
@@ -56,9 +56,9 @@ class Batch:
     Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
     and `stop_variable`, and call `rows` and `by_method`.
 
-    `scene` has the quantities that all scenes share. `arrays` has the others, with a row for each
-    scene, by argument of `solve_many` and `run_many`; `omega0` is always present. `listing` is None
-    for a method. `t_end` (s) has shape (n,). `attitude` is for methods only.
+    `scene` has the quantities that all scenes share. `arrays` has the others, each with a row per
+    scene; its keys are arguments of `solve_many` and `run_many`, always including `omega0`.
+    `listing` is None for a method. `t_end` (s) has shape (n,). `attitude` is for methods only.
     """
 
     scene: Scene
@@ -105,7 +105,7 @@ class Batch:
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return each stopping variable's position in STOP_VARIABLES, from 1, or 0; shape (n,)."""
+        """Return the number in STOP_VARIABLES, from 1, of each run's stopping variable, or 0."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -116,7 +116,7 @@ class Batch:
     def rows(self, samples: int) -> Array:
         """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
 
-        A method starts anew for each time, so that errors do not accumulate; for a program the
+        A method starts from time 0 for each of them, so that errors do not accumulate. A program's
         times are those of `sample_steps`.
         """
         if not self.is_program:
@@ -128,7 +128,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are quaternions, scalar first, from the body to its axes at time 0.
+        They are quaternions, scalar first, from the body's axes to its axes at time 0.
         """
         ends = []
         for each in self._samples(samples):
@@ -152,14 +152,14 @@ class Batch:
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return a batch without results, with the initial `omega0` (rad/s)."""
+        """Return this batch with the initial `omega0` (rad/s), without results."""
         return replace(self, arrays={**self.arrays, "omega0": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        Scenes are run one by one, without the codes IER, if `torque_rate` differs or the program
-        refuses a scene. Only the refused scene has the status REFUSED.
+        Scenes are run one by one, without the codes IER, if they differ in `torque_rate` or the
+        program refuses one of them. Only the refused scenes have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -171,7 +171,7 @@ class Batch:
     def scene_of(self, i: int) -> Scene:
         """Return scene `i` (from 0), with an attitude only if the torque needs it.
 
-        Raise InputError for invalid numbers.
+        Raise InputError if a number is invalid.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         scene = self.scene

@@ -1,6 +1,6 @@
 """Candidates, a common interface of methods, prepared solvers and programs.
 
-A prepared solver, made by `prepare`, solves one scene by one method, for many initial states.
+A prepared solver, made by `prepare`, solves one scene by one method, from many initial states.
 Tolerances are relative to the largest component of omega; `effort` multiplies the work limit.
 """
 
@@ -105,7 +105,7 @@ def prepared_candidate(name: str, tolerance: float | None, primed: bool = False)
 
 
 def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate like that of `prepared_candidate`, for omega and attitude."""
+    """Return a candidate like `prepared_candidate`'s that also computes the attitude."""
 
     def ready(scene: Scene, time: float) -> Ready:
         solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)

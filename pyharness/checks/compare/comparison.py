@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of SciPy's methods, on one scene.
 
-The difference between Fortran and its twin is in units in the last place. Errors against the
-reference (rad/s) have no meaning below the reference's error.
+Differences between Fortran and twin are in units in the last place. Errors against the
+reference (rad/s) have no meaning below the reference's own error.
 """
 
 import itertools
@@ -123,7 +123,7 @@ class Comparison:
 
     @property
     def digits(self) -> float | None:
-        """Return the decimal digits that amplified rounding leaves in binary64, or None."""
+        """Return the decimal digits that remain after amplified rounding in binary64, or None."""
         return None if self.growth is None else digits_left(ROUNDING * self.growth)
 
     @property
@@ -142,7 +142,7 @@ class Comparison:
 
         With programs, a result is unexpected if Fortran and twin differ, or a corrected program
         misses its order. Without programs, it is unexpected if a method's error exceeds the limit
-        that follows from the tolerance, or rows are missing.
+        that follows from its tolerance, or rows are missing.
         """
         found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
         for each in self.programs:
@@ -216,8 +216,8 @@ def compare_programs(
     effort : float
         Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too. The initial attitude is the scene's, by default the axes
-        of space. A program's attitude is integrated from its rows of omega by a method of order 4.
+        Whether attitudes are compared too. The initial attitude is the scene's, by default the
+        identity. A program's attitude is integrated from its rows of omega by a method of order 4.
     word : str
         The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
         compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
@@ -292,9 +292,9 @@ def listings_for(
     readings: Sequence[str] = (),
     conjectures: Sequence[str] | None = None,
 ) -> list[Listing]:
-    """Return the listings to compare, in order: original, selected and corrected, for each program.
+    """Return the listings to compare: original, selected and corrected, for each program.
 
-    The selection applies `fix` and `keep` to `base`; if `base` alone is specified, it is the only
+    The selection applies `fix` and `keep` to `base`. If `base` alone is specified, it is the only
     listing. Raise InputError for a name that none of `programs` has.
     """
     chosen = list(programs)
@@ -328,7 +328,7 @@ def listings_for(
 def method_finding(
     scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
 ) -> MethodFinding:
-    """Return the results of a method at the scene's steps, or the message of its InputError."""
+    """Return a method's results at the scene's steps, or the message of its InputError."""
     start = time.perf_counter()
     try:
         trajectory = method_candidate(name, tolerance, effort).rows(scene)

@@ -1,4 +1,4 @@
-"""Comparison of methods with each other and with the reference, on one scene without programs."""
+"""Comparison of methods on one scene with each other and with the reference."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -85,8 +85,8 @@ def measured_order(
 ) -> Order:
     """Measure the order with which omega of a compiled program converges to `truth`.
 
-    The state is `sensitive` if the error may be amplified rounding. A program without convergence
-    has the state `misses` only if a textbook method of the same order converges.
+    The state is `sensitive` if the error may be amplified rounding. A program that does not
+    converge has the state `misses` if a textbook method of the same order does.
     """
 
     def omega(finer: Scene) -> Array:
@@ -121,9 +121,9 @@ def order_of(
     """Measure the order of a numerical solution by halving the step size.
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
-    The measurement ends when `pairs` consecutive halvings have an order of at least `due` - 0.5, or
-    as many a smaller one, or when the error is only rounding. A run has at most `most_steps` steps;
-    by default 2**18, or those of eight halvings if these are more.
+    The measurement ends when `pairs` consecutive halvings all have an order of at least `due` - 0.5
+    or all a smaller one, or when the error is only rounding. A run has at most `most_steps` steps,
+    by default 2**18 or, if more, those of eight halvings.
     """
     n = len(truth.time)
     if n < scene.steps:
@@ -213,7 +213,7 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:
-    """Return whether the matrix of a collocation program has a condition of 1e15 or overflows."""
+    """Return whether a collocation program's matrix overflows or has a condition number of 1e15."""
     from pyharness.checks.theory.collocation_matrices import PARTS
 
     if program not in PARTS:

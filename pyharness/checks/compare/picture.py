@@ -54,8 +54,8 @@ def _curves(comparison: Comparison) -> list[_Curve]:
 def comparison_picture(comparison: Comparison) -> Picture:
     """Return a picture with one column per program or method.
 
-    Its panels show the components of omega (rad/s), their error, and the error of any attitude
-    (rad).
+    Its panels show the components of omega and their largest error (rad/s), and the error of the
+    attitude (rad) if it is compared.
     """
     from matplotlib.figure import Figure
 

@@ -90,7 +90,7 @@ def comparison_report(comparison: Comparison) -> Report:
 
 
 def verdict(comparison: Comparison) -> list[str]:
-    """Return sentences that say whether results are expected, sensitive or not judged."""
+    """Return sentences on which results are as expected, unexpected, sensitive or not judged."""
     told = [f"UNEXPECTED: {each}" for each in comparison.unexpected] or [_as_expected(comparison)]
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))

@@ -25,7 +25,7 @@ def seconds(
     clocks: Sequence[Clock] | None = None,
     slow: float = SLOW,
 ) -> list[float]:
-    """Return the time of one call of each function in `runs` (s), over several rounds.
+    """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
     In each round a function is called for about `length` seconds. The first call only limits the
     rounds: to three if it takes `slow` seconds or more, to one from five times `slow`. `statistic`
@@ -66,7 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError if the Python code of a ``with`` block takes longer than `limit` (s).
 
-    Signals arrive in the main thread only.
+    It works in the main thread only, where signals arrive.
     """
 
     def end(*_: object) -> None:

@@ -35,7 +35,7 @@ CHANGE = Basis(
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts from time 0, shape (n,), and the largest `change` between two rows."""
+    """The drifts from time 0, shape (n,), and the largest `change` between neighbouring rows."""
 
     times: Array
     energy: Array
@@ -52,8 +52,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the change between rows.
 
-    The level is the first whose limits allow enough rows, else the last. The limit is None if the
-    errors are too large.
+    The level is the first step size or tolerance whose limits allow enough rows, else the last. The
+    limit is None if the errors are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)
@@ -99,7 +99,10 @@ def _angle(first: Array, second: Array) -> Array:
 
 
 def growth_power(times: Array, drift: Array) -> float | None:
-    """Return the power of time with which the largest drift grows; None if it is rounding."""
+    """Return the power of time with which the largest drift grows.
+
+    Return None if the drift is 0 in the first quarter of the time, or not finite.
+    """
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
     if not math.isfinite(late) or early <= 0.0:

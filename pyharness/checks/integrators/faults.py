@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-A fault is recognised if an integrator converges to its motion: our solution of another scene or in
-other conventions.
+A fault is recognised if an integrator converges to its motion, which is our solution of another
+scene or in other conventions.
 """
 
 import math
@@ -35,7 +35,7 @@ class Fault:
     """A fault of an integrator: its name, a sentence on it, and its motion.
 
     `motion` takes a scene, times (s) and a step size (s), and returns None if the fault has no
-    effect. With `of_step`, its states approach the true ones as the step decreases.
+    effect. If `of_step`, its states approach the true ones as the step decreases.
     """
 
     name: str
@@ -74,7 +74,7 @@ def _law(scene: Scene, t: Any) -> list[Any]:
 
 
 def _with_gyroscopic(x: float, y: float, z: float) -> Callable[[Scene, Array, float], State]:
-    """Return the motion whose gyroscopic term -omega x (I omega) is multiplied by x, y and z."""
+    """Return a motion whose gyroscopic term -omega x (I omega) is multiplied by x, y and z."""
 
     def motion(scene: Scene, times: Array, step: float) -> State:
         moments = scene.moments
@@ -171,8 +171,8 @@ def as_output(name: str, attitude: Array, scene: Scene) -> Array:
 def _space_rates(scene: Scene, times: Array, step: float) -> State:
     """Return the motion with q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
-    It is computed for the conjugate p of q and for -omega: p' = p (0, -omega)/2, and -omega
-    satisfies Euler's equations with opposite gyroscopic term and torque.
+    The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
+    opposite gyroscopic term and torque; the motion is computed for p and -omega.
     """
     moments = scene.moments
     assert moments is not None

@@ -81,9 +81,10 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    ``again(name)`` returns the command that repeats the checks in a scene; ``told`` receives the
-    number of finished problems and the next name. `due` is the required order, `patience` the
-    longest wait (s). An invalid answer ends the checks. Raise InputError if the command is empty.
+    ``again(name)`` returns the command that repeats the checks in a scene. ``told`` receives the
+    number of finished problems and the name of the next. `due` is the required order, `patience`
+    the longest wait (s) for an answer. An invalid answer ends the checks. Raise InputError if the
+    command is empty.
     """
     found = Verdict(command)
     where = "start"
@@ -122,7 +123,8 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow, and a low order explains that a higher one is missing.
+    A fault also explains an overflow of its own motion; a low order explains why a higher one is
+    missing.
     """
     faults = [each for each in found.findings if each.name not in FIRST_ORDER]
     named = {each.name for each in faults}
@@ -230,7 +232,7 @@ def _same(one: Array, other: Array) -> Any:
 
 
 def _returned(ask: Ask, judged: Judged) -> list[Check]:
-    """Return checks that the torque-free body returns after omega, and so time, is reversed."""
+    """Return checks that a torque-free body returns to its start after omega is reversed."""
     problem, level = judged.problem, LEVELS // 2
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:

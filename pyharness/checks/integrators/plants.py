@@ -1,4 +1,4 @@
-"""Planted faults in requests to an integrator and in its answers, and their self-test."""
+"""Faults planted in an integrator's requests and answers, and the self-test that uses them."""
 
 import itertools
 import json
@@ -73,7 +73,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis by h rad, h the step size in s."""
+    """Rotate the initial angular momentum about a body axis by h rad; h is the step size in s."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)

@@ -1,6 +1,6 @@
 """Random scenes in which an integrator is judged, and its errors in them.
 
-A level, from 0 to `LEVELS` - 1, determines a step size (s) and a tolerance.
+A level, from 0 to `LEVELS` - 1, determines a step size (s) and a tolerance; both decrease with it.
 """
 
 import math
@@ -21,9 +21,9 @@ from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 
 LEVELS = 8
-"""The number of step sizes or tolerances in each scene."""
+"""The number of levels."""
 DRAWS = 2
-"""The default number of random scenes of each kind."""
+"""The default number of random scenes of each kind of torque."""
 PARTS = ("omega", "attitude")
 """The parts of a state whose errors are measured."""
 _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerances
@@ -106,7 +106,7 @@ class Problem:
         return request(self.scene, times, self.step_size(level), tolerance)
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
-        """Return the errors of omega (relative) and attitude (rad, or None), maybe infinite."""
+        """Return the errors of omega (relative) and attitude (rad, or None), possibly infinite."""
         assert self.truth.attitude is not None
         return errors_between(State(self.truth.omega, self.truth.attitude), motion)
 
@@ -130,8 +130,8 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    They are proportional to the power `order` of step size (s) or tolerance; None if they are
-    rounding.
+    They are proportional to the power `order` of the step size (s) or tolerance; `order` is None if
+    they are rounding.
     """
 
     part: str
@@ -141,7 +141,7 @@ class Convergence:
 
     @property
     def is_first(self) -> bool:
-        """Return whether the order is about 1, also over several steps."""
+        """Return whether the order is about 1, over the last pair and over several steps."""
         if self.order is None:
             return False
         far = _power(self.errors[-_SEVERAL] / max(self.errors[-1], _LEAST),
@@ -150,7 +150,7 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the errors decrease with order 1 at least, up to its slack."""
+        """Return whether the errors decrease with an order of at least 1, up to `ORDER_SLACK`."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property
@@ -159,7 +159,7 @@ class Convergence:
         return self.order is None or self.order >= _ORDER_ONE
 
     def predicted(self, level: int) -> float:
-        """Return the error at a level, extrapolated by the order from the next level."""
+        """Return the error at a level, extrapolated from the next level by the order."""
         ratio = self.settings[level] / self.settings[level + 1]
         return self.errors[level + 1] * math.pow(ratio, self.order or 0.0)
 
@@ -170,8 +170,8 @@ def convergence(
     """Return the measured order of convergence of errors above `floor`.
 
     It is the order of the last pair. With `overall`, for tolerances, whose errors decrease
-    irregularly, it is the smaller of the orders from the first and from the fourth last to the
-    last.
+    irregularly, it is the smaller of two orders: from the first setting to the last, and from the
+    fourth last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -210,9 +210,9 @@ class Judged:
 
     @cached_property
     def lost(self) -> int:
-        """Return the number of rows that are not finite and should be.
+        """Return the number of rows that should be finite and are not.
 
-        A level may overflow if the order predicts for it an error of 1 or more from the next level.
+        A level may overflow if the order predicts, from the next level, an error of 1 or more.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -224,7 +224,10 @@ class Judged:
         return rows
 
     def error(self, level: int) -> float:
-        """Return the larger error of omega (relative) and attitude (rad), with a lower limit."""
+        """Return the larger error of omega (relative) and attitude (rad).
+
+        It is at least the tolerance or, with a step size, the possible rounding error.
+        """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
         least = problem.tolerance(level) if by_tolerance else problem.floor(finest.rounding)

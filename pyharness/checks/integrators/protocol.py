@@ -17,7 +17,7 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.model.trajectory import Array
 
 CONTROLS = ("step_size", "tolerance")
-"""The fields of a request that may determine an integrator's accuracy."""
+"""The fields of a request by which an integrator may control its accuracy."""
 ROUNDINGS = {"binary64": 2.0**-53, "binary32": 2.0**-24}
 """The relative rounding error of each arithmetic that an answer may name."""
 
@@ -27,8 +27,9 @@ class Motion:
     """An integrator's answer: the states at the requested times, or its refusal.
 
     `omega` is about the body axes (rad/s), shape (n, 3). `attitude` is from body to space, scalar
-    first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before. The
-    field `control` of the request sets the accuracy; `rounding` is relative.
+    first, normalised, shape (n, 4); `norm` is the largest difference of its norm from 1 before
+    normalisation. `control` is the field of the request that set the accuracy; `rounding` is
+    relative.
     """
 
     omega: Array

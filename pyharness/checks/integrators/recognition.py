@@ -29,7 +29,7 @@ FIRST_ORDER = {
     "torque-held": "the order is 1 under a torque that varies with time, and higher otherwise: "
     "the torque of a step is that at one end of the step, or at another wrong time",
 }
-"""The faults that measured orders show, with a sentence on each."""
+"""The faults that measured orders reveal, with a sentence on each."""
 UNKNOWN = "unknown"
 """The name of any unknown fault."""
 
@@ -44,7 +44,7 @@ class Finding:
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
-    """Return the known faults that explain the errors, else those that the orders show."""
+    """Return the known faults that explain the errors, else those that the orders reveal."""
     names: dict[str, tuple[str, list[str]]] = {}
 
     def add(name: str, says: str, problem: str) -> None:

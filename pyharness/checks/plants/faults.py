@@ -1,4 +1,4 @@
-"""Faults of a chosen size: in which function, and what changes.
+"""Faults of a chosen size: which function is faulty, and how its result changes.
 
 A fault is planted in the running process, and removed when its context ends.
 """
@@ -75,7 +75,7 @@ def change_result(target: str, change: Change, call: int | None = None) -> Fault
 
 
 def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) -> Fault:
-    """Return a fault that is planted inside another context."""
+    """Return a fault that is planted within the context `around`."""
 
     @contextmanager
     def both(size: float) -> Iterator[None]:
@@ -86,7 +86,7 @@ def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) ->
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of the attribute `name` of a result, if it is not None."""
+    """Return a change of the attribute `name` of a result; it has no effect on None."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 def plus(found: Any, size: float) -> Any:
-    """Return a number increased by `size`, or by its integer part if the number is an integer."""
+    """Return a number plus `size`, or plus its integer part if the number is an integer."""
     return found + (int(size) if isinstance(found, int) else size)
 
 

@@ -37,7 +37,7 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test, with the JSON fields `extra`; `again` repeats it."""
+    """Return the report of a self-test, which `again` repeats; `extra` are fields of its JSON."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

@@ -1,4 +1,4 @@
-"""Python twins with one fault: copies of the sources with one replacement."""
+"""Python twins with one fault, made from copies of their sources with one replacement."""
 
 import importlib
 import itertools
@@ -41,7 +41,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty twin, which replaces the Fortran program too if `both`."""
+    """A program with a faulty twin, which also replaces the Fortran program if `both`."""
 
     module: ModuleType
     both: bool = True

@@ -105,7 +105,7 @@ _FIXED = [code for name, code in _CODES.items() if name.startswith(("gauss", "rk
 
 
 def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
-    """Return too large an omega for fixed-step methods and Gauss collocation."""
+    """Return an enlarged omega for fixed-step methods and Gauss collocation."""
     omega, status, steps, found = answer
     wrong = omega * (1.0 + size)
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
@@ -149,7 +149,7 @@ def _shifted(
     size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
     *rest: float,
 ) -> Trajectory:  # fmt: skip
-    """Return results for later times, labelled with `times`; only the true solution shows it."""
+    """Return results for later times, labelled with `times`; only the true solution reveals it."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)

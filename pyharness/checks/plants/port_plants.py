@@ -1,4 +1,4 @@
-"""Planted faults in a port's answers and in the requests to it."""
+"""Faults planted in the requests to a port and in its answers."""
 
 import math
 from collections.abc import Callable

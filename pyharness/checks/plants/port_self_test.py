@@ -17,7 +17,7 @@ _MOST_CELLS = 24  # cells in which the faults are planted
 
 
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
-    """Yield the outcomes without a fault, then with each fault.
+    """Yield the outcomes without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
     """
@@ -83,7 +83,7 @@ def _faulty(
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    """Return a valid answer as a dictionary, with texts converted to floats."""
+    """Return a valid answer as a dictionary, with numbers written as text converted to floats."""
     answer: dict[str, Any] = json.loads(line)
     answer["rows"] = [[_float(x) for x in row] for row in answer["rows"]]
     if answer["stop"] is not None:

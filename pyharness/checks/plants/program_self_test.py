@@ -25,7 +25,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return whether checks other than of the golden record detect a planted fault."""
+    """Return whether any checks detect a planted fault, apart from the golden record's."""
     with plant.planted(plant.size):
         failed, example = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
@@ -33,7 +33,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the number of failed checks by kind, and one id, if possible not of the record."""
+    """Return the number of failed checks by kind, and one id, preferably not of the record."""
     names = [check.id for check in verify(chosen) if not check.passed]
     kinds = Counter(name.partition("/")[0] for name in names)
     return kinds, min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

@@ -1,7 +1,7 @@
 """Random scenes for each kind of torque, on which no method was tuned.
 
-Torques and frequencies are proportional to the initial angular velocity, so that they affect slow
-and fast bodies alike.
+Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
+bodies alike.
 """
 
 import math

@@ -23,12 +23,12 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound (1/s) of the rate of change of torque-free omega, over `largest` (rad/s)."""
+    """Return a bound (1/s) on torque-free abs(omega') / `largest`; omega <= `largest` (rad/s)."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
 def in_steps(scene: Scene, time: float) -> Scene:
-    """Return the scene in 10 to 20 000 steps, about 0.002 over `speed`, that end at `time` (s)."""
+    """Return the scene in 10 to 20 000 steps, of about 0.002 / `speed`, until `time` (s)."""
     rate = speed(scene, max(map(abs, scene.omega)))
     count = max(10, min(20_000, math.ceil(rate * abs(time) / 0.002)))
     return replace(scene, step_size=abs(time) / count, steps=count)
@@ -60,8 +60,8 @@ def _separatrix() -> Iterator[Circumstance]:
     """Yield perturbed rotations about the axis of the middle moment.
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
-    end times are before the first flip, and in the first and the fifth. Other scenes are on the
-    separatrix.
+    end times are before the first flip, and in the first and the fifth. Other scenes start on the
+    separatrix, where the body flips only once.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
@@ -126,7 +126,7 @@ _BODIES: dict[str, Triple] = {
 
 
 def _shapes() -> Iterator[Circumstance]:
-    """Yield needles, coins, plates, impossible bodies, with axes in several orders, and Case 6."""
+    """Yield needles, coins, plates and impossible bodies, in several orders of axes, and Case 6."""
     for name, moments in _BODIES.items():
         for axes in _ORDERS:
             first, second, third = (moments[axis] for axis in axes)

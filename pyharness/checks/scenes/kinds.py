@@ -40,7 +40,7 @@ def _near_separatrix(source: Random) -> Scene:
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
-    """Return omega (rad/s) of `spin` about axis 2, plus a perturbation of at most `faint`."""
+    """Return omega (rad/s): `spin` about axis 2, plus a perturbation of at most `faint`."""
     return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
 
 
@@ -74,7 +74,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with two to six waves of 1e-6 to 630 rad/s, some as sine and cosine."""
+    """Return a random scene with waves of 1e-6 to 630 rad/s, some as both sine and cosine."""
     scene = _plain(source)
     some: list[list[Wave]] = [[], []]
     for _ in range(source.randint(2, 6)):

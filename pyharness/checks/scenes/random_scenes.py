@@ -39,13 +39,13 @@ class Draw:
 
 
 def weekly_seed(day: datetime.date | None = None) -> str:
-    """Return the week of `day`, by default today, as in 2026-W47, for use as a seed."""
+    """Return the week of `day`, by default today, as a seed such as 2026-W47."""
     year, week, _ = (day or datetime.date.today()).isocalendar()
     return f"{year}-W{week:02d}"
 
 
 def draw(seed: str, number: int) -> Draw:
-    """Return the random inputs of check `number`, equal in all versions of Python."""
+    """Return the random inputs of check `number`, the same in all versions of Python."""
     # A generator for each draw, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
     scene = KINDS["plain"](source)

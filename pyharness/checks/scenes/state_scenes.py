@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-Torques are sums of recorded functions or ready terms. They are proportional to the gyroscopic
-torque, so that they affect slow and fast bodies alike. End times may be negative.
+Torques are sums of recorded functions or of ready-made terms. They are proportional to the
+gyroscopic torque, so that they affect slow and fast bodies alike. End times may be negative.
 """
 
 from collections.abc import Callable
@@ -74,7 +74,7 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
-    """Return a random scene under one or two ready terms of `names`, and its end time (s)."""
+    """Return a random scene under one or two ready-made terms of `names`, and its end time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
     size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
     moments = [size * x for x in _moments(source)]
@@ -93,7 +93,7 @@ def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, f
 
 
 def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
-    """Return a ready term with random arguments, similar in size to the gyroscopic torque."""
+    """Return a ready-made term with random arguments, similar in size to the gyroscopic torque."""
     part = max(moments) * speed * source.uniform(0.05, 1.0)
     vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
     several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
@@ -183,7 +183,7 @@ def orbit(t: Any, rate: float) -> Any:
 
 
 def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
-    """Return a torque r x I r like the gravity gradient, with r the direction to the satellite."""
+    """Return the torque r x I r, like the gravity gradient; r is the direction to the satellite."""
     r = to_body(q, orbit(t, rate))
     return np.cross(r, inertia * r)
 

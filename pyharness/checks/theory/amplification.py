@@ -1,9 +1,14 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
 A perturbation x of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
-multiplies x by a matrix of polynomials in z, h times an eigenvalue of J, in exact fractions; hJ may
-replace z. The matrix has m rows for the m vectors that a program propagates. In the original
-Runge-Kutta program these are two, the result and U(1), at which the first stage is evaluated.
+multiplies x by a matrix of polynomials in z, which is h times an eigenvalue of J, or hJ itself. The
+coefficients are exact fractions. The matrix has m rows for the m vectors that a program propagates.
+In the original Runge-Kutta program these are two: the result, and U(1), at which the first stage is
+evaluated.
+
+A collocation program evaluates the right-hand side along a straight line, its first estimate, and
+corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F). Here F is its
+value at s = 0, and Q its quadratic part.
 """
 
 from dataclasses import dataclass
@@ -50,8 +55,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without row and column of the step's result, if possible.
 
-        This is possible if no other vector depends on the previous result, and if the factor of the
-        previous result in the new one, the omitted eigenvalue, does not depend on z.
+        It is possible if only the new result depends on the old, by a factor that is free of z.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -59,7 +63,7 @@ class Amplification:
         return self
 
     def exact_matrix(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix, of order m n, for n equations x' = J x, from hJ."""
+        """Return the exact matrix for n equations x' = J x, of order m n, from hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -77,8 +81,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of step `step` of a program.
 
     `step`, from 1, matters only with the defect `dt-accumulates`, which moves the collocation
-    points. A collocation program evaluates the right-hand side along a straight line, its first
-    estimate, and corrects once.
+    points.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -89,18 +92,14 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return a collocation program's integral of s**2 / h**3 over a step; exact is 1/3.
-
-    Along the first estimate the right-hand side is F + s J F + s**2 Q(F), where Q is its quadratic
-    part. The integral is the weight of Q(F) in the result. `step` is from 1.
-    """
+    """Return a collocation step's weight of Q(F), the integral of s**2 / h**3; exact is 1/3."""
     points, weights = _quadrature(listing, step)
     found: Fraction = weights @ points**2
     return found
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
-    """Return collocation points and weights, in step sizes."""
+    """Return collocation points and weights, in units of the step size."""
     moved = step if listing.has("dt-accumulates") else 1
     points = [part * moved for part in PARTS[listing.program]]
     return np.array(points, dtype=object), inverse(collocation_matrix(points)).sum(axis=0)

@@ -1,8 +1,8 @@
 """Bounds, by Brouwer's law, of rounding errors over many steps of a torque-free motion.
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
-the power 1/2 of the number of steps, and the phase error with the power 3/2; with biased rounding
-the powers are 1 and 2.
+the power 1/2 of the number of steps, the phase error with the power 3/2. With biased rounding the
+powers are 1 and 2.
 """
 
 import math
@@ -36,12 +36,12 @@ POWER = Basis(
     "fitted power of the number of steps with which errors grow",
     "Brouwer 1937: nearer to the expected power than to the other one (`theory/brouwer.py`)",
 )
-"""Basis of the limits of the result of `exponent`."""
+"""Basis of the limits for the result of `exponent`."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds of the rounding and truncation errors of a step, over the largest abs(omega)."""
+    """Bounds on the rounding and truncation errors of a step, over the largest abs(omega)."""
 
     step: float  # step size, s
     rounding: float  # bound of the rounding error, whose sign is random
@@ -67,7 +67,7 @@ class Orbit:
     turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
-        """Return the bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
+        """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
         # The result is rounded once more. A, B and C have two rounding errors each, which change
@@ -124,8 +124,8 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 
     `step` is in s, `left_out` the truncation error relative to the largest omega. Term k is a sum
     of k products of lower terms, with their errors and at most k + 3 roundings each. The remainder
-    of compensated summation adds at most half a unit in the last place, and the sum rounds each
-    term three times.
+    of compensated summation adds at most half a unit in the last place. The sum rounds each term
+    three times.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -144,13 +144,14 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Return error bounds of a step h (s) of Gauss collocation with s = `stages` stages.
 
-    The sum at each node has s + 3 roundings of the right-hand sides and one of omega, multiplied by
-    the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian. Gauss collocation
-    conserves quadratic invariants for any step size. The truncation error is the integral of the
-    state-transition matrix times the residual, which is zero at the nodes, the zeros of an
-    orthogonal polynomial. Therefore only power s of time in the other factor contributes. By
-    Leibniz's rule its coefficient is a sum over j of multiples of (h J)**j / j! times the Taylor
-    term 2s + 1 - j of omega.
+    The sum at each node has s + 3 roundings of the right-hand sides and one of omega. The inverse
+    of 1 - h A J multiplies it, where A is the tableau's matrix and J the Jacobian. Gauss
+    collocation conserves quadratic invariants for any step size.
+
+    The truncation error is the integral of the state-transition matrix times the residual. The
+    residual is zero at the nodes, the zeros of an orthogonal polynomial, so that only power s of
+    time in the other factor contributes. By Leibniz's rule its coefficient is a sum over j of
+    multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
     """
     from pyharness.checks.theory.tableau import tableau
 
@@ -176,7 +177,7 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
 
 
 def _terms(body: Orbit, scene: Scene, step: float, order: int) -> list[Array]:
-    """Return the Taylor terms of a step (s) from n states (rad/s), shape (n, 3) each."""
+    """Return the Taylor terms of a step (s) from n states (rad/s), each of shape (n, 3)."""
     a = np.array(scene.euler_coefficients)
     terms = [body.states]
     for k in range(1, order + 1):
@@ -193,7 +194,8 @@ def errors(
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, like a method.
+    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, as a method
+    does.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]

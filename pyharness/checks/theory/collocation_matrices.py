@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
-Every float is a fraction, so that exact solutions are computed in fractions. `program` is
-"two-term" or "four-term".
+LEQT1F is the linear solver of the collocation programs. Every float is a fraction, so that exact
+solutions are computed in fractions. `program` is "two-term" or "four-term".
 """
 
 import math
@@ -85,7 +85,7 @@ class Solved:
 
 
 def points(program: str, step: float) -> list[float]:
-    """Return the collocation points (s), rounded as by a program's formulas."""
+    """Return the collocation points (s), with the rounding of a program's formulas."""
     if program == "two-term":
         return [step / 3.0, 2.0 * step / 3.0]
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
@@ -147,7 +147,7 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step (s) so small that 1 is the largest element of each row, and the matrix."""
+    """Return a step (s) so small that each row's largest element is 1, and the matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
@@ -156,11 +156,11 @@ def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
     Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
-    points, so that only c1 is not zero. The second, times the relative deviation, is for deviations
-    from equal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) (Higham 2002,
-    theorem 9.4), with n points, the powers of the step size, the factors L and U of the matrix and
-    the solution X. They do not depend on the step size as long as 1 is the largest element of each
-    row.
+    points, where only c1 is not zero. The second, times the relative deviation, is for deviations
+    from equal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for n points (Higham
+    2002, theorem 9.4). L and U are the factors of the matrix, X is the solution, and powers are
+    those of the step size. The bounds do not depend on the step size as long as each row's largest
+    element is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -178,9 +178,9 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    It reports one if the computed sum N + p equals N, for a scaled pivot p and N rows: if p is at
-    most half a unit in the last place of N, a power of 2 with the unit N 2**(1 - bits). A tie is
-    rounded to even N. The last scaled pivot, proportional to step**(N-1), decides.
+    It reports one if the computed sum N + p equals N, for a scaled pivot p and N rows. Then p is at
+    most half a unit in the last place of N. N is a power of 2 with the unit N 2**(1 - bits); a tie
+    is rounded to even N. The last scaled pivot, proportional to step**(N-1), decides.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

@@ -1,7 +1,7 @@
 """Error amplification by Euler's equations themselves, which affects all methods.
 
-The state-transition matrix Phi(t, s) of the equations linearised along the solution multiplies an
-error of omega at time s to give the error at t.
+An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the equations
+linearised along the solution, is the resulting error at time t.
 """
 
 import math
@@ -38,7 +38,14 @@ _MOST_NODES = 400_000
 
 @dataclass(frozen=True)
 class Conditioning:
-    """The sensitivity of omega at the end of a motion to errors during it."""
+    """The sensitivity of omega at the end of a motion to errors during it.
+
+    The limits contain `made`, the sum of the errors allowed in the steps (relative, or rad), and
+    rounding errors. `limit` amplifies `made`; its `steps` is the number of roundings of omega, 0
+    with compensated summation. It is at most 2, because components up to `largest` differ by no
+    more. `angle_limit` contains the angle that results if omega has its largest rounding error at
+    all times.
+    """
 
     # largest factor from an error of omega at any time to the error at the end, at least 1
     amplification: float
@@ -51,23 +58,13 @@ class Conditioning:
     largest: float  # largest magnitude of any component of omega until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
-        """Return the largest final error of omega that a method may have, over `largest`.
-
-        `made`, the relative sum of the errors allowed in the steps, is amplified. Two bounds of
-        amplified rounding errors are added; the second is proportional to `steps`, the number of
-        roundings of omega (0 with compensated summation). The limit is at most 2, because
-        components up to `largest` differ by no more.
-        """
+        """Return the largest final error that omega may have, over `largest`."""
         allowed = made * self.amplification + self.rounding + steps * self.storing
         # If the limit is NaN, no error is allowed.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
-        """Return the largest error of an attitude at `time` (s), in rad.
-
-        It is the sum of `made` (rad), the attitude's rounding error, and the angle that results
-        from the largest rounding error of omega at all times.
-        """
+        """Return the largest error of an attitude at `time` (s), in rad."""
         turned = self.rounding * (1.0 + math.sqrt(3.0) * self.largest * abs(time))
         return made + turned + ATTITUDE
 
@@ -88,8 +85,8 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     """Return the final sensitivity along the solution `omega` (rad/s, (n, 3)) at `times` (s).
 
-    Times begin at 0, with little change of omega between them. Raise InputError if the
-    amplification exceeds binary64.
+    Times begin at 0, and omega changes little between them. Raise InputError if the amplification
+    exceeds binary64.
     """
     with np.errstate(all="ignore"):
         found = _along(scene, times, omega)
@@ -110,7 +107,7 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
 
 
 def _nodes(scene: Scene, time: float) -> Array:
-    """Return equally spaced times up to `time` (s), with little change of omega between them.
+    """Return equally spaced times up to `time` (s), between which omega changes little.
 
     Raise InputError if more than 400 000 intervals (`_MOST_NODES`) would be needed.
     """
@@ -142,8 +139,8 @@ def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
     """Return the sensitivity of a final state, from state-transition matrices.
 
-    `flow` has the matrix from each time to the last, shape (n, m, m). `state` and `source`, the
-    sums of magnitudes of the terms of its derivative (1/s), have the shape (n, m). Errors are
+    `flow` has the matrix from each time to the last, shape (n, m, m). `state` has the shape (n, m),
+    and so has `source`, the sums of magnitudes of the terms of its derivative (1/s). Errors are
     divided by `largest`.
     """
     steps, sizes = np.diff(times), np.abs(flow)
@@ -170,7 +167,7 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sums of magnitudes of the terms of Euler's equations (1/s2), shape (n, 3).
 
     A sine or cosine is multiplied by 1 plus its angle, because the angle's rounding error is
-    proportional to its size.
+    proportional to the angle.
     """
     products = np.abs(scene.euler_coefficients) * np.abs(
         np.roll(omega, -1, 1) * np.roll(omega, -2, 1)

@@ -1,6 +1,6 @@
-"""Polhodes, and growth rates for all bodies, as data for plots.
+"""Polhodes, the curves of torque-free omega, and growth rates for all bodies, as data for plots.
 
-A polhode, the path of torque-free omega, is shown by the direction of the angular momentum.
+A polhode is represented by the directions of the angular momentum.
 """
 
 import math
@@ -20,8 +20,8 @@ _POINTS = 181
 def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
 
-    L is the angular momentum along the body axes. The last two curves are in the planes of the
-    separatrix, L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), where j = 1 / I (kg m2) and axis 2 has the
+    L is the angular momentum along the body axes. The last two curves are the separatrix, in the
+    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j = 1 / I (kg m2), and axis 2 has the
     middle moment. With two equal moments both planes are perpendicular to the third axis. A sphere
     has no curves.
     """
@@ -51,7 +51,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 
 
 def growth_of_bodies(first: Array, third: Array) -> Array:
-    """Return the growth rate Re Q about each middle axis, over the spin.
+    """Return the growth rate Re Q about each middle axis, divided by the spin.
 
     Q is the fastest rate of equation 32. `first` and `third` are Smelt's numbers K1 = A and K3 =
     -C, from -1 to 1.

@@ -1,9 +1,9 @@
 """Bounds on the sum of the errors of a method's steps, derived without running it.
 
 The bound is the tolerance, or with a fixed step follows from the order. The derivative of omega is
-at most `a` times the product of two components. The k-th derivative is therefore at most k! (a
-W)**k W, with W the largest omega, as for y' = a y**2, y(0) = W. Likewise no term of the method's
-own power series exceeds its term for that equation.
+at most `a`, the largest Euler coefficient, times the product of two components. The k-th derivative
+is therefore at most k! (a W)**k W, with W the largest omega, as for y' = a y**2, y(0) = W. Likewise
+no term of the method's own power series exceeds its term for that equation.
 """
 
 import math
@@ -34,10 +34,10 @@ def steps_of(name: str, run_steps: int, evaluations: int) -> float:
 
 
 def fixed_step_sum(name: str, angle: float, steps: int) -> float:
-    """Return a bound of the relative truncation errors of all fixed steps.
+    """Return a bound on the sum of the relative truncation errors of all fixed steps.
 
     `angle` (rad) is the product of the largest Euler coefficient, the largest omega and the step.
-    The bound is infinite for 0.5 and above.
+    From 0.5 on, the bound is infinite.
     """
     if angle >= 0.5:
         return math.inf
@@ -50,7 +50,7 @@ def fixed_step_sum(name: str, angle: float, steps: int) -> float:
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
 
-    This equation is Euler's with A = B = C = 1 and equal components.
+    This is one of Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))

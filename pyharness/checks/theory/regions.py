@@ -1,4 +1,7 @@
-"""Regions of linear stability in the plane of z (`amplification`), as data for plots."""
+"""Regions of linear stability in the plane of z, as data for plots.
+
+`amplification` defines z, the step size times an eigenvalue.
+"""
 
 from dataclasses import dataclass
 

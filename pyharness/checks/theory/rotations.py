@@ -1,12 +1,12 @@
 """Steady rotations under constant torque, and their linear stability.
 
 Grammel's method, equation 32 of the thesis (III.4.a): omega is a steady rotation (a, b, c) plus a
-small perturbation proportional to exp(Q t). With A, B, C of Euler's equations and M = N / I, torque
-over moment, (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3. The rates Q (1/s) are the
-roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
+small perturbation proportional to exp(Q t). Let A, B, C be the coefficients of Euler's equations,
+and M = N / I torque over moment. Then (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3.
+The rates Q (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-Below, `share` is the initial perturbation over the rotation, and a place is a pair of a description
-and omega (rad/s). Only some members of a continuous family are reported.
+Below, `share` is the initial perturbation over the rotation. A place is a pair of a description and
+omega (rad/s). Only some members of a continuous family are reported.
 """
 
 import cmath
@@ -76,8 +76,8 @@ class SteadyRotations:
 def steady_rotations(scene: Scene, disturbance: float) -> SteadyRotations:
     """Return the steady rotations of a scene, and the development of perturbations.
 
-    `disturbance` is the perturbation over the rotation. Raise InputError if the torque varies with
-    time, or if a rotation or its rates exceed binary64.
+    `disturbance` is the perturbation divided by the rotation. Raise InputError if the torque varies
+    with time, or if a rotation or its rates exceed binary64.
     """
     if scene.body_torque.varies:
         raise InputError(
@@ -160,8 +160,8 @@ def _growing(
 ) -> float | None:
     """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    Linear theory is valid until then. The time is infinite if these terms are zero, None if they
-    exceed binary64. `rate` is the fastest Q, `matrix` the Jacobian (1/s).
+    Linear theory is valid until then. The time is infinite if these terms are zero, and None if
+    they exceed binary64. `rate` is the fastest Q, `matrix` the Jacobian (1/s).
     """
     # The eigenvector of `rate` is the null vector of the matrix less the rate.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -200,9 +200,9 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     """Return the shortest time (s) between flips about the middle axis.
 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
-    near (2 / lambda) ln(4 / k') for a small perturbation, where K is the complete elliptic integral
-    with the complementary modulus k', and lambda is near the growth rate. It is shortest for a
-    perturbation along the other axis with the smaller coefficient. Return None if the signs are
+    where K is the complete elliptic integral with the complementary modulus k', and lambda is near
+    the growth rate. For a small perturbation it is near (2 / lambda) ln(4 / k'). It is shortest for
+    a perturbation along the other axis with the smaller coefficient. Return None if the signs are
     impossible for a middle axis.
     """
     first, second, third = coefficients
@@ -287,7 +287,7 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
     """Return a text and places for a torque perpendicular to the axis of symmetry, `axis`.
 
-    `products` are w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch of the
+    `products` are the w2 w3, w3 w1 and w1 w2 that balance the torque (rad2/s2). One branch of the
     hyperbola is shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3

@@ -30,8 +30,8 @@ _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0
 def rotations_picture(scene: Scene) -> Picture:
     """Return the polhodes of a scene with moments, beside the growth rates of all bodies.
 
-    The right panel shows the growth rate about the middle axis over the spin, with the cases of
-    Table 1.
+    The right panel shows the growth rate about the middle axis, divided by the spin, and marks the
+    cases of Table 1.
     """
     from matplotlib.figure import Figure
 
@@ -79,7 +79,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return points' coordinates to the right, upwards and to the viewer, `toward`."""
+    """Return the points' coordinates to the right, upwards, and towards the viewer (`toward`)."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward

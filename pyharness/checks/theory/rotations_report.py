@@ -1,4 +1,4 @@
-"""The report of `rotations`."""
+"""The report of the command `rotations`."""
 
 from collections.abc import Sequence
 from functools import partial

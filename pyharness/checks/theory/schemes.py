@@ -1,8 +1,9 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
 A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
-is `Numbers`, or `Series`, power series in the step size, which yield each term of the truncation
-error. Schemes share no code with the methods.
+is `Numbers`, or `Series` for power series in the step size, which yield each term of the truncation
+error. Schemes share no code with the methods. The derivative of the right-hand side F in the
+direction F is half of F(omega + F) - F(omega - F), because F is quadratic.
 """
 
 import math
@@ -26,7 +27,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
-        """Store the equations and a step (s); with `sizes`, terms are replaced by magnitudes."""
+        """Store the equations and a step (s); with `sizes`, magnitudes replace all terms."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
@@ -167,11 +168,7 @@ def improved_euler(on: Arithmetic, omega: Array) -> Array:
 
 
 def taylor_3(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (eq. 30).
-
-    The derivative of the right-hand side F in the direction F is half of F(omega + F) - F(omega -
-    F), because F is quadratic.
-    """
+    """Return omega after a step of the Taylor method with three terms (eq. 30)."""
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
     return omega + on.times_step(rate + 0.5 * on.times_step(along))
@@ -212,7 +209,7 @@ SCHEMES = {each.name: each for each in _ALL}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
-    """Return the truncation error of a step, shape (TERMS, n, 3), from n omegas (rad/s)."""
+    """Return the truncation errors of a step from n omegas (rad/s), shape (TERMS, n, 3)."""
     on = Series(scene)
     return scheme(on, constant(omega)) - on.solution(omega)
 

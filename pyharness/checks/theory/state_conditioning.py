@@ -1,8 +1,8 @@
 """Error amplification under a torque that depends on omega and attitude.
 
-The state-transition matrix includes the attitude; its derivative follows from the tape of the
-equations. Errors of omega are divided by the largest |omega|; errors of the attitude are angles
-(rad).
+The state-transition matrix includes the attitude; its derivative follows from the tape, the
+recorded operations of the equations. Errors of omega are divided by the largest |omega|; errors of
+the attitude are angles (rad).
 """
 
 import math
@@ -101,7 +101,7 @@ def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds of the rounding errors of the equations (1/s), over the unit roundoff.
+    """Return bounds on the rounding errors of the equations (1/s), over the unit roundoff.
 
     By running error analysis each operation adds the error of its result; in a sum the magnitudes
     of all terms count.
@@ -115,7 +115,7 @@ def _sources(tape: Tape, times: Array, state: Array) -> Array:
 
 
 class _Bounded:
-    """Values, and bounds of their rounding errors over the unit roundoff."""
+    """Values, and bounds on their rounding errors over the unit roundoff."""
 
     def __init__(self, value: Any, error: Any) -> None:
         self.value, self.error = value, error

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The errors of steps, with the truncation errors from `schemes`, are propagated by the
-state-transition matrix. The methods are not run.
+The state-transition matrix propagates the errors of the steps to the end; truncation errors are
+from `schemes`. The methods are not run.
 """
 
 import math
@@ -125,7 +125,7 @@ class Forecaster:
     def crossing(self, smallest: float) -> float:
         """Return the step (s) below which the expected rounding error exceeds the truncation error.
 
-        It is at least `smallest` (s), and computed by bisection.
+        It is at least `smallest` (s), and found by bisection.
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -140,7 +140,7 @@ class Forecaster:
     def _of_one_step(self) -> float:
         """Return the mean relative final error from one step's rounding.
 
-        A component's rounding error is proportional to it, and 0 if the component never changes.
+        A component's rounding error is proportional to the component, and 0 if it never changes.
         """
         here = self._path
         changes = (self._rates() != 0.0).any(axis=0)

@@ -38,8 +38,8 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
     is for collocation, as in `grid`. The Gauss-Legendre quadrature with m points is exact to degree
-    2m - 1. For constant torques the products of two omegas have degree 2n, and the weights n
-    (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time the error of the
+    2m - 1. For constant torques the products of two omegas have degree 2n, and the weight functions
+    n (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time the error of the
     quadrature is of order 2n + 1 or higher, above the method's order.
     """
     n = terms
@@ -115,7 +115,7 @@ def _gauss(m: int) -> tuple[Array, Array]:
 
 
 def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
-    """Return the Legendre polynomial of degree m and its derivative inside (-1, 1)."""
+    """Return the Legendre polynomial of degree m and its derivative, inside (-1, 1)."""
     before, value = Fraction(1), x
     for k in range(2, m + 1):
         before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k

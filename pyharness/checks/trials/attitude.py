@@ -116,8 +116,8 @@ def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> 
 POLICY = Policy(_limit, FLOW, refusable)
 """Policy whose limit is rounding for closed forms, else tolerance plus rounding.
 
-The flow amplifies the rounding errors of the other methods and, if it amplifies errors more than a
-thousandfold, their tolerance.
+The flow amplifies the rounding errors of the other methods and, if its amplification exceeds a
+thousand, their tolerance.
 """
 
 
@@ -195,9 +195,9 @@ def _momentum_drift(scene: Scene, found: Answer) -> float:
 def _montgomery(name: Name) -> Check:
     """Return the check of the rotation in a period against Montgomery's formula.
 
-    The angle about the angular momentum L is 2 E T/L less the solid angle that L encloses in the
-    body, about the axis along which its component keeps its sign, with energy E and period T. As
-    the angle is not conserved, no other check detects a wrong rate.
+    The angle about the angular momentum L is 2 E T/L less a solid angle, with energy E and period
+    T. L encloses the solid angle in the body, about the axis along which its component keeps its
+    sign. As the angle is not conserved, no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -276,7 +276,7 @@ def _back(name: Name) -> Check:
 
 
 def _angles(off: float, name: Name) -> Check:
-    """Return the check of Euler angles `off` (rad) from a pole against SciPy's rotations."""
+    """Return the check, against SciPy's rotations, of Euler angles `off` (rad) from a pole."""
     from scipy.spatial.transform import Rotation
 
     sequence = name.circumstance

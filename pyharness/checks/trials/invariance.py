@@ -1,6 +1,6 @@
 """Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations differ only in axes, signs or exponents must return the same bits; all
+Methods whose operations then differ only in axes, signs or exponents must return the same bits. All
 others must agree within an error bound.
 """
 
@@ -135,7 +135,7 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
 
 
 def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time` (s); NaN if a prepared solver ends before."""
+    """Return omega at `time` (s); NaN if a prepared solver ends before it."""
     return run_method(name, scene, time, tolerance).omega
 
 

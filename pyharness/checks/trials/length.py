@@ -1,8 +1,8 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
 The phase is the position along the closed curve of omega. Rounding errors of energy and momentum
-grow with the power 1/2 of the number of steps, and the phase error with the power 3/2; if the
-errors of a step are biased, the powers are 1 and 2.
+grow with the power 1/2 of the number of steps, the phase error with the power 3/2. If the errors of
+a step are biased, the powers are 1 and 2.
 """
 
 import math

@@ -79,7 +79,7 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Return the check of the number of steps with IER = 129.
+    """Return the check of the number of steps with IER = 129, a singular matrix.
 
     With `dt-accumulates` the matrix is singular in the first steps only.
     """

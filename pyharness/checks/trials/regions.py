@@ -110,7 +110,7 @@ def _polynomial(listing: Listing, name: Name) -> Check:
 
 
 def _spin(listing: Listing, name: Name) -> Check:
-    """Return the growth of a wobble about axis 3 in a step: the spectral radius less 1."""
+    """Report the growth of a wobble about axis 3 in a step: the spectral radius minus 1."""
     scene = scene_of(name)
     z = eigenvalues(replace(scene, omega=(0.0, 0.0, scene.omega[2])))
     spin = z[np.argmax(np.abs(z))]

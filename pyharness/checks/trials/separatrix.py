@@ -1,4 +1,4 @@
-"""Trial of spin about the middle axis over several flips, with perturbations from .1 to 0."""
+"""Trial of spin about the middle axis over several flips, with perturbations from .1 to 0 rad/s."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ _UNDISTURBED = Basis(
 
 
 def _undisturbed() -> Iterator[Attempt]:
-    """Yield checks that the unperturbed rotation is constant, but for one rounding by `quick`."""
+    """Yield checks that the unperturbed rotation is constant; `quick` may round once."""
     scene = in_steps(
         Scene("middle axis, undisturbed", (0.0, 1.0, 0.0), moments=MIDDLE_AXIS), _STAYS
     )

@@ -84,7 +84,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Return the check of the smallest step at which truncation dominates against theory."""
+    """Return the check, against theory, of the smallest step at which truncation dominates."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
@@ -140,7 +140,7 @@ def _rows(name: str, scene: Scene) -> Trajectory:
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
-    """Return the check of the smallest divergent step against linear stability, if applicable."""
+    """Return the check, against linear stability if it applies, of the smallest divergent step."""
     scene, method = case_scene(case), name.subject
     if listing is None:
         runner: Runner = partial(_rows, method)

@@ -90,7 +90,7 @@ def bits(job: Job) -> bytes:
 
 
 def jobs() -> list[Job]:
-    """Return jobs for every method, prepared solver, program, LEQT1F, and for refusals."""
+    """Return jobs for every method, prepared solver and program, for LEQT1F, and for refusals."""
     found = []
     for scene in SCENES:
         for name in METHODS:

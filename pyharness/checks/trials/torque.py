@@ -1,6 +1,6 @@
 """Trial of torques: waves too fast for the step, huge and tiny torques, resonance.
 
-A wave is a sine or cosine term of the torque. Resonance is with the precession.
+A wave is a sine or cosine term of the torque; in resonance it has the frequency of the precession.
 """
 
 import math
@@ -63,7 +63,7 @@ def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
     The phase of a wave has a random rounding error in every evaluation, at least one per period.
-    `conditioning` adds n of them in full; 4 sqrt(n) suffice for random errors (Hoeffding 1963).
+    `conditioning` adds n of them in full; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -75,7 +75,7 @@ def axial(scene: Scene, time: float) -> Truth:
 
 
 def averaged(scene: Scene, time: float) -> Truth:
-    """Return the true omega at `time` (s) without very fast waves, whose effect is bounded."""
+    """Return the true omega at `time` (s) without very fast waves, and a bound on their effect."""
     moments = np.array(scene.moments)
     waves = scene.law.sines + scene.law.cosines
     moved = sum(float((2.0 * np.abs(a) / moments).max()) / f for a, f in waves)
@@ -96,7 +96,7 @@ def summed(scene: Scene, time: float) -> Truth:
 
 
 def _wave(frequency: float) -> Circumstance:
-    """Return a scene with waves (rad/s) about all axes until their phase is 500 rad."""
+    """Return a scene with waves of one `frequency` (rad/s) about all axes, for 500 radians."""
     size = 10.0 * frequency
     law = TorqueLaw(
         sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),

@@ -205,10 +205,12 @@ def test_scene_file_in_the_reference_is_one(tmp_path: Path) -> None:
 
 
 def test_reference_lists_every_method_with_its_tolerances() -> None:
-    text = (ROOT / "docs/reference/methods.md").read_text()
+    page = "docs/reference/methods.md"
+    text = (ROOT / page).read_text()
     for name, method in METHODS.items():
-        (row,) = re.findall(rf"^\| `{name}` \| (.*) \|$", text, re.MULTILINE)
-        title, _, default, finest = row.split(" | ")
+        rows = re.findall(rf"^\| `{name}` \| (.*) \|$", text, re.MULTILINE)
+        assert len(rows) == 1, f"{page} has {len(rows)} rows for {name}"
+        title, _, default, finest = rows[0].split(" | ")
         assert title == method.title
         wanted = "none" if method.is_fixed_step else f"{method.default:.0e}"
         assert default == wanted, name

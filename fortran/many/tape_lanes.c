@@ -10,17 +10,10 @@
 
 #include "../modern/tape.h"
 
-/* Bodies in a register. Wider vectors of the compiler would be taken apart number by number. */
-#if defined(__AVX512F__)
-enum { SIDE_BY_SIDE = 8 };
-#elif defined(__AVX__)
-enum { SIDE_BY_SIDE = 4 };
-#else
-enum { SIDE_BY_SIDE = 2 };
-#endif
-
-typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
-typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
+/* One body in each number of a register. */
+enum { SIDE_BY_SIDE = IN_REGISTER };
+typedef reg lanes;
+typedef reg_bits bits;
 
 enum { LEAST_ORDER = 8, MOST_ORDER = 27, TERMS = MOST_ORDER + 1 };
 enum { MANY = 3 };                            /* factors of a product that may not show early */

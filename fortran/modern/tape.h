@@ -7,6 +7,17 @@
 #define JOINED(name, level) name##_##level
 #define OF_LEVEL(name, level) JOINED(name, level)
 
+/* A register. The compiler would take comparisons of longer vectors apart, number by number. */
+#if defined(__AVX512F__)
+enum { IN_REGISTER = 8 };
+#elif defined(__AVX__)
+enum { IN_REGISTER = 4 };
+#else
+enum { IN_REGISTER = 2 };
+#endif
+typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
+typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
+
 enum { MOST_UNKNOWNS = 7 };
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 

@@ -44,7 +44,8 @@ module tape_march
   ! The outcome of an integration, beside its rows and status.
   type, public :: outcome_t
     integer(int64) :: steps = 0
-    real(dp) :: error = 0.0_dp  ! largest of a row before it was subtracted; relative, or rad
+    ! Largest of a row or node before it was subtracted; relative, or rad.
+    real(dp) :: error = 0.0_dp
     real(dp) :: least = 0.0_dp  ! lower bound, for estimates that are too small
     real(dp) :: growth = 1.0_dp ! error amplification until any requested time
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative

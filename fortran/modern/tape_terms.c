@@ -34,16 +34,7 @@ static inline lanes loaded(const double *from) { return *(const lanes_anywhere *
 
 static inline void store(double *to, lanes x) { *(lanes_anywhere *)to = x; }
 
-/* A register: the compiler takes comparisons of longer vectors apart number by number. */
-#if defined(__AVX512F__)
-enum { IN_REGISTER = 8 };
-#elif defined(__AVX__)
-enum { IN_REGISTER = 4 };
-#else
-enum { IN_REGISTER = 2 };
-#endif
-typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
-typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
+/* The same at any address. */
 typedef reg reg_anywhere __attribute__((aligned(8)));
 typedef double row[SIDE_BY_SIDE];
 #define ALWAYS_INLINE inline __attribute__((always_inline))

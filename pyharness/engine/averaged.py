@@ -188,7 +188,7 @@ class _Run:
         return min(self.longest, _RELATIVE / change, rest + _TURNS_BEYOND * _TURN)
 
     def _step(self) -> MacroStep:
-        """Return the next macro-step, shortened until accurate; raise TimedError if none is."""
+        """Return the next macro-step, shortened until it is accurate, or raise TimedError."""
         time = self.begin[0]
         angles = self._angles(float(self.coordinates.modulus(self.point)))
         length = self._forecast()

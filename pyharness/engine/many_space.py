@@ -53,7 +53,7 @@ def solve_one_by_one(
 ) -> Ensemble:  # fmt: skip
     """Return the final states of bodies by prepared solvers; invalid bodies are REFUSED.
 
-    Raise InputError if the torque needs an attitude and none is given, if the method can't solve
+    Raise InputError if the torque needs an attitude and there is none, if the method can't solve
     the scene, or if a torque in space acts on bodies given by coefficients.
     """
     check_torque(scene, method, attitude=True)

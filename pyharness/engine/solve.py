@@ -16,6 +16,7 @@ from pyharness.engine.continuous import solution_of, with_events, with_events_re
 from pyharness.engine.event_functions import event_functions
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
 from pyharness.engine.plan import plan
+from pyharness.engine.rates import rates as rates_of
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
@@ -34,11 +35,10 @@ from pyharness.engine.rescaled import (
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
-from pyharness.engine.steps import steps_output, transformed_steps
+from pyharness.engine.steps import transformed_steps
 from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.dense_output import Pieces
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
@@ -185,10 +185,10 @@ def solve(
         )
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output or functions is not None:
-        if found.sol is not None and isinstance(found.sol.states, Pieces):
-            sol = steps_output(given, found.sol.states)
-        else:
+        if found.sol is None:
             sol = solution_of(given, found, rows, method, tolerance)
+        else:
+            sol = replace(found.sol, rates=partial(rates_of, given))
         found = replace(found, sol=sol if dense_output else None)
     if functions is not None:
         ends = values[0], values[-1]

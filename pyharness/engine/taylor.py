@@ -23,9 +23,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
-# Nodes of a step, in parts of it, and the number of steps that are expected.
-_NODES = 0.5 + 0.5 * POINTS
-_EXPECTED = 100
+_NODES = 0.5 + 0.5 * POINTS  # of a step, in parts of it
+_MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def taylor(
@@ -39,8 +38,8 @@ def taylor(
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
     Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
-    is None. With `with_steps`, `sol` has the steps under a recorded torque. Raise InputError for an
-    opaque torque, and if the work limit is exceeded.
+    is None. With `with_steps`, `sol` has the steps under a recorded torque, up to 20 000. Raise
+    InputError for an opaque torque, and if the work limit is exceeded.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
@@ -48,20 +47,16 @@ def taylor(
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     kernel, given = series_kernel(scene)
+    most = _MOST_STEPS if with_steps else 0
+    ends = np.empty(most + 1)
+    at_nodes = np.empty((7 if n_attitudes else 3, NODES, most + 1), order="F")
     recorded: dict[str, Any] = {}
-    most, n_steps = 0, [_EXPECTED if with_steps else 0]
-    while True:
-        if kernel == "tape_rows":
-            most = n_steps[0]
-            shape = (7 if n_attitudes else 3, NODES, most + 1)
-            ends, at_nodes = np.empty(most + 1), np.empty(shape, order="F")
-            recorded = {"nodes": _NODES, "most": most, "ends": ends, "at_nodes": at_nodes}
-        rows, n_rows, status, steps, *n_steps = getattr(extension(), kernel)(
-            *given, scene.omega, times, tolerance,
-            n_attitudes=n_attitudes, attitudes=joint, effort=work, **recorded,
-        )  # fmt: skip
-        if not most or n_steps[0] <= most:
-            break
+    if kernel == "tape_rows":
+        recorded = {"nodes": _NODES, "most": most, "ends": ends, "at_nodes": at_nodes}
+    rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
+        *given, scene.omega, times, tolerance,
+        n_attitudes=n_attitudes, attitudes=joint, effort=work, **recorded,
+    )  # fmt: skip
     if status == GAVE_UP:
         # After one step the kernel forecasts the work.
         how = "would exceed" if steps == 1 else "exceeded"
@@ -76,9 +71,10 @@ def taylor(
     found = trajectory_of(
         times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
     )
-    if not most or not n_steps[0] or not found.has_all_rows:
+    kept = others[0] if others else 0
+    if not 0 < kept <= most or not found.has_all_rows:
         return found
-    edges, values = ends[: n_steps[0] + 1], at_nodes[:, :, : n_steps[0]].T
+    edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T.copy()
     if times[-1] < 0.0:
         edges, values = edges[::-1], values[::-1, ::-1]
     return replace(found, sol=steps_output(scene, Pieces(edges, values)))

@@ -16,6 +16,7 @@ from pyharness.checks.theory.regions import regions
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error
 from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main
+from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import collocation
@@ -24,6 +25,11 @@ from pyharness.views.pictures import saved
 from tests.checks.stressed import checks_of
 
 FIGURES = Path(__file__).parent.parent.parent / "docs/figures"
+
+
+def test_every_method_with_a_fixed_step_has_a_scheme() -> None:
+    missing = sorted({*FIXED_STEP} - SCHEMES.keys())
+    assert not missing, f"pyharness/checks/theory/schemes.py has no scheme of {missing}"
 
 
 @pytest.mark.campaign

@@ -54,7 +54,7 @@ def check(message: str, named: str) -> None:
     assert "\n" not in message
     assert message.isprintable()
     assert named in message
-    assert any(each.search(message) for each in _wordings()), message
+    assert any(each.search(message) for each in _wordings()), f"{message}: python -m tests.messages"
 
 
 @pytest.fixture

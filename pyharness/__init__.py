@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from pyharness.checks.compare.comparison import Comparison, compare_programs
     from pyharness.checks.compare.method_comparison import compare_methods
     from pyharness.engine.compiled_call import get_include
-    from pyharness.engine.many import Ensemble, solve_many
+    from pyharness.engine.many import solve_many
     from pyharness.engine.prepared import prepare
-    from pyharness.engine.prepared_attitude import AttitudeSolver
     from pyharness.engine.scene_reader import read_scene
     from pyharness.engine.solve import solve
     from pyharness.engine.solver import Solver
     from pyharness.engine.stepper import Stepper
     from pyharness.engine.taylor_ivp import Taylor
     from pyharness.engine.trajectory_reader import load
+    from pyharness.model.batch_result import Ensemble
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     _kernels: Any
 
 __all__ = [
-    "AttitudeSolver",
     "ChangingInertia",
     "ChangingMoments",
     "Comparison",
@@ -99,9 +98,9 @@ _SUBMODULES = {
     "model.trajectory": ("Stop", "Trajectory"),
     "thesis.many": ("ProgramEnsemble", "run_many"),
     "thesis.programs": ("run_program",),
-    "engine.many": ("Ensemble", "solve_many"),
+    "engine.many": ("solve_many",),
+    "model.batch_result": ("Ensemble",),
     "engine.prepared": ("prepare",),
-    "engine.prepared_attitude": ("AttitudeSolver",),
     "engine.compiled_call": ("get_include",),
     "engine.solver": ("Solver",),
     "engine.stepper": ("Stepper",),

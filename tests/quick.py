@@ -16,8 +16,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.tiers import MARK, WEEKLY
+
 ROOT = Path(__file__).parent.parent
-SECONDS = 26.0
+SECONDS = 23.0
 # All tests of a chunk may be campaigns, and then none is left.
 _WELL = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 # Tests of a file that no test names, by the beginning of its path. Those of a package follow.
@@ -75,9 +77,12 @@ def changed(base: str) -> list[str]:
 
 
 def sources() -> dict[str, str]:
-    """Return the text of every test file by its path."""
-    found = sorted((ROOT / "tests").rglob("test_*.py"))
-    return {str(path.relative_to(ROOT)): path.read_text() for path in found}
+    """Return the text of every test file of the fast tier by its path."""
+    found = {path: path.read_text() for path in sorted((ROOT / "tests").rglob("test_*.py"))}
+    return {
+        str(path.relative_to(ROOT)): text
+        for path, text in found.items() if WEEKLY not in path.parents and MARK not in text
+    }  # fmt: skip
 
 
 def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
@@ -85,13 +90,13 @@ def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
 
     The nearest are the changed test files, then those of a changed file's name. Tests of a module
     of Python follow by the number of imports from the test to the module. Tests of any other file
-    name it; if none does, they are those of the folder that uses it.
+    name it; those of the folder that uses it follow, first those that have its first word.
     """
     ranks: dict[str, tuple[int, bool]] = {}
     for path in paths:
         stem = Path(path).stem
-        folder = Path(path).parent.name
-        near = importers(path) if path.endswith(".py") else {}
+        is_python = path.endswith(".py")
+        near = importers(path) if is_python else {}
         found = {}
         for test, text in tests.items():
             if path == test:
@@ -100,17 +105,22 @@ def nearest(paths: Sequence[str], tests: dict[str, str]) -> list[str]:
                 found[test] = 1
             elif between := [near[name] for name in imported(text) if name in near]:
                 found[test] = 2 + min(between)
-            elif not path.endswith(".py") and re.search(rf"\b{re.escape(stem)}\b", text):
+            elif not is_python and re.search(rf"\b{re.escape(stem)}\b", text):
                 found[test] = 2
-        if not found:
-            of_package = {f"pyharness/{each}": f"tests/{each}" for each in Path(path).parts[1:2]}
-            every = [*USERS.items(), *of_package.items()]
-            users = [user for begin, user in every if path.startswith(begin)][:1]
-            found = {test: 2 for test in tests for user in users if test.startswith(user)}
+        if not found or not is_python:
+            user, word = user_of(path), stem.partition("_")[0]
+            of_folder = {test: text for test, text in tests.items() if test.startswith(user)}
+            found = {test: 3 + (word not in text) for test, text in of_folder.items()} | found
         for test, steps in found.items():
-            rank = (steps, Path(test).parent.name != folder)
+            rank = (steps, Path(test).parent.name != Path(path).parent.name)
             ranks[test] = min(rank, ranks.get(test, rank))
     return sorted(ranks, key=lambda test: (ranks[test], test))
+
+
+def user_of(path: str) -> str:
+    """Return the folder of tests that use a file, or the file itself if there is none."""
+    every = [*USERS.items(), *((f"pyharness/{each}", f"tests/{each}") for each in Path(path).parts)]
+    return next((user for begin, user in every if path.startswith(begin)), path)
 
 
 def importers(path: str) -> dict[str, int]:

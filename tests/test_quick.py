@@ -23,11 +23,11 @@ TESTS = {
     ("path", "wanted"),
     [
         ("pyharness/engine/taylor.py", ["test_taylor", "test_plan"]),
-        ("fortran/modern/taylor_march.f90", ["test_other"]),
+        ("fortran/modern/taylor_march.f90", ["test_other", "test_plan", "test_taylor"]),
         ("tests/truth/test_other.py", ["test_other"]),
         ("docs/index.md", []),
         ("pyharness/engine/registry.py", ["test_taylor", "test_plan"]),
-        ("fortran/modern/sphere.f90", ["test_plan", "test_taylor"]),
+        ("fortran/modern/solve_all.c", ["test_taylor", "test_plan"]),
     ],
 )
 def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
@@ -38,7 +38,7 @@ def test_nearest_tests_come_first(path: str, wanted: list[str]) -> None:
 def test_a_module_has_the_tests_that_import_it() -> None:
     found = nearest(["pyharness/engine/rescaled.py"], sources())
     assert found[0] == "tests/checks/scenes/test_rescaled.py"
-    assert nearest(["fortran/modern/taylor_march.f90"], sources())
+    assert "tests/engine/test_sums.py" in nearest(["fortran/modern/tape_terms.c"], sources())[:12]
 
 
 @pytest.mark.campaign

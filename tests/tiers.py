@@ -14,7 +14,7 @@ LIMIT = 1.0  # s of CPU on the machine on which the yardstick takes _USUAL
 _USUAL = 0.045  # s
 # A test that imports packages first is not judged, because another would do it in another order.
 _MODULES = 20
-_WEEKLY = Path(__file__).parent / "campaigns"
+WEEKLY = Path(__file__).parent / "campaigns"
 MARK = "\npytestmark = pytest.mark.campaign\n"
 
 
@@ -23,7 +23,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     if config.option.markexpr != FAST:
         return None
     is_marked = collection_path.suffix == ".py" and MARK in collection_path.read_text()
-    return True if is_marked or _WEEKLY in (collection_path, *collection_path.parents) else None
+    return True if is_marked or WEEKLY in (collection_path, *collection_path.parents) else None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -31,7 +31,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark as campaigns `tests/campaigns`, and all but the first parameters of `sampled` tests."""
     begun: set[str] = set()
     for item in items:
-        if _WEEKLY in item.path.parents:
+        if WEEKLY in item.path.parents:
             item.add_marker("campaign")
         function = item.nodeid.partition("[")[0]
         if item.get_closest_marker("sampled"):

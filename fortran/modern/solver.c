@@ -6,6 +6,7 @@
    a solver. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
+#include <math.h>
 #include <stddef.h>
 
 #define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
@@ -48,6 +49,10 @@ typedef struct {
   PyObject *check;       /* (omega0, t_end, third) -> (floats of a start, float), or InputError */
   int width;             /* numbers in a start: OMEGA or MOST */
   double attitude[ATTITUDE]; /* at time 0, for a call that specifies none */
+  double span[2];        /* times (s) between which a call needs no check */
+  int has_axes;          /* whether the kernel's axes, the principal ones, are other than a call's */
+  double axes[OMEGA][OMEGA]; /* the principal axes, in columns */
+  double turn[ATTITUDE]; /* the same as a quaternion, from principal axes to a call's */
   ending *endings;
   Py_ssize_t n_endings;
   Py_ssize_t room;
@@ -290,6 +295,38 @@ static int read_slowly(bound_kernel *self, const arguments *given, double *start
   return is_right;
 }
 
+/* ---- Axes --------------------------------------------------------------------------------- */
+
+/* Hamilton's product p q, with the sums of `product` in Python. */
+static void multiply(const double *p, const double *q, double *result)
+{
+  const double a = p[0], b = p[1], c = p[2], d = p[3], e = q[0], f = q[1], g = q[2], h = q[3];
+  result[0] = a * e - b * f - c * g - d * h;
+  result[1] = a * f + b * e + c * h - d * g;
+  result[2] = a * g - b * h + c * e + d * f;
+  result[3] = a * h + b * g - c * f + d * e;
+}
+
+/* Convert a state to principal axes in place. */
+static void to_principal(const bound_kernel *self, double *state)
+{
+  const double x = state[0], y = state[1], z = state[2];
+  for (int i = 0; i < OMEGA; i++) {
+    state[i] = (self->axes[0][i] * x + self->axes[1][i] * y) + self->axes[2][i] * z;
+  }
+  if (self->width > OMEGA) multiply(state + OMEGA, self->turn, state + OMEGA);
+}
+
+static void from_principal(const bound_kernel *self, double *state)
+{
+  const double x = state[0], y = state[1], z = state[2], *t = self->turn;
+  for (int i = 0; i < OMEGA; i++) {
+    state[i] = (self->axes[i][0] * x + self->axes[i][1] * y) + self->axes[i][2] * z;
+  }
+  const double back[ATTITUDE] = {t[0], -t[1], -t[2], -t[3]};
+  if (self->width > OMEGA) multiply(state + OMEGA, back, state + OMEGA);
+}
+
 /* ---- The call ----------------------------------------------------------------------------- */
 
 /* Copy numbers that a kernel other than f2py's returned. */
@@ -372,9 +409,11 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
     return NULL;
   }
   if (!(read_numbers(found.omega0, OMEGA, start) && read_number(found.t_end, &now.time) &&
-        read_third(self, found.third, start))) {
+        read_third(self, found.third, start) && self->span[0] < now.time &&
+        now.time < self->span[1])) {
     if (!read_slowly(self, &found, start, &now.time)) return NULL;
   }
+  if (self->has_axes) to_principal(self, start);
   memcpy(now.start, start, sizeof now.start);
 
   if (self->address != NULL) {
@@ -399,6 +438,7 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
   if (own == NULL) return NULL;
   *own = now;
 
+  if (self->has_axes) from_principal(self, state);
   if (self->width > OMEGA) return omega_and_attitude(state);
   if (found.third == Py_None) return new_array(three, state);
   memcpy(PyArray_DATA((PyArrayObject *)found.third), state, OMEGA * sizeof(double));
@@ -406,8 +446,6 @@ static PyObject *call(PyObject *object, PyObject *const *given, size_t n_given, 
 }
 
 /* ---- The type ----------------------------------------------------------------------------- */
-
-static PyTypeObject bound_attitude_kernel_type; /* as bound_kernel_type, for seven numbers */
 
 /* Return a solver's own copy of a packed array, or NULL with an error set if it is invalid. */
 static PyArrayObject *own_packed(PyObject *packed)
@@ -424,13 +462,28 @@ static PyArrayObject *own_packed(PyObject *packed)
   return own;
 }
 
+/* Read the principal axes, three rows, and the quaternion. */
+static int read_axes(bound_kernel *self, PyObject *axes)
+{
+  PyObject *rows[OMEGA], *turn;
+  if (!PyArg_ParseTuple(axes, "(OOO)O", rows, rows + 1, rows + 2, &turn)) return 0;
+  int is_right = read_numbers(turn, ATTITUDE, self->turn);
+  for (int i = 0; i < OMEGA; i++) {
+    is_right = is_right && read_numbers(rows[i], OMEGA, self->axes[i]);
+  }
+  if (!is_right) PyErr_SetString(PyExc_ValueError, "axes: allowed: 3 x 3 and 4 numbers");
+  return is_right;
+}
+
 static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-  static char *known[] = {"kernel", "packed", "check", "packed_with_gil", "attitude", NULL};
-  PyObject *callable, *packed, *check, *packed_with_gil = Py_None;
-  double q[ATTITUDE] = {0.0};
-  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|O(dddd)", known, &callable, &packed, &check,
-                                   &packed_with_gil, q, q + 1, q + 2, q + 3)) {
+  static char *known[] = {"kernel",   "packed", "check", "packed_with_gil",
+                          "attitude", "span",   "axes",  NULL};
+  PyObject *callable, *packed, *check, *packed_with_gil = Py_None, *attitude = Py_None,
+                                       *axes = Py_None;
+  double span[2] = {-HUGE_VAL, HUGE_VAL};
+  if (!PyArg_ParseTupleAndKeywords(args, names, "OOO|OO(dd)O", known, &callable, &packed, &check,
+                                   &packed_with_gil, &attitude, span, span + 1, &axes)) {
     return NULL;
   }
   bound_kernel *self = (bound_kernel *)type->tp_alloc(type, 0);
@@ -438,8 +491,14 @@ static PyObject *new_kernel(PyTypeObject *type, PyObject *args, PyObject *names)
   self->vectorcall = call;
   self->callable = Py_NewRef(callable);
   self->check = Py_NewRef(check);
-  self->width = PyType_IsSubtype(type, &bound_attitude_kernel_type) ? MOST : OMEGA;
-  memcpy(self->attitude, q, sizeof q);
+  self->width = attitude == Py_None ? OMEGA : MOST;
+  memcpy(self->span, span, sizeof span);
+  self->has_axes = axes != Py_None;
+  if (self->width > OMEGA && !read_numbers(attitude, ATTITUDE, self->attitude)) {
+    PyErr_SetString(PyExc_ValueError, "attitude: allowed: four numbers");
+    goto failed;
+  }
+  if (self->has_axes && !read_axes(self, axes)) goto failed;
   PyObject *address = PyObject_GetAttrString(callable, "_cpointer");
   if (address != NULL) {
     self->address = (kernel *)PyCapsule_GetPointer(address, PyCapsule_GetName(address));
@@ -517,17 +576,24 @@ static PyObject *size_of(PyObject *object, PyObject *Py_UNUSED(unused))
 
 static void release(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
 
-static PyObject *no_address(void)
+/* Return whether compiled callers can have the solver; set an error if not. */
+static int has_address(const bound_kernel *self)
 {
-  PyErr_SetString(PyExc_AttributeError, "the kernel is a Python object");
-  return NULL;
+  if (self->has_axes) {
+    PyErr_SetString(PyExc_AttributeError,
+                    "a solver for a full inertia matrix has no compiled call; allowed: a solver "
+                    "for the scene that `principal` returns");
+  } else if (self->address == NULL) {
+    PyErr_SetString(PyExc_AttributeError, "the kernel is a Python object");
+  }
+  return !self->has_axes && self->address != NULL;
 }
 
 /* Return a capsule with the address of `exported`, which keeps this solver. */
 static PyObject *get_capsule(PyObject *object, void *Py_UNUSED(closure))
 {
   bound_kernel *self = (bound_kernel *)object;
-  if (self->address == NULL) return no_address();
+  if (!has_address(self)) return NULL;
   PyObject *capsule = PyCapsule_New(&self->exported, PYHARNESS_SOLVER, release);
   if (capsule != NULL && PyCapsule_SetContext(capsule, Py_NewRef(object)) < 0) {
     Py_DECREF(object);
@@ -544,13 +610,14 @@ static int solve_at(const pyharness_solver *solver, const double *start, double 
 
 static PyObject *get_address(PyObject *object, void *Py_UNUSED(closure))
 {
-  if (((bound_kernel *)object)->address == NULL) return no_address();
+  if (!has_address((bound_kernel *)object)) return NULL;
   return PyLong_FromVoidPtr(&((bound_kernel *)object)->exported);
 }
 
 static PyMethodDef methods[] = {
   {"__sizeof__", size_of, METH_NOARGS, NULL},
   {"__init_subclass__", init_subclass, METH_CLASS | METH_NOARGS, NULL},
+  {"__class_getitem__", Py_GenericAlias, METH_CLASS | METH_O, "See PEP 585."},
   {NULL, NULL, 0, NULL},
 };
 
@@ -590,12 +657,7 @@ PyMODINIT_FUNC PyInit__solver(void)
 {
   import_array();
   out_name = PyUnicode_InternFromString("out");
-  bound_attitude_kernel_type = bound_kernel_type;
-  bound_attitude_kernel_type.tp_name = "pyharness._solver.BoundAttitudeKernel";
-  if (out_name == NULL || PyType_Ready(&bound_kernel_type) < 0 ||
-      PyType_Ready(&bound_attitude_kernel_type) < 0) {
-    return NULL;
-  }
+  if (out_name == NULL || PyType_Ready(&bound_kernel_type) < 0) return NULL;
   PyObject *created = PyModule_Create(&module);
   /* A union, because C converts no address of a function to one of data. */
   const union {
@@ -607,9 +669,7 @@ PyMODINIT_FUNC PyInit__solver(void)
     Py_CLEAR(created);
   Py_XDECREF(address);
   if (created != NULL &&
-      (PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0 ||
-       PyModule_AddObjectRef(created, "BoundAttitudeKernel",
-                             (PyObject *)&bound_attitude_kernel_type) < 0)) {
+      PyModule_AddObjectRef(created, "BoundKernel", (PyObject *)&bound_kernel_type) < 0) {
     Py_CLEAR(created);
   }
   return created;

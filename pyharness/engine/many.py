@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.ensemble import Ensemble as Ensemble
-from pyharness.engine.ensemble import place_for
+from pyharness.engine.many_alone import NO_ATTITUDE, is_solved_alone, solve_one_by_one
 from pyharness.engine.many_details import Details
 from pyharness.engine.many_scenes import (
     Axes,
@@ -20,13 +19,8 @@ from pyharness.engine.many_scenes import (
     checked_rows,
     from_rows,
     from_scenes,
-    rows_of_scene,
-)
-from pyharness.engine.many_space import (
-    NO_ATTITUDE,
     inertia_scenes,
-    is_solved_alone,
-    solve_one_by_one,
+    rows_of_scene,
 )
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
@@ -40,6 +34,7 @@ from pyharness.model.arrays import (
     threads_of,
 )
 from pyharness.model.attitude import scalar_first
+from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.ensemble import Ensemble
 from pyharness.engine.event_functions import event_functions
-from pyharness.engine.many_space import rows_of_bodies, scene_of_row
+from pyharness.engine.many_scenes import rows_of_bodies, scene_of_row
 from pyharness.engine.parameter_sensitivity import checked_names
 from pyharness.engine.registry import requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.model.arrays import only_one, row_of, rows_of, unit_quaternions
+from pyharness.model.batch_result import Ensemble
 from pyharness.model.errors import InputError
 from pyharness.model.progress import count_done, expect_bodies
 from pyharness.model.scene import Scene

@@ -2,21 +2,31 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pyharness.engine.prepared_inertia import axes_and_turn, rotated, turned_back
-from pyharness.model.arrays import check_rows, rows_of, unit_quaternions, waves_of
+from pyharness.engine.many_prepared import rotated, turned_back
+from pyharness.model.arrays import (
+    check_rows,
+    count_bodies,
+    row_of,
+    rows_of,
+    unit_quaternions,
+    waves_of,
+)
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
-from pyharness.model.principal import principal
-from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.principal import axes_and_turn, principal
+from pyharness.model.scene import STATE_TORQUE, Scene, checked_scene
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
 _MOST_KEPT = 8  # scenes whose arrays are kept
+_BODIES = ("moments", "inertia", "coefficients")
 
 
 class Axes:
@@ -179,3 +189,51 @@ _CONVERSIONS: dict[str, Callable[[Any], Array]] = {
     "t_end": partial(rows_of, "t_end"),
     "attitude0": lambda values: rows_of("attitude0", values, 4),
 }
+
+
+def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
+    """Return the scene of each body; None for a body with invalid numbers."""
+    rows = rows_of_bodies(arrays)
+    found: list[Scene | None] = []
+    for i in range(count_bodies(rows)):
+        try:
+            found.append(scene_of_row(scene, rows, i))
+        except InputError:
+            found.append(None)
+    return found
+
+
+def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
+    """Return the arrays of bodies and torques that are not None, with checked shapes."""
+    shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
+    rows = {}
+    for name, values in arrays.items():
+        if values is not None and name in shapes:
+            rows[name] = rows_of(name, values, *shapes[name])
+        elif values is not None and name in ("sines", "cosines"):
+            rows[name] = waves_of(name, values)
+    return rows
+
+
+def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
+    """Return the scene of body `i`, or raise InputError if its numbers are invalid."""
+    own = {name: row_of(each, i) for name, each in rows.items()}
+    torque: dict[str, Any] = {
+        name.removeprefix("torque_"): own.pop(name)
+        for name in ("torque_constant", "torque_rate", "sines", "cosines")
+        if name in own
+    }
+    for name in ("sines", "cosines"):
+        if name in torque:
+            torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
+    if own.keys() & _BODIES:
+        own = {**dict.fromkeys(_BODIES), **own}
+    for name in ("omega", "attitude"):
+        if f"{name}0" in own:
+            own[name] = own.pop(f"{name}0")
+    law = scene.torque
+    if torque:
+        if isinstance(law, StateTorque):
+            raise InputError(STATE_TORQUE)
+        law = replace(law, **torque)
+    return replace(scene, torque=law, **own)

@@ -1,19 +1,24 @@
 """Preparation of solvers for many calls with one scene."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, overload
+from typing import Any, Literal, overload
 
 from pyharness.engine.plan import plan
-from pyharness.engine.registry import check_prepared, check_torque, requested_tolerance
+from pyharness.engine.registry import (
+    check_attitude,
+    check_prepared,
+    check_torque,
+    requested_tolerance,
+)
 from pyharness.engine.solver import PREPARED, Solver
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import unknown
+from pyharness.model.principal import principal
 from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import Array
 from pyharness.model.values import Number, boolean
 from pyharness.model.waves import with_merged_waves
-
-if TYPE_CHECKING:
-    from pyharness.engine.prepared_attitude import AttitudeSolver
 
 
 @overload
@@ -24,7 +29,7 @@ def prepare(
     *,
     effort: float = ...,
     attitude: Literal[False] = ...,
-) -> Solver: ...
+) -> Solver[Array]: ...
 @overload
 def prepare(
     scene: Scene,
@@ -33,7 +38,7 @@ def prepare(
     *,
     effort: float = ...,
     attitude: Literal[True],
-) -> "AttitudeSolver": ...
+) -> Solver[tuple[Array, Array]]: ...
 def prepare(
     scene: Scene,
     method: str = "auto",
@@ -41,13 +46,13 @@ def prepare(
     *,
     effort: float = 1.0,
     attitude: bool = False,
-) -> "Solver | AttitudeSolver":
+) -> Solver[Any]:
     """Prepare a solver for many calls with the same scene.
 
     Parameters
     ----------
     scene : Scene
-        The scene. With a full inertia matrix, a call takes some microseconds more.
+        The scene.
     method : str
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
@@ -62,7 +67,7 @@ def prepare(
 
     Returns
     -------
-    Solver or AttitudeSolver
+    Solver
         A callable. ``solver(omega0, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
         With `attitude` it also returns a quaternion from body to space, scalar first, shape (4,).
         Under a torque that depends on the state, an initial omega above 2**300 or below 2**-300
@@ -93,20 +98,12 @@ def prepare(
     effort = checked_effort(effort)
     check_torque(scene, method, attitude)
     check_prepared(scene, method)
-    if scene.changing is not None:
-        from pyharness.engine.prepared_changing import prepared_changing
-
-        return prepared_changing(scene, method, tolerance, effort, attitude)
-    if scene.inertia is not None:
-        from pyharness.engine.prepared_inertia import prepared_inertia, prepared_inertia_attitude
-
-        prepared = prepared_inertia_attitude if attitude else prepared_inertia
-        return prepared(scene, method, tolerance, effort)
-    scene = with_merged_waves(scene)
+    # An attitude that was not requested is not computed, unless the torque needs it.
+    own = scene.attitude or IDENTITY if attitude else None
+    about_principal, _ = principal(replace(scene, attitude=own))
     if attitude:
-        from pyharness.engine.prepared_attitude import prepared_attitude
-
-        return prepared_attitude(scene, method, tolerance, effort)
-    # An attitude that was not requested is not computed.
-    scene = replace(scene, attitude=None)
-    return Solver(plan(scene, method, tolerance), tolerance, method, effort)
+        check_attitude(method)
+    else:
+        about_principal = replace(about_principal, attitude=None)
+    chosen = plan(with_merged_waves(about_principal), method, tolerance, rows=attitude)
+    return Solver(scene, chosen, tolerance, method, effort, attitude)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pyharness.model.attitude import IDENTITY, product, quaternion_of_axes
+from pyharness.model.attitude import IDENTITY, Quaternion, product, quaternion_of_axes
 from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, principal_frame
 from pyharness.model.scene import Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
@@ -130,3 +130,10 @@ def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:
     first, second, third = map(Fraction, vector)
     x, y, z = map(float, frame.into((first, second, third)))
     return x, y, z
+
+
+def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:
+    """Return the axes of `principal`, as columns and as a quaternion, for a full inertia matrix."""
+    assert scene.inertia is not None
+    axes = principal_frame(scene.inertia).axes
+    return axes.copy(), quaternion_of_axes(axes)

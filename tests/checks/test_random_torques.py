@@ -15,7 +15,7 @@ from pyharness.checks.check import Check, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_torques import random_torques
 from pyharness.checks.selection import Selection
-from pyharness.engine import many_recorded, recorded, solve, system
+from pyharness.engine import many_prepared, recorded, solve, system
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -67,7 +67,7 @@ FAULTS: dict[str, tuple[Any, str, Any, str]] = {
     "many": (recorded, "system_of", _off, "torque-solve-many"),
     "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),
     "initial attitude": (
-        many_recorded, "unit_quaternions",
+        many_prepared, "unit_quaternions",
         lambda rows, real=arrays.unit_quaternions: real(rows + 1e-3 * np.eye(4)[0]),
         "torque-solve-many",
     ),

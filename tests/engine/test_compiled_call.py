@@ -87,7 +87,7 @@ def expected(solver: Any, start: Any, time: float) -> Any:
 
 def starts_of(solver: Any, n: int) -> Any:
     starts = np.random.default_rng(7).uniform(-1.0, 1.0, (n, 3))
-    if solver._with_attitude:
+    if solver.with_attitude:
         starts = np.column_stack([starts, np.tile([0.6, 0.0, 0.8, 0.0], (n, 1))])
     return starts
 

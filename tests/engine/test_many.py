@@ -12,10 +12,10 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, prepare, run_many, solve, solve_many, torques
 from pyharness.engine import many_scenes
-from pyharness.engine.many import Ensemble
 from pyharness.engine.problem import normalized
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.engine.solver import CODES, PREPARED
+from pyharness.model.batch_result import Ensemble
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing
@@ -267,7 +267,7 @@ def test_results_may_overlap_the_starts(law: TorqueLaw) -> None:
             solver.many(starts, times, out=wrong)
         assert np.array_equal(wrong, before, equal_nan=True)
     with pytest.raises(TypeError):
-        solver.many(starts, times, place=omega)  # type: ignore[call-arg]
+        solver.many(starts, times, place=omega)
 
 
 def test_any_array_will_do() -> None:

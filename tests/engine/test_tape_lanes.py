@@ -9,10 +9,10 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.ensemble import Ensemble
-from pyharness.engine.many_recorded import solve_side_by_side
+from pyharness.engine.many_prepared import solve_side_by_side
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
+from pyharness.model.batch_result import Ensemble
 
 MOMENTS = (1.0, 2.0, 2.5)
 

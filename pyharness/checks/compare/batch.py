@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.ensemble import Ensemble
 from pyharness.engine.many import solve_many
-from pyharness.engine.many_space import scene_of_row
+from pyharness.engine.many_scenes import scene_of_row
 from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, product
+from pyharness.model.batch_result import Ensemble
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS

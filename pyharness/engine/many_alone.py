@@ -1,32 +1,31 @@
-"""Conversion of the arrays of `solve_many` to one scene per body.
+"""Bodies that the general kernel for many bodies can't take, by prepared solvers.
 
-Full inertia matrices need it. So do torques in space, torques of the state and changing inertias;
-prepared solvers solve these bodies here.
+They are those under a torque of the state or about the axes of space, or of a changing inertia.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.ensemble import Ensemble, place_for
-from pyharness.engine.many_recorded import solve_side_by_side
+from pyharness.engine.many_prepared import solve_each, solve_row
+from pyharness.engine.many_scenes import rows_of_bodies, scene_of_row
 from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import check_prepared, check_torque
-from pyharness.model.arrays import count_bodies, row_of, rows_of, waves_of
+from pyharness.model.arrays import count_bodies, rows_of
+from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
-from pyharness.model.extension import ENDS
 from pyharness.model.pieces import for_each_piece
-from pyharness.model.scene import STATE_TORQUE, Scene, Triple
+from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
 _REST: Triple = (0.0, 0.0, 0.0)
 _MOST_KEPT = 8  # prepared solvers
-_BODIES = ("moments", "inertia", "coefficients")
 NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes with an attitude"
 
 
@@ -83,41 +82,28 @@ def solve_one_by_one(
     # Bodies that differ in their starts alone share one solver.
     shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
     # `omega0` or `attitude0` may share memory with `out`.
-    omega = np.full((n, 3), np.nan)
-    attitude = np.full((n, 4), np.nan) if with_attitude else None
+    own = Ensemble(
+        np.full((n, 3), np.nan), found.status, np.full((n, 4), np.nan) if with_attitude else None,
+        found.estimates,
+    )  # fmt: skip
     found.status[:] = Statuses.REFUSED
+    turns = counted.get("attitude0")
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
-        left: Sequence[int] = range(piece.start, piece.stop)
         if shared is not None:
-            turns = counted.get("attitude0")
-            whole = Ensemble(omega, found.status, attitude, found.estimates)
-            left = solve_side_by_side(shared, starts, times, turns, whole, piece, given_up)
-        for i in left:
+            solve_each(shared, starts, times, turns, own, piece, given_up)
+            return
+        for i in range(piece.start, piece.stop):
             if given_up[0]:
                 return
-            try:
-                solver: Any = shared or prepare(
-                    scene_of_row(at_rest, rows, i), method, tolerance, **settings
-                )
-                start, time = row_of(starts, i), float(row_of(times, i))
-                if attitude is not None:
-                    turn = row_of(counted["attitude0"], i)
-                    omega[i], attitude[i] = solver(start, time, turn)
-                else:
-                    omega[i] = solver(start, time)
-            except InputError:
-                continue
-            found.status[i] = ENDS.index(solver.status)
-            if found.estimates is not None:
-                found.estimates[i] = [
-                    np.nan if each is None else each for each in (solver.error, solver.growth)
-                ]
+            with suppress(InputError):
+                solver = prepare(scene_of_row(at_rest, rows, i), method, tolerance, **settings)
+                solve_row(solver, i, starts, times, turns, own)
 
     for_each_piece(enter, n, threads)
-    found.omega[:] = omega
-    if found.attitude is not None and attitude is not None:
-        found.attitude[:] = attitude
+    found.omega[:] = own.omega
+    if found.attitude is not None and own.attitude is not None:
+        found.attitude[:] = own.attitude
     return found
 
 
@@ -137,51 +123,3 @@ def _kept_solver(
         at_rest = replace(scene, omega=_REST, attitude=None)
         _kept[key] = scene, prepare(at_rest, method, tolerance, **settings)
     return _kept[key][1]
-
-
-def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return the scene of each body; None for a body with invalid numbers."""
-    rows = rows_of_bodies(arrays)
-    found: list[Scene | None] = []
-    for i in range(count_bodies(rows)):
-        try:
-            found.append(scene_of_row(scene, rows, i))
-        except InputError:
-            found.append(None)
-    return found
-
-
-def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques that are not None, with checked shapes."""
-    shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
-    rows = {}
-    for name, values in arrays.items():
-        if values is not None and name in shapes:
-            rows[name] = rows_of(name, values, *shapes[name])
-        elif values is not None and name in ("sines", "cosines"):
-            rows[name] = waves_of(name, values)
-    return rows
-
-
-def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene of body `i`, or raise InputError if its numbers are invalid."""
-    own = {name: row_of(each, i) for name, each in rows.items()}
-    torque: dict[str, Any] = {
-        name.removeprefix("torque_"): own.pop(name)
-        for name in ("torque_constant", "torque_rate", "sines", "cosines")
-        if name in own
-    }
-    for name in ("sines", "cosines"):
-        if name in torque:
-            torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
-    if own.keys() & _BODIES:
-        own = {**dict.fromkeys(_BODIES), **own}
-    for name in ("omega", "attitude"):
-        if f"{name}0" in own:
-            own[name] = own.pop(f"{name}0")
-    law = scene.torque
-    if torque:
-        if isinstance(law, StateTorque):
-            raise InputError(STATE_TORQUE)
-        law = replace(law, **torque)
-    return replace(scene, torque=law, **own)

@@ -1,0 +1,203 @@
+"""Solution of a prepared scene from many initial states."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyharness.model.arrays import (
+    buffer_of,
+    check_rows,
+    row_of,
+    rows_of,
+    spread,
+    threads_of,
+    unit_quaternions,
+)
+from pyharness.model.attitude import IDENTITY, product, scalar_first
+from pyharness.model.batch_result import Ensemble, place_for
+from pyharness.model.codes import Methods, Places, Statuses
+from pyharness.model.errors import InputError
+from pyharness.model.extension import ENDS, extension
+from pyharness.model.pieces import for_each_piece
+from pyharness.model.principal import axes_and_turn
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Array
+
+if TYPE_CHECKING:
+    from pyharness.engine.solver import Solver
+
+# The methods that the kernel for many bodies has.
+_SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
+
+
+def many_starts(
+    solver: "Solver[Any]", omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
+) -> tuple[Array, NDArray[np.int8]]:
+    """Return final omegas (rad/s), (n, 3), and statuses, or raise InputError for wrong shapes."""
+    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
+    n = len(starts)
+    check_rows("t_end", times, n)
+    omega = np.empty((n, 3)) if out is None else buffer_of("out", out, (n, 3), "d")
+    if np.may_share_memory(starts, omega):  # a kernel may write a result before it reads the start
+        starts = starts.copy()
+    times = times_within(solver.scene, times)
+    axes = None if solver.scene.inertia is None else axes_and_turn(solver.scene)[0]
+    if axes is not None:
+        starts = rotated(starts, axes.T)
+    status = np.empty(n, np.int8)
+
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
+        own = times if len(times) == 1 else times[piece]
+        extension().solve_packed_many(
+            solver.packed, starts[piece].T, own, given_up, omega[piece].T, status[piece]
+        )
+
+    for_each_piece(enter, n, threads_of(threads))
+    if axes is not None:
+        omega[:] = rotated(omega, axes)
+    return omega, status
+
+
+def times_within(scene: Scene, times: Array) -> Array:
+    """Return times (s), with NaN, which kernels refuse, where a changing moment has reached 0."""
+    if scene.changing is None:
+        return times
+    first, last = scene.changing.span
+    return np.where((first < times) & (times < last), times, np.nan)
+
+
+def rotated(vectors: Array, matrix: Array) -> Array:
+    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
+    # The fixed order of the sums gives bit-for-bit the same products for any n, and as in C.
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.stack(
+        [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
+        axis=-1,
+    )
+
+
+def turned_back(attitudes: Array, turn: Any) -> Array:
+    """Return attitudes of the matrix's axes from those of the principal axes, (4,) or (n, 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
+    first, *rest = np.moveaxis(attitudes, -1, 0)
+    parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
+    return np.stack(parts, axis=-1)
+
+
+def many_states(
+    solver: "Solver[Any]", omega0: Any, t_end: Any, attitude0: Any = None, *, threads: int = 1,
+    out: "Ensemble | Array | None" = None,
+) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
+    """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many`."""
+    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
+    n = len(starts)
+    check_rows("t_end", times, n)
+    turns = rows_of("attitude0", solver.scene.attitude or IDENTITY, 4)
+    if attitude0 is not None:
+        turns = rows_of("attitude0", scalar_first(attitude0), 4)
+        check_rows("attitude0", turns, n)
+    found = place_for(out, n, with_attitude=True)
+    if out is not None:  # the starts may share memory with it
+        starts, turns = starts.copy(), turns.copy()
+    has_kernel = solver.packed[Places.METHOD] in _SIDE_BY_SIDE and solver.scene.inertia is None
+    work = partial(_solve_by_moments if has_kernel else solve_each, solver, starts, times, turns)
+    for_each_piece(partial(work, found), n, threads_of(threads))
+    assert found.attitude is not None
+    return found.omega, found.attitude, found.status
+
+
+def _solve_by_moments(
+    solver: "Solver[Any]", starts: Array, times: Array, turns: Array, found: Ensemble,
+    piece: slice, given_up: NDArray[np.int32],
+) -> None:  # fmt: skip
+    assert found.attitude is not None
+    scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
+    law = scene.body_torque
+    waves = [
+        np.array([[*amplitude, frequency] for amplitude, frequency in each]).reshape(1, -1, 4)
+        for each in (law.sines, law.cosines)
+    ]
+    extension().solve_ensemble(
+        int(solver.packed[Places.METHOD]), tolerance, scene.step_size, effort,
+        scene.moments is not None,
+        *(np.array([each]).T for each in (
+            scene.moments or scene.coefficients, law.constant, law.rate
+        )),
+        *(each.T for each in waves),
+        starts[piece].T, _select(times, piece), _select(turns, piece).T, given_up,
+        found.omega[piece].T, found.attitude[piece].T, found.status[piece],
+        found.estimates_of(piece),
+    )  # fmt: skip
+
+
+def _select(rows: Array, piece: slice) -> Array:
+    return rows if len(rows) == 1 else rows[piece]
+
+
+def solve_each(
+    solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
+    piece: slice, given_up: NDArray[np.int32],
+) -> None:  # fmt: skip
+    """Solve the bodies in `piece`, those of a recorded torque side by side; others by calls."""
+    for i in solve_side_by_side(solver, starts, times, turns, found, piece, given_up):
+        if given_up[0]:
+            return
+        solve_row(solver, i, starts, times, turns, found)
+
+
+def solve_row(
+    solver: "Solver[Any]", i: int, starts: Array, times: Array, turns: Array | None,
+    found: Ensemble,
+) -> None:  # fmt: skip
+    """Solve body `i` by a call; a body with invalid numbers is REFUSED."""
+    start, time = row_of(starts, i), float(row_of(times, i))
+    try:
+        if turns is None or found.attitude is None:
+            found.omega[i] = solver(start, time)
+        else:
+            found.omega[i], found.attitude[i] = solver(start, time, row_of(turns, i))
+        found.status[i] = ENDS.index(solver.status)
+        estimates = solver.error, solver.growth
+    except InputError:
+        found.omega[i], found.status[i] = np.nan, Statuses.REFUSED
+        if found.attitude is not None:
+            found.attitude[i] = np.nan
+        estimates = None, None
+    if found.estimates is not None:
+        found.estimates[i] = [np.nan if each is None else each for each in estimates]
+
+
+def solve_side_by_side(
+    solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
+    piece: slice, given_up: NDArray[np.int32],
+) -> list[int]:  # fmt: skip
+    """Solve the bodies in `piece` side by side, and return the indices of the unsolved bodies.
+
+    A body remains unsolved if its error can't be measured. All do if the torque is neither recorded
+    nor in space, or if the inertia matrix is full.
+    """
+    packed = solver.packed_for_lanes
+    if packed[Places.METHOD] != Methods.TAPE or solver.scene.inertia is not None:
+        return list(range(piece.start, piece.stop))
+    n = piece.stop - piece.start
+
+    def part(rows: Array) -> Array:
+        return spread(_select(rows, piece), n)
+
+    first = last = np.empty((0, 4))
+    if turns is not None:
+        first, last = unit_quaternions(part(turns)), np.empty((n, 4))
+    omega, status = np.empty((n, 3)), np.empty(n, np.int8)
+    extension().tape_many(
+        packed, part(starts).T, part(times_within(solver.scene, times)), first.T, given_up, omega.T,
+        last.T, status, found.estimates_of(piece),
+    )  # fmt: skip
+    taken = status == Statuses.COMPLETE
+    found.omega[piece][taken] = omega[taken]
+    found.status[piece][taken] = Statuses.COMPLETE
+    if found.attitude is not None:
+        found.attitude[piece][taken] = last[taken]
+    left: list[int] = (piece.start + np.flatnonzero(~taken)).tolist()
+    return left

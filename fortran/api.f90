@@ -3,10 +3,11 @@
 ! no logic.
 
 subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosines, cosines, &
-                       omega0, n_times, times, tolerance, n_attitudes, attitudes, effort, rows, &
-                       n_rows, status, steps)
+                       omega0, n_times, times, tolerance, n_attitudes, attitudes, effort, &
+                       n_nodes, nodes, n, most, ends, at_nodes, rows, n_rows, status, steps, &
+                       n_steps)
   ! Integrate by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which have
-  ! one sign and are ordered away from 0.
+  ! one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
   !f2py threadsafe
   use levels, only: taylor_solve
   use problem, only: problem_t, request_t, solution_t
@@ -29,21 +30,41 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
   !f2py real(8), optional, intent(inout) :: attitudes = 0.0
   real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  !f2py integer(4), optional, intent(in) :: n_nodes = 1
+  integer(4), intent(in) :: n_nodes
+  !f2py real(8), optional, intent(in) :: nodes = 0.0
+  real(8), intent(in), target :: nodes(n_nodes) ! in parts of a step
+  !f2py integer(4), optional, intent(in) :: n = 3
+  integer(4), intent(in) :: n                   ! number of unknowns
+  !f2py integer(4), optional, intent(in) :: most = 0
+  integer(4), intent(in) :: most                ! number of steps with nodes
+  !f2py real(8), optional, intent(inout) :: ends = 0.0
+  real(8), intent(inout), target :: ends(most + 1) ! 0 and the ends of the steps, s
+  !f2py real(8), optional, intent(inout) :: at_nodes = 0.0
+  real(8), intent(inout), target :: at_nodes(n, n_nodes, most + 1)
   real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
   integer(4), intent(out) :: n_rows
   integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
   integer(8), intent(out) :: steps
   ! steps: number of steps of the last integration
+  integer(4), intent(out) :: n_steps            ! of the last integration; may be above `most`
   type(solution_t) :: solution
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
+  if (most > 0) then
+    solution%nodes => nodes
+    ends(1) = 0.0d0
+    solution%ends => ends
+    solution%at_nodes => at_nodes
+  end if
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
                     request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows
   status = solution%status
   steps = solution%steps
+  n_steps = solution%n_steps
   effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine taylor_rows
 

@@ -11,7 +11,7 @@ module taylor_march
   use taylor_error, only: begin, count_step, estimate_truncation, &
                           estimate_truncation_from_rest, growths_of, likely_remainder
   use taylor_plan, only: order_of_variations, plan
-  use taylor_rows, only: add_last_row, add_rows, outcome_t, room_t, state_t
+  use taylor_rows, only: add_last_row, add_nodes, add_rows, outcome_t, room_t, state_t
   use taylor_series, only: expand, fitting, predict_step, propagate_precisely, &
                            propagate_variations, rescale, size_of
   use torque_terms, only: longest_turn, steps_by_turns, torque_terms_at, turn_waves, wave_t
@@ -99,6 +99,7 @@ contains
     found = outcome_t(0_int64, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, .true., 1.0_dp)
     solution%status = COMPLETE
     solution%n_rows = 0
+    solution%n_steps = 0
     with_attitude = associated(solution%attitudes)
     t_end = request%times(size(request%times))
     rest = t_end
@@ -223,6 +224,9 @@ contains
         n_before = solution%n_rows
         call add_rows(room, order, h, at_end, error, left(:3), request, solution)
         if (solution%status /= COMPLETE) exit
+        if (associated(solution%nodes)) then
+          call add_nodes(room, order, h, error, left(:3), request%tolerance, solution)
+        end if
         call count_step(attempt%precise, solution%n_rows > n_before, s%lanes, blocks)
         if (blocks%steps == 0) then
           ! Not at every step, to save time.

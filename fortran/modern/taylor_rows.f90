@@ -51,13 +51,12 @@ module taylor_rows
     real(dp) :: scale = 0.0_dp ! largest |omega|, rad/s
   end type outcome_t
 
-  public :: add_last_row, add_rows
+  public :: add_last_row, add_nodes, add_rows
 
 contains
 
   subroutine add_rows(room, order, h, at_end, before, left, request, solution)
-    !! Compute the rows within the step, except the last of all, from its terms. The error between
-    !! the ends of the step follows Hermite's cubic.
+    !! Compute the rows within the step, except the last of all, from its terms.
     type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
     integer, intent(in) :: order
     real(dp), intent(in) :: h               !! s
@@ -66,41 +65,33 @@ contains
     real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
     type(request_t), intent(in) :: request
     type(solution_t), intent(inout) :: solution
-    real(dp) :: rises(3, 2)  ! rate of the error at either end, times the step
-    real(dp) :: carried(3)   ! propagated error at the end, without truncation, rad/s
-    real(dp) :: change(4)    ! of omega, rad/s
-    real(dp) :: part, to_go
+    real(dp) :: ends(3, 4)
+    real(dp) :: part
     integer :: last
 
-    associate (s => room%s, now => room%now, attitude => room%attitude, times => request%times)
+    associate (s => room%s, now => room%now, times => request%times, n_rows => solution%n_rows)
       last = size(times)
       if (at_end) last = last - 1
-      if (solution%n_rows >= last) return
-      if (abs(times(solution%n_rows + 1) - now%t) > abs(h)) return
-      rises(:, 1) = rise(s%factors(:3), now%w(:3), before)
-      carried = s%lanes(1, :) + left
-      rises(:, 2) = rise(s%factors(:3), now%w(:3) + s%change(:3), carried)
-      do while (solution%n_rows < last)
-        if (abs(times(solution%n_rows + 1) - now%t) > abs(h)) exit
-        part = ((times(solution%n_rows + 1) - now%t) - now%t_low)/h
-        to_go = 1.0_dp - part
-        change = evaluate(order, s%terms, part)
-        call add_row(now%w(:3), now%w_low(:3) + change(:3), &
-                     (to_go*to_go)*((1.0_dp + 2.0_dp*part)*before + part*rises(:, 1)) &
-                     + (part*part)*((1.0_dp + 2.0_dp*to_go)*carried - to_go*rises(:, 2)) &
-                     - part**(order + 1)*left, &
-                     request%tolerance, now, solution%rows(:, solution%n_rows + 1))
-        if (.not. all(abs(solution%rows(:, solution%n_rows + 1)) <= huge(h))) then
+      if (n_rows >= last) return
+      if (abs(times(n_rows + 1) - now%t) > abs(h)) return
+      ends = errors_at_ends(s, now, before, left)
+      do while (n_rows < last)
+        if (abs(times(n_rows + 1) - now%t) > abs(h)) exit
+        n_rows = n_rows + 1
+        part = ((times(n_rows) - now%t) - now%t_low)/h
+        call add_row_within(now, order, part, evaluate(order, s%terms, part), ends, left, &
+                            request%tolerance, solution%rows(:, n_rows))
+        if (.not. all(abs(solution%rows(:, n_rows)) <= huge(h))) then
+          n_rows = n_rows - 1
           solution%status = OVERFLOW
           return
         end if
         if (associated(solution%attitudes)) then
-          call add_attitude_row(attitude%q_low + evaluate(order, s%turns, part), order, part, &
-                                min(LINEAR, request%tolerance), attitude, &
-                                solution%attitudes(:, solution%n_rows + 1))
+          call add_attitude_row(room%attitude%q_low + evaluate(order, s%turns, part), order, &
+                                part, min(LINEAR, request%tolerance), room%attitude, &
+                                solution%attitudes(:, n_rows))
         end if
-        solution%n_rows = solution%n_rows + 1
-        if (mod(solution%n_rows, ROWS_BETWEEN_LOOKS) == 0) then
+        if (mod(n_rows, ROWS_BETWEEN_LOOKS) == 0) then
           if (interrupt_raised() /= 0) then
             solution%status = INTERRUPTED
             return
@@ -109,6 +100,86 @@ contains
       end do
     end associate
   end subroutine add_rows
+
+  subroutine add_nodes(room, order, h, before, left, tolerance, solution)
+    !! Compute omega and attitude at the nodes of the step.
+    type(room_t), intent(inout) :: room     !! its state and attitude note the largest error
+    integer, intent(in) :: order
+    real(dp), intent(in) :: h               !! s
+    real(dp), intent(in) :: before(3)       !! error at the step's beginning, rad/s
+    real(dp), intent(in) :: left(3)         !! truncation error of the step, rad/s
+    real(dp), intent(in) :: tolerance
+    type(solution_t), intent(inout) :: solution
+    real(dp) :: ends(3, 4)
+    real(dp) :: changes(size(solution%nodes), 4)
+    integer :: k
+
+    solution%n_steps = solution%n_steps + 1
+    if (solution%n_steps >= size(solution%ends)) return
+    associate (s => room%s, now => room%now, nodes => solution%nodes, n => solution%n_steps, &
+               at_nodes => solution%at_nodes)
+      solution%ends(n + 1) = now%t + (now%t_low + h)
+      ends = errors_at_ends(s, now, before, left)
+      call evaluate_side_by_side(order, s%terms, size(nodes), nodes, changes)
+      do k = 1, size(nodes)
+        call add_row_within(now, order, nodes(k), changes(k, :), ends, left, tolerance, &
+                            at_nodes(:3, k, n))
+      end do
+      if (.not. associated(solution%attitudes)) return
+      call evaluate_side_by_side(order, s%turns, size(nodes), nodes, changes)
+      do k = 1, size(nodes)
+        call add_attitude_row(room%attitude%q_low + changes(k, :), order, nodes(k), &
+                              min(LINEAR, tolerance), room%attitude, at_nodes(4:, k, n))
+      end do
+    end associate
+  end subroutine add_nodes
+
+  pure subroutine evaluate_side_by_side(order, terms, n, parts, changes)
+    !! Compute the change of omega, or of an attitude, at fractions of the step.
+    integer, intent(in) :: order, n
+    real(dp), intent(in) :: terms(4, 0:order), parts(n)
+    real(dp), intent(out) :: changes(n, 4)
+    integer :: i, k
+
+    changes = 0.0_dp
+    do k = order, 1, -1
+      do i = 1, 4
+        changes(:, i) = (changes(:, i) + terms(i, k))*parts
+      end do
+    end do
+  end subroutine evaluate_side_by_side
+
+  pure function errors_at_ends(s, now, before, left) result(ends)
+    !! Return the errors of omega at the ends of the step, rad/s, and their rates times the step.
+    type(series_t), intent(in) :: s
+    type(state_t), intent(in) :: now
+    real(dp), intent(in) :: before(3), left(3)
+    real(dp) :: ends(3, 4)
+
+    ends(:, 1) = before
+    ends(:, 2) = rise(s%factors(:3), now%w(:3), before)
+    ends(:, 3) = s%lanes(1, :) + left ! propagated error, without truncation
+    ends(:, 4) = rise(s%factors(:3), now%w(:3) + s%change(:3), ends(:, 3))
+  end function errors_at_ends
+
+  pure subroutine add_row_within(now, order, part, change, ends, left, tolerance, row)
+    !! Compute omega within the step. The error between its ends follows Hermite's cubic.
+    type(state_t), intent(inout) :: now
+    integer, intent(in) :: order
+    real(dp), intent(in) :: part       !! of the step
+    real(dp), intent(in) :: change(4)  !! from its beginning, rad/s
+    real(dp), intent(in) :: ends(3, 4) !! of errors_at_ends
+    real(dp), intent(in) :: left(3)
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(out) :: row(3)    !! rad/s
+    real(dp) :: to_go
+
+    to_go = 1.0_dp - part
+    call add_row(now%w(:3), now%w_low(:3) + change(:3), &
+                 (to_go*to_go)*((1.0_dp + 2.0_dp*part)*ends(:, 1) + part*ends(:, 2)) &
+                 + (part*part)*((1.0_dp + 2.0_dp*to_go)*ends(:, 3) - to_go*ends(:, 4)) &
+                 - part**(order + 1)*left, tolerance, now, row)
+  end subroutine add_row_within
 
   pure subroutine add_last_row(room, order, request, solution)
     !! Compute the row at the end of the last step, after omega and attitude have been advanced.

@@ -69,25 +69,34 @@ class Solution:
     def noise(self, g: EventFunction, times: Array) -> Array:
         """Return the errors of a function due to errors of time, omega, attitude and rates."""
         states = self.states(times)
-        rates = self.sol.rates(times, states) if g.event.needs_rates else None
-        value = g(times, states, rates)
+        n, width = states.shape
         shift = _SHIFT * np.abs(times)
         later = np.where(times + shift > times, times + shift, times)
-        found = ROUNDING * np.abs(g(later, states, rates) - value) / _SHIFT
+        # All arguments in one call: the state at a later time, the state, and with each component
+        # changed.
+        moved = np.tile(states, (width + 2, 1, 1))
+        largest = self._largest_until(times)
+        for k in range(width):
+            moved[k + 2, :, k] += _SHIFT * (largest if k < 3 else 1.0)
+        every = np.concatenate([later, np.tile(times, width + 1)])
+        rates = None
+        if g.event.needs_rates:
+            rates = self.sol.rates(every[n:], moved[1:].reshape(-1, width))
+            rates = np.concatenate([rates[:n], rates])
+        after, value, *others = g(every, moved.reshape(-1, width), rates).reshape(-1, n)
+        found = ROUNDING * np.abs(after - value) / _SHIFT
         # A larger error would hide pairs of roots.
         own = max(ROUNDING, min(self.tolerance, _COARSEST))
-        largest = self._largest_until(times)
-        for k in range(states.shape[1]):
-            moved = states.copy()
-            moved[:, k] += _SHIFT * (largest if k < 3 else 1.0)
-            found += own * np.abs(self.values(g, times, moved) - value) / _SHIFT
+        for other in others:
+            found += own * np.abs(other - value) / _SHIFT
         if rates is not None:
+            rates = rates[:n]
             largest = np.abs(rates[:, :3]).max(axis=1)
             for k in range(3):
-                moved = rates.copy()
-                moved[:, k] += _SHIFT * largest
-                found += ROUNDING * np.abs(g(times, states, moved) - value) / _SHIFT
-        return found
+                changed = rates.copy()
+                changed[:, k] += _SHIFT * largest
+                found += ROUNDING * np.abs(g(times, states, changed) - value) / _SHIFT
+        return np.asarray(found)
 
     @cached_property
     def _largest(self) -> Array:
@@ -223,6 +232,8 @@ class ZeroIntervals:
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
         """Return which roots are in an interval, or so near that the function is 0 in between."""
+        if not self.low.size:
+            return np.zeros(len(roots.time), dtype=bool)
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
@@ -241,8 +252,9 @@ class ZeroIntervals:
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
     """Return the zero intervals of a function."""
+    none = ZeroIntervals(*(np.zeros(0) for _ in range(5)))
     if not fits.low.size:
-        return ZeroIntervals(*(np.zeros(0) for _ in range(5)))
+        return none
     fits = fits.only(np.argsort(fits.low))
     sizes, noise = fits.sizes, np.zeros(len(fits.low))
     largest = [sizes.argmax()]
@@ -251,6 +263,8 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     near = np.flatnonzero(sizes <= max(sizes.max() / _SUDDEN, _SUDDEN * limit))
     noise[near] = 2.0 * _noise_of(g, solution, fits.low[near], fits.high[near])
     zero = near[sizes[near] <= noise[near]]
+    if not zero.size:
+        return none
     is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]
     begins = np.flatnonzero(is_begin)
     ends = np.append(begins[1:], len(zero))[: len(begins)] - 1

@@ -91,7 +91,7 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     factor = rescaling_factor(scene, t_end)
     near_one = scaled(replace(scene, step_size=1.0, steps=1), factor)
     work = np.array([_LITTLE_WORK, 0.0, -1.0, -1.0, 0.0])
-    _, n_rows, _, _ = extension().taylor_rows(
+    _, n_rows, *_ = extension().taylor_rows(
         *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
     )
     return estimate_or_none(work[3]) if n_rows else None

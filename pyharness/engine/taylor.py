@@ -38,7 +38,7 @@ def taylor(
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
     Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
-    is None. With `with_steps`, `sol` has the steps under a recorded torque, up to 20 000. Raise
+    is None. With `with_steps`, `sol` has the steps, up to 20 000, unless the torque is about the axes of space. Raise
     InputError for an opaque torque, and if the work limit is exceeded.
     """
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
@@ -50,12 +50,13 @@ def taylor(
     most = _MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty((7 if n_attitudes else 3, NODES, most + 1), order="F")
-    recorded: dict[str, Any] = {}
-    if kernel == "tape_rows":
-        recorded = {"nodes": _NODES, "most": most, "ends": ends, "at_nodes": at_nodes}
+    room: dict[str, Any] = {}
+    if kernel != "space_torque_rows":
+        room = {"nodes": _NODES, "n": len(at_nodes), "most": most, "ends": ends}
+        room |= {"at_nodes": at_nodes, "n_nodes": NODES}
     rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,
-        n_attitudes=n_attitudes, attitudes=joint, effort=work, **recorded,
+        n_attitudes=n_attitudes, attitudes=joint, effort=work, **room,
     )  # fmt: skip
     if status == GAVE_UP:
         # After one step the kernel forecasts the work.

@@ -62,7 +62,7 @@ def _error(found: Array, truth: Array) -> float:
 
 
 def _end(scene: Scene, time: float, tolerance: float) -> tuple[Array, int, int]:
-    rows, _, status, steps = extension().taylor_rows(
+    rows, _, status, steps, _ = extension().taylor_rows(
         *normalized(scene), scene.omega, [time], tolerance
     )
     return rows[:, 0], status, steps
@@ -97,7 +97,7 @@ def test_blow_up_ends_the_rows(level: int) -> None:
     assert found.ended == "overflow"
     np.testing.assert_allclose(found.omega, [[2.0] * 3, [10.0] * 3, [1000.0] * 3], rtol=1e-10)
     assert found.steps < 10_000
-    _, n_rows, status, _ = extension().taylor_rows(*normalized(scene), scene.omega, [2.0], 1e-12)
+    _, n_rows, status, *_ = extension().taylor_rows(*normalized(scene), scene.omega, [2.0], 1e-12)
     assert (n_rows, status) == (0, 2)
 
 

@@ -159,7 +159,7 @@ def test_the_smallest_tolerance_of_a_method_is_enough() -> None:
 
 def test_too_many_polynomials_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dense, "_MOST_PIECES", 5)
-    for method in ("DOP853", "rk4"):
+    for method in ("dop853", "rk4"):
         with pytest.raises(InputError, match="dense output"):
             solve(SCENES["law"], 20.0, method, dense_output=True)
 

@@ -1,6 +1,7 @@
 """Integration by Taylor series, with adapted order and step size."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -17,10 +18,10 @@ from pyharness.engine.steps import steps_output
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import NODES, POINTS, Pieces
 from pyharness.model.effort import advice
-from pyharness.model.errors import TimedError
+from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, of_law
 from pyharness.model.trajectory import Array, Trajectory
 
 _NODES = 0.5 + 0.5 * POINTS  # of a step, in parts of it
@@ -38,9 +39,12 @@ def taylor(
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
     Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
-    is None. With `with_steps`, `sol` has the steps, up to 20 000, unless the torque is about the axes of space. Raise
-    InputError for an opaque torque, and if the work limit is exceeded.
+    is None. With `with_steps`, `sol` has the steps, up to 20 000, and such a torque is recorded.
+    Raise InputError for an opaque torque, and if the work limit is exceeded.
     """
+    if with_steps and scene.torque.in_space:
+        with suppress(InputError):  # too many terms to be recorded
+            scene = replace(scene, torque=of_law(scene.law))
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)

@@ -42,12 +42,12 @@ _UNIT = Basis(
     "measured",
     "difference of the norm of a quaternion from 1: 0.001, or the error of the attitude (rad)",
     "an integrator that does not normalise has a smaller error of the norm than of the angle "
-    "(`checks/integrator.py`)",
+    "(`checks/integrators/judging.py`)",
 )
 _SAME = Basis(
     "derived",
     "rows that differ between two answers to one request",
-    "a deterministic program gives the same answer (`checks/integrator.py`)",
+    "a deterministic program gives the same answer (`checks/integrators/judging.py`)",
 )
 
 

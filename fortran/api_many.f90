@@ -151,3 +151,24 @@ subroutine solve_packed_many(packed, n_packed, n, omega0, n_times, times, given_
   call solve_packed_bodies(packed, n_packed, n, omega0, times, omega, status, raised)
   call watch(c_null_ptr)
 end subroutine solve_packed_many
+
+subroutine inertia_frames(n, matrices, m, vectors, coefficients, axes, components, status)
+  ! Compute A, B, C of n bodies, their principal axes, and torques over moments about these.
+  !f2py threadsafe
+  use principal_frames, only: find_frame
+  implicit none
+  integer(4), intent(in) :: n
+  real(8), intent(in) :: matrices(3, 3, n)      ! symmetric, finite, kg m2
+  integer(4), intent(in) :: m                   ! vectors of a body
+  real(8), intent(in) :: vectors(3, m, n)       ! about the axes of the matrix
+  real(8), intent(out) :: coefficients(3, n)
+  real(8), intent(out) :: axes(3, 3, n)         ! in columns
+  real(8), intent(out) :: components(3, m, n)
+  integer(4), intent(out) :: status(n)          ! 0 complete, 3 not positive definite, 4 too thin
+  integer :: i
+
+  do i = 1, n
+    call find_frame(matrices(:, :, i), vectors(:, :, i), coefficients(:, i), axes(:, :, i), &
+                    components(:, :, i), status(i))
+  end do
+end subroutine inertia_frames

@@ -15,11 +15,11 @@ from pyharness.engine.many_alone import NO_ATTITUDE, is_solved_alone, solve_one_
 from pyharness.engine.many_details import Details
 from pyharness.engine.many_scenes import (
     Axes,
+    about_principal,
     check_alike,
     checked_rows,
-    from_rows,
+    from_scene,
     from_scenes,
-    inertia_scenes,
     rows_of_scene,
 )
 from pyharness.engine.plan import FINEST
@@ -195,12 +195,7 @@ def _solved(
             )  # fmt: skip
         step_size = scene.step_size
         if kind == "inertia" or (scene.inertia is not None and not kind):
-            given, axes = from_rows(
-                inertia_scenes(scene, {name: arrays[name] for name in (*_TORQUE, *_BODY)})
-            )
-            starts = {name: own[name] for name in _STARTS if name in own}
-            own = {**given, **starts}
-            axes.about_principal(own, starts)
+            own, axes = about_principal({"inertia": scene.inertia, **from_scene(scene), **own})
         else:
             if scene.inertia is not None:  # the arrays give other bodies
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
@@ -223,7 +218,7 @@ def _solved(
                     estimates=estimates, threads=threads,
                 )  # fmt: skip
             check_alike(scene)
-            own, axes = from_rows(scene)
+            own, axes = about_principal(from_scenes(scene))
         else:
             own = from_scenes(scene)
         step_size = scene[0].step_size

@@ -1,9 +1,9 @@
 """Conversion of scenes to the arrays of `solve_many`."""
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from fractions import Fraction
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,15 @@ from pyharness.model.arrays import (
     count_bodies,
     row_of,
     rows_of,
+    spread,
     unit_quaternions,
     waves_of,
 )
-from pyharness.model.attitude import IDENTITY
+from pyharness.model.attitude import IDENTITY, quaternions_of_axes
+from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
-from pyharness.model.principal import axes_and_turn, principal
+from pyharness.model.extension import extension
+from pyharness.model.inertia import SYMMETRIC, nearest_float, principal_frame
 from pyharness.model.scene import STATE_TORQUE, Scene, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
@@ -27,14 +30,20 @@ from pyharness.model.waves import with_merged_rows
 
 _MOST_KEPT = 8  # scenes whose arrays are kept
 _BODIES = ("moments", "inertia", "coefficients")
+_TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
 
 
 class Axes:
     """The principal axes of n bodies, or one set for all, and conversions to and from them."""
 
-    def __init__(self, axes: Array, turns: Array) -> None:
-        """Store the axes as columns, (n, 3, 3), and as quaternions, (n, 4)."""
-        self.axes, self.turns = axes, turns
+    def __init__(self, axes: Array) -> None:
+        """Store the axes as columns, (n, 3, 3)."""
+        self.axes = axes
+
+    @cached_property
+    def turns(self) -> Array:
+        """The axes as quaternions, (n, 4)."""
+        return quaternions_of_axes(self.axes)
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
         """Convert `omega0` and `attitude0` of `given`, if in `names`, to principal axes."""
@@ -59,37 +68,58 @@ class Axes:
             check_rows(name, rows, len(self.axes))
 
 
-def from_rows(rows: Sequence[Scene | None]) -> tuple[dict[str, Any], Axes]:
-    """Return scenes with full inertia matrices as arrays about principal axes, and these axes.
+def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Axes]:
+    """Return arrays of bodies with inertia matrices as arrays about principal axes, and these.
 
-    None becomes NaN. The arrays have A, B, C, because rounded moments would be less accurate.
+    The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
+    matrix that is not symmetric and positive definite.
     """
-    each = [_REFUSED if scene is None else _full_row(scene) for scene in rows]
-    axes = Axes(np.array([row["axes"] for row in each]), np.array([row["turn"] for row in each]))
-    return _stacked(each), axes
-
-
-_NONE = (math.nan, math.nan, math.nan)
-_REFUSED: dict[str, Any] = {
-    "coefficients": _NONE, "omega0": _NONE, "torque_constant": _NONE, "torque_rate": _NONE,
-    "sines": [], "cosines": [], "axes": np.eye(3), "turn": IDENTITY, "attitude0": None,
-}  # fmt: skip
-
-
-def _full_row(scene: Scene) -> dict[str, Any]:
-    turned, axes = principal(scene)
-    law, moments = turned.body_torque, np.array(turned.moments)
-    return {
-        "coefficients": turned.euler_coefficients,
-        "omega0": turned.omega,
-        "torque_constant": np.array(law.constant) / moments,
-        "torque_rate": np.array(law.rate) / moments,
-        "sines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.sines],
-        "cosines": [[*(np.array(wave) / moments), frequency] for wave, frequency in law.cosines],
-        "axes": axes,
-        "turn": axes_and_turn(scene)[1],
-        "attitude0": turned.attitude,
+    rows = checked_rows({name: given[name] for name in given if name not in _BODIES})
+    own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
+    own |= {name: rows.pop(name) for name in _TORQUES}
+    n = count_bodies(own)
+    matrices, constant, rate, sines, cosines = (spread(each, n) for each in own.values())
+    constant, sines, cosines = with_merged_rows(constant, sines, cosines)
+    with np.errstate(all="ignore"):
+        opposite = matrices.transpose(0, 2, 1)
+        largest = np.abs(matrices).max(axis=(1, 2))
+        is_right = np.isfinite(largest) & (
+            np.abs(matrices - opposite).max(axis=(1, 2)) <= SYMMETRIC * largest
+        )
+        matrices = np.where(is_right[:, None, None], 0.5 * matrices + 0.5 * opposite, np.eye(3))
+    vectors = np.concatenate(
+        [constant[:, None], rate[:, None], sines[..., :3], cosines[..., :3]], axis=1
+    )
+    coefficients, axes, components, status = (
+        np.ascontiguousarray(each.T)
+        for each in extension().inertia_frames(matrices.transpose(1, 2, 0), vectors.T)
+    )
+    axes = axes.transpose(0, 2, 1)
+    for i in np.flatnonzero((status == Statuses.GAVE_UP) & np.isfinite(vectors).all(axis=(1, 2))):
+        (a, b, c), (d, e, f), (g, h, k) = matrices[i].tolist()
+        frame = principal_frame(((a, b, c), (d, e, f), (g, h, k)))
+        i1, i2, i3 = exact = frame.exact_moments
+        exact_coefficients = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
+        coefficients[i] = [nearest_float(each) for each in exact_coefficients]
+        axes[i] = frame.axes
+        for row, (x, y, z) in enumerate(vectors[i].tolist()):
+            turned = frame.into((Fraction(x), Fraction(y), Fraction(z)))
+            parts = zip(turned, exact, strict=True)
+            components[i, row] = [nearest_float(part / moment) for part, moment in parts]
+    coefficients[~is_right | (status == Statuses.REFUSED)] = np.nan
+    last = 2 + sines.shape[1]
+    found = {
+        **rows,
+        "coefficients": coefficients,
+        "torque_constant": components[:, 0],
+        "torque_rate": components[:, 1],
+        "sines": np.concatenate([components[:, 2:last], sines[..., 3:]], axis=2),
+        "cosines": np.concatenate([components[:, last:], cosines[..., 3:]], axis=2),
     }
+    found = {name: np.ascontiguousarray(each) for name, each in found.items()}
+    about = Axes(np.ascontiguousarray(axes))
+    about.about_principal(found, rows)
+    return found, about
 
 
 def _filled(laws: list[Any]) -> list[Any]:
@@ -97,9 +127,10 @@ def _filled(laws: list[Any]) -> list[Any]:
     return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
 
 
-def _from_scene(scene: Scene) -> dict[str, Any]:
-    law = checked_scene(scene).body_torque
-    kind = "coefficients" if scene.moments is None else "moments"
+def from_scene(scene: Scene) -> dict[str, Any]:
+    """Return the arrays of a scene."""
+    law = checked_scene(scene, any_axes=True).body_torque
+    kind = next(name for name in _BODIES if getattr(scene, name) is not None)
     return {
         kind: getattr(scene, kind),
         "omega0": scene.omega,
@@ -124,7 +155,7 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
     found = _kept.get(id(scene))
     if found is not None:
         return found[1]
-    rows: dict[str, Any] = checked_rows(_from_scene(scene))
+    rows: dict[str, Any] = checked_rows(from_scene(scene))
     rows["merged"] = with_merged_rows(rows["torque_constant"], rows["sines"], rows["cosines"])
     if len(_kept) >= _MOST_KEPT:
         _kept.clear()
@@ -157,8 +188,8 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     if not scenes:
         raise InputError("the sequence of scenes is empty; give at least one scene")
     check_alike(scenes)
-    rows = [_from_scene(each) for each in scenes]
-    if len({"moments" in row for row in rows}) > 1:
+    rows = [from_scene(each) for each in scenes]
+    if len({"coefficients" in row for row in rows}) > 1:
         raise InputError(
             "some bodies are given by coefficients and others are not; allowed: "
             "coefficients for all, or for none"
@@ -168,7 +199,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {"attitude0": None}
-    for name in ("moments", "coefficients", "omega0", "torque_constant", "torque_rate"):
+    for name in (*_BODIES, "omega0", "torque_constant", "torque_rate"):
         if name in rows[0]:
             found[name] = np.array([row[name] for row in rows])
     for name in ("sines", "cosines"):
@@ -189,18 +220,6 @@ _CONVERSIONS: dict[str, Callable[[Any], Array]] = {
     "t_end": partial(rows_of, "t_end"),
     "attitude0": lambda values: rows_of("attitude0", values, 4),
 }
-
-
-def inertia_scenes(scene: Scene, arrays: dict[str, Any]) -> list[Scene | None]:
-    """Return the scene of each body; None for a body with invalid numbers."""
-    rows = rows_of_bodies(arrays)
-    found: list[Scene | None] = []
-    for i in range(count_bodies(rows)):
-        try:
-            found.append(scene_of_row(scene, rows, i))
-        except InputError:
-            found.append(None)
-    return found
 
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:

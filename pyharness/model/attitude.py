@@ -148,9 +148,15 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
     """Return the attitude of a right-handed frame, the columns of a 3 x 3 array."""
+    w, x, y, z = quaternions_of_axes(axes[None])[0].tolist()
+    return w, x, y, z
+
+
+def quaternions_of_axes(axes: Array) -> Array:
+    """Return the attitudes of n right-handed frames, the columns of arrays, shape (n, 3, 3)."""
     # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
     # Older versions of SciPy refuse read-only arrays.
-    x, y, z, w = Rotation.from_matrix(np.array(axes)).as_quat().tolist()
-    return w, x, y, z
+    found: Array = Rotation.from_matrix(np.array(axes)).as_quat()[:, [3, 0, 1, 2]]
+    return found

@@ -16,7 +16,7 @@ from pyharness.model.values import Triple, converted, number_list, three
 Exact = tuple[Fraction, Fraction, Fraction]
 Array = NDArray[np.float64]
 
-_ALIKE = 1e-12  # allowed asymmetry of elements, over the largest element
+SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
 _KEPT = 256  # number of cached principal frames
 
 
@@ -67,7 +67,7 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
     largest = max(abs(x) for row in given for x in row)
     for i in range(3):
         for j in range(i):
-            if abs(given[i][j] - given[j][i]) > _ALIKE * largest:
+            if abs(given[i][j] - given[j][i]) > SYMMETRIC * largest:
                 raise InputError(
                     f"{where}: not symmetric, row {i + 1} column {j + 1} is {given[i][j]:g} and "
                     f"row {j + 1} column {i + 1} is {given[j][i]:g}; allowed: equal numbers"

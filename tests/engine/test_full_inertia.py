@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pyharness import Scene, TorqueLaw, principal, solve
+from pyharness import InputError, Scene, TorqueLaw, principal, solve, solve_many
+from pyharness.engine.many_scenes import about_principal
 from pyharness.model.scene import Triple
 from pyharness.truth.reference import reference
 
@@ -124,3 +125,57 @@ def test_what_rounding_takes_off_a_moment_is_kept() -> None:
     )
     # A copy with another start has the same body.
     assert replace(bare, omega=(3.0, 2.0, 1.0)).exact_moments == exact
+
+
+@pytest.mark.parametrize(
+    ("shape", "apart"),
+    [("plain", 1e-15), ("thin", 1e-15), ("needle", 1e-15), ("nearly round", 1e-5)],
+)
+def test_many_matrices_have_the_principal_axes_of_each(shape: str, apart: float) -> None:
+    """`apart` allows for axes that the rounding of the matrix determines."""
+    rng = np.random.default_rng(55)
+    turns = Rotation.random(20, random_state=rng).as_matrix()
+    moments = rng.uniform(1.0, 1.5, (20, 3))
+    if shape in ("thin", "needle"):
+        moments[:, 0] *= 2.0**-35 if shape == "thin" else 2.0**-44
+    if shape == "nearly round":
+        moments = 1.0 + 1e-10 * rng.uniform(0.0, 1.0, (20, 3))
+    matrices = np.einsum("nij,nj,nkj->nik", turns, moments, turns)
+    matrices = 0.5 * matrices + 0.5 * matrices.transpose(0, 2, 1)
+    torques, rows = rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
+    waves = np.concatenate([rng.normal(size=(20, 2, 3)), np.full((20, 2, 1), 3.0)], axis=2)
+    waves[:, 1, 3] = 5.0
+    given = {
+        "inertia": matrices, "torque_constant": torques, "torque_rate": rows, "sines": waves,
+        "cosines": [], "omega0": (1.0, 2.0, 3.0),
+    }  # fmt: skip
+    found, axes = about_principal(given)
+    for n, matrix in enumerate(matrices.tolist()):
+        law = TorqueLaw(torques[n], rows[n], sines=[(each[:3], each[3]) for each in waves[n]])
+        try:
+            scene, own = principal(Scene("", (1.0, 2.0, 3.0), inertia=matrix, torque=law))
+        except InputError:  # rounding has made a needle's least moment negative
+            assert np.isnan(found["coefficients"][n]).all()
+            continue
+        assert found["coefficients"][n] == pytest.approx(scene.euler_coefficients, rel=4e-16)
+        assert axes.axes[n] == pytest.approx(own, rel=0.0, abs=apart)
+        i = np.array(scene.moments)
+        about = scene.law
+        for name, vector in (
+            ("torque_constant", about.constant), ("torque_rate", about.rate),
+            ("sines", about.sines[0][0]),
+        ):  # fmt: skip
+            row = found[name][n, 0, :3] if name == "sines" else found[name][n]
+            assert row * i == pytest.approx(vector, rel=1e-15, abs=10.0 * apart)
+
+
+def test_a_matrix_in_an_array_is_refused_alone() -> None:
+    good, thin = np.diag([1.0, 2.0, 2.5]), np.diag([2.0**-60, 1.0, 1.0])
+    skew = good.copy()
+    skew[0, 1] = 0.1
+    matrices = [good, -good, skew, np.full((3, 3), np.nan), thin]
+    found = solve_many(Scene("", (1.0, 2.0, 3.0), inertia=good), 1.0, inertia=matrices)
+    assert found.ended.tolist() == ["complete", *["refused"] * 3, "complete"]
+    assert found.omega[4] == pytest.approx(
+        solve(Scene("", (1.0, 2.0, 3.0), inertia=thin), 1.0).omega[-1], rel=1e-9
+    )

@@ -41,7 +41,7 @@ class Method:
     default: float
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
     gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
-    # Takes a fifth argument, whether `sol` has the steps, which it has under a recorded torque.
+    # Takes a fifth argument, whether `sol` has the steps.
     gives_steps: bool = False
     order: int = 0  # of the global error in the step size; 0 if it varies
     evaluations: int = 0  # right-hand sides per step; 0 if the number varies
@@ -108,6 +108,8 @@ def _scipy(scipy: str, title: str, source: str) -> Method:
         FINEST[scipy],
         _SCIPY_DEFAULT,
         scipy_method(scipy),
+        # The others' interpolants are less accurate than their steps.
+        gives_steps=scipy in ("DOP853", "LSODA"),
         attitude=True,
         state_torque=True,
         scipy=scipy,

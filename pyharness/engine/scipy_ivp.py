@@ -85,10 +85,15 @@ def scipy_method(name: str) -> Integrator:
     """Return an integrator by SciPy's method `name` that chooses the local tolerance."""
 
     def solve(
-        scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
+        scene: Scene,
+        times: Sequence[float],
+        tolerance: float,
+        effort: float = 1.0,
+        with_steps: bool = False,
     ) -> Trajectory:
         if isinstance(scene.torque, StateTorque):
-            return solve_state(name, scene, times, tolerance, effort, _most(name, effort))
+            most = _most(name, effort)
+            return solve_state(name, scene, times, tolerance, effort, most, with_steps)
         if times[-1] == 0.0:
             return rows_of(times, np.array([state_of(scene)]), 0, 0, "complete")
         run = _Run(scene, times[-1], name, effort)

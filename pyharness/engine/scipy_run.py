@@ -69,8 +69,11 @@ class Run:
         longest: float = math.inf,
         begin: float = 0.0,
         state: Sequence[float] | None = None,
+        with_steps: bool = False,
     ) -> Any:
-        """Return SciPy's result by its method `name`, with dense output if there are no `times`.
+        """Return SciPy's result by its method `name`.
+
+        It has dense output `with_steps`, or if there are no `times`.
 
         The result's times are in units of `self.unit` seconds, the arguments in s. Raise
         NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
@@ -95,7 +98,7 @@ class Run:
                     self.start if state is None else state,
                     method=name,
                     t_eval=None if times is None else [time / self.unit for time in times],
-                    dense_output=times is None,
+                    dense_output=with_steps or times is None,
                     events=phase_left,
                     rtol=relative,
                     atol=absolute,

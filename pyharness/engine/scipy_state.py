@@ -4,10 +4,12 @@ The error amplification of such a torque is unknown. Therefore the local toleran
 the difference of two integrations shows that the second meets the tolerance.
 """
 
+import itertools
 import math
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +21,9 @@ from pyharness.engine.scipy_run import (
     rows_of,
 )
 from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
+from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.system import slopes_of
+from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.errors import InputError, TimedError, printable
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -38,6 +42,7 @@ _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
 # The longest step is the time span over this number, which grows with each integration, so that no
 # two pass a short pulse or sample a wave in the same way.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
+_WITHIN = np.array([0.2, 0.5, 0.8])  # parts of a step at which interpolants are compared
 _COARSE = 1e-3
 # The preliminary integration of a body at rest is repeated if omega is smaller than expected by
 # this factor.
@@ -61,6 +66,7 @@ class _Rows(NamedTuple):
     state: Array  # shape (n, 3) or (n, 7): omega, and the attitude as a unit quaternion
     is_complete: bool  # whether there is a row for each time
     largest: float  # largest abs(omega) of any component from 0 to the end (rad/s)
+    solutions: Sequence[Any] = ()  # SciPy's dense outputs, one after the other
 
 
 def solve_state(
@@ -70,11 +76,13 @@ def solve_state(
     tolerance: float,
     effort: float,
     most: float,
+    with_steps: bool = False,
 ) -> Trajectory:
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
 
     The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
-    work limit in right-hand sides of a body without torque.
+    work limit in right-hand sides of a body without torque. With `with_steps`, `sol` has the steps
+    under an opaque torque, by SciPy's interpolants.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular. It is
     ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
@@ -82,6 +90,7 @@ def solve_state(
     exceeded.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
+    run.with_steps = with_steps and not run.is_smooth
     nothing = np.empty((0, len(run.start)))
     if run.is_singular():
         run.check_undefined()
@@ -100,7 +109,8 @@ def solve_state(
         run.check_undefined()
     count = len(found.state)
     ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
-    return rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+    result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
+    return replace(result, sol=run.steps(scene)) if ended == "complete" else result
 
 
 def _solved(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
@@ -167,7 +177,24 @@ def _allowed(error: float) -> str:
 def _difference(before: _Rows, after: _Rows) -> float:
     """Return the largest relative difference of omega, or angle (rad) between attitudes."""
     n = min(len(before.state), len(after.state))
-    return float(_differences(before, after, n).max(initial=0.0))
+    found = float(_differences(before, after, n).max(initial=0.0))
+    if not (before.solutions and before.is_complete and after.is_complete):
+        return found
+    # The interpolants are inaccurate where a torque has a kink.
+    for one in after.solutions:
+        ends = one.ts[:-1, None]
+        times = (ends + np.diff(one.ts)[:, None] * _WITHIN).ravel()
+        first, second = (each._replace(state=_state_at(each, times)) for each in (before, after))
+        found = max(found, float(_differences(first, second, len(times)).max(initial=0.0)))
+    return found
+
+
+def _state_at(rows: _Rows, times: Array) -> Array:
+    """Return the states at n ascending or descending times by SciPy's dense outputs, (n, m)."""
+    last = np.array([each.ts[-1] for each in rows.solutions])
+    which = np.searchsorted(np.abs(last), np.abs(times)).clip(max=len(last) - 1)
+    parts = [rows.solutions[k](times[which == k]).T for k in np.unique(which)]
+    return _with_unit_attitude(np.concatenate(parts))
 
 
 def _differences(before: _Rows, after: _Rows, n: int) -> Array:
@@ -221,6 +248,8 @@ class _StateRun(Run):
         self._undefined: float | None = None
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
+        self.with_steps = False
+        self._solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
     def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
@@ -310,6 +339,7 @@ class _StateRun(Run):
         longest = abs(self.end) / (_FEWEST_STEPS + _MORE_STEPS * self._integrations)
         rows = np.empty((0, len(self.start)))
         state, begin, self._largest = self.start, 0.0, 0.0
+        self._solutions.clear()
         # Each integration ends where a table changes, because SciPy may pass the change.
         for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
@@ -329,25 +359,49 @@ class _StateRun(Run):
         while wanted:
             self._reached, self._stuck = begin, 0
             try:
-                result = self.solved(self.name, local, sizes, wanted, longest, begin, state)
+                result = self.solved(
+                    self.name, local, sizes, wanted, longest, begin, state, self.with_steps
+                )
             except NoNumberError:
                 # SciPy returned no rows, although those before the failure exist.
                 wanted = [time for time in wanted if abs(time) < abs(self._reached)]
                 continue
             if result.status == 1 and self._largest < _UNBOUNDED * scale:
                 raise self.phase_error(float(result.t_events[0][0]))
+            self._solutions += [result.sol] if self.with_steps else []
             # SciPy returns an empty list if it reached no time.
             return np.reshape(np.asarray(result.y).T, (-1, len(self.start)))
         return np.empty((0, len(self.start)))
+
+    def steps(self, scene: Scene) -> DenseOutput | None:
+        """Return the steps of the last integration, or None if there are none, or too many."""
+        edges, values = [0.0], []
+        for sol in self._solutions:
+            for (first, last), step in zip(
+                itertools.pairwise(sol.ts.tolist()), sol.interpolants, strict=True
+            ):
+                values.append(step(first + (last - first) * STEP_NODES).T)
+                edges.append(last * self.unit)
+        if not 0 < len(values) <= MOST_STEPS:
+            return None
+        order = 1 if self.end > 0.0 else -1
+        nodes = np.array(values)[::order, ::order]
+        return steps_output(scene, Pieces(np.array(edges)[::order], nodes))
 
     def _collect_rows(self, rows: Array, wanted: int) -> _Rows:
         rows = np.reshape(rows, (-1, len(self.start)))
         finite = np.isfinite(rows).all(axis=1)
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
-        if rows.shape[1] > 3:
-            unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
-            rows = np.hstack([rows[:, :3], unit])
-        return _Rows(rows, len(rows) == wanted, self._largest)
+        rows = _with_unit_attitude(rows)
+        solutions = tuple(self._solutions)
+        return _Rows(rows, len(rows) == wanted, self._largest, solutions)
+
+
+def _with_unit_attitude(rows: Array) -> Array:
+    if rows.shape[1] == 3:
+        return rows
+    unit = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    return np.hstack([rows[:, :3], unit])
 
 
 def _interior(first: float, second: float) -> tuple[float, float]:

@@ -71,7 +71,7 @@ def solve(
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
-        A name in `pyharness.engine.registry.METHODS`.
+        A name in `pyharness.engine.registry.METHODS`. `auto` uses `dop853` for an opaque torque.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
         from 0 on. The default depends on the method, 1e-12 for `auto`. Methods with a fixed step
@@ -84,8 +84,9 @@ def solve(
         space, require it.
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        to within the tolerance. Under a recorded torque `sol` has the steps of the integration;
-        else further integrations are needed. With a fixed step it is a cubic on each step.
+        to within the tolerance. By Taylor series, and for an opaque torque, `sol` has the steps
+        of the integration; else further integrations are needed. With a fixed step it is a cubic on
+        each step.
     events : callable, Event, or list of these
         Functions of `(t, omega)` or `(t, omega, attitude)`, or events of `pyharness.events`, whose
         roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
@@ -129,6 +130,8 @@ def solve(
     dense_output = boolean("dense_output", dense_output)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
+    if method == "auto" and isinstance(scene.torque, StateTorque) and scene.torque.tape is None:
+        method = "dop853"
     chosen = METHODS[method]
     tolerance = requested_tolerance(method, tolerance)
     if chosen.is_fixed_step and tolerance != 1.0:

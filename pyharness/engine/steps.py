@@ -8,8 +8,11 @@ import numpy as np
 
 from pyharness.engine.rates import rates
 from pyharness.model.array_type import Array
-from pyharness.model.dense_output import DenseOutput, Pieces
+from pyharness.model.dense_output import POINTS, DenseOutput, Pieces
 from pyharness.model.scene import Scene
+
+STEP_NODES = 0.5 + 0.5 * POINTS  # in parts of a step
+MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:

@@ -14,18 +14,15 @@ from pyharness.engine.problem import (
     trajectory_of,
 )
 from pyharness.engine.recorded import kernel_tape, system
-from pyharness.engine.steps import steps_output
+from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.model.attitude import IDENTITY
-from pyharness.model.dense_output import NODES, POINTS, Pieces
+from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
 from pyharness.model.trajectory import Array, Trajectory
-
-_NODES = 0.5 + 0.5 * POINTS  # of a step, in parts of it
-_MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def taylor(
@@ -51,12 +48,12 @@ def taylor(
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     kernel, given = series_kernel(scene)
-    most = _MOST_STEPS if with_steps else 0
+    most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty((7 if n_attitudes else 3, NODES, most + 1), order="F")
     room: dict[str, Any] = {}
     if kernel != "space_torque_rows":
-        room = {"nodes": _NODES, "n": len(at_nodes), "most": most, "ends": ends}
+        room = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
         room |= {"at_nodes": at_nodes, "n_nodes": NODES}
     rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,

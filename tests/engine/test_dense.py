@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, solve, torques
+from pyharness import ChangingMoments, InputError, Scene, TorqueLaw, opaque, solve, torques
 from pyharness.engine import dense, taylor
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.events import crosses
@@ -289,10 +289,29 @@ def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: pytest.Monke
     scene, times = SCENES["damping"], np.linspace(0.1, 40.0, 30)
     truth = solve(scene, times, tolerance=1e-14)
     kept = solve(scene, 40.0, tolerance=1e-10, dense_output=True)
-    monkeypatch.setattr(taylor, "_MOST_STEPS", kept.steps - 1)
+    monkeypatch.setattr(taylor, "MOST_STEPS", kept.steps - 1)
     other = solve(scene, 40.0, tolerance=1e-10, dense_output=True)
     counts = [len(sol_of(each).states.edges) - 1 for each in (kept, other)]  # type: ignore[attr-defined]
     assert counts[0] == kept.steps
     assert counts[1] != kept.steps
     for each in (kept, other):
         assert largest_error(sol_of(each), truth) <= 1e-10
+
+
+@pytest.mark.parametrize("end", [9.0, -2.0])
+def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: float) -> None:
+    calls = 0
+
+    def brake(time: float, omega: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return np.clip(-0.8 * omega + np.sin(3.0 * time), -0.5, 0.5)
+
+    scene = Scene("brake", (1.0, 0.2, -0.7), moments=(1.0, 2.0, 2.5), torque=opaque(brake))
+    found = solve(scene, end, tolerance=1e-6, dense_output=True, events=lambda t, w: w[2])
+    assert calls <= found.evaluations + 2
+    times = np.linspace(0.0, end, 101)[1:]
+    truth = solve(scene, times, "dop853", 1e-9)
+    assert largest_error(sol_of(found), truth) <= 1e-6
+    assert found.t_events is not None
+    assert len(found.t_events[0]) == np.sum(np.diff(np.sign(truth.omega[:, 2])) != 0.0)

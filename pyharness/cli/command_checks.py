@@ -12,7 +12,7 @@ from pyharness.checks.integrators.protocol import refuse_integrator
 from pyharness.checks.plants.outcome import Outcome, self_test_report
 from pyharness.checks.port import Cell, port, port_cells, random_cells, refuse_port
 from pyharness.checks.port_report import port_report
-from pyharness.checks.scenes.moderate import KINDS
+from pyharness.checks.scenes.random_scenes import MODERATE as KINDS
 from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
 from pyharness.cli.forecast import CHECKS, Cost, check_count

@@ -20,7 +20,7 @@ from pyharness.checks.integrators.protocol import read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER
 from pyharness.checks.plants.outcome import CONTROL
 from pyharness.checks.port_process import PortError
-from pyharness.checks.scenes.moderate import KINDS, draw_moderate
+from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.cli.main import main
 from pyharness.model.attitude import angle_between
 from tests.campaigns import integrator_campaign as campaign
@@ -69,7 +69,7 @@ def test_a_right_integrator_has_its_order_and_no_fault(capsys: Capture) -> None:
     record = _json(capsys, command_of(RK4), "--order", "4", "--seed", "right", "--draws", "1")
     assert record["findings"] == []
     names = [each["problem"] for each in record["convergence"][::2]]
-    assert names == [f"{kind}-0" for kind in KINDS]
+    assert names == [f"{kind}-0" for kind in MODERATE]
     for each in record["convergence"]:
         assert each["order"] == pytest.approx(4.0, abs=0.2)
         assert each["control"] == "step_size"
@@ -381,7 +381,7 @@ def test_pictures_and_reports_are_written(tmp_path: Path, capsys: Capture) -> No
     assert "order of omega" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MODERATE)
 def test_known_motions_differ_from_the_true_one_and_from_each_other(kind: str) -> None:
     """Faults whose motions are equal could not be told apart."""
     scene = draw_moderate("apart", kind, 0)
@@ -404,7 +404,7 @@ def test_known_motions_differ_from_the_true_one_and_from_each_other(kind: str) -
 
 
 def test_scenes_are_bodies_that_can_be() -> None:
-    for kind, number in itertools.product(KINDS, range(20)):
+    for kind, number in itertools.product(MODERATE, range(20)):
         scene = draw_moderate("bodies", kind, number)
         assert not scene.is_impossible
         a, b, c = sorted(scene.moments or ())

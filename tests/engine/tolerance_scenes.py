@@ -11,7 +11,7 @@ import numpy as np
 
 from pyharness import ChangingInertia, ChangingMoments, Scene, TorqueLaw, case_scene, torques
 from pyharness.checks.scenes import state_scenes
-from pyharness.checks.scenes.kinds import KINDS as DRAWN
+from pyharness.checks.scenes.random_scenes import KINDS as DRAWN
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.model.attitude import IDENTITY
 from tests.checks.scenes.cancelling import MERGED, cancelling

@@ -16,7 +16,7 @@ from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
-from pyharness.checks.scenes.moderate import draw_moderate
+from pyharness.checks.scenes.random_scenes import draw_moderate
 from pyharness.cli.output import check_tree
 from pyharness.edition.crate import PACKAGE_MARK
 from pyharness.edition.report import MARK

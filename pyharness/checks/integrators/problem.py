@@ -13,7 +13,7 @@ import numpy as np
 from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import Fault, State, motions
 from pyharness.checks.integrators.protocol import Motion, request
-from pyharness.checks.scenes.moderate import KINDS, draw_moderate
+from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.model.attitude import angle_between
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -50,7 +50,7 @@ class Problem:
 
     @property
     def kind(self) -> str:
-        """Return the kind of the torque, one of `scenes.moderate.KINDS`."""
+        """Return the kind of the torque, one of `scenes.random_scenes.MODERATE`."""
         return self.scene.name.partition("-")[0]
 
     @cached_property
@@ -240,7 +240,7 @@ class Judged:
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
     """Return `draws` random scenes of each kind, or those in `names` (``wave-1`` or a kind)."""
-    drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in KINDS]
+    drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in MODERATE]
     return [
         Problem(scene)
         for scene in drawn

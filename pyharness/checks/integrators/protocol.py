@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.checks.port_process import PortError, refuse_other
 from pyharness.checks.port_protocol import read_list, read_number, read_object
-from pyharness.checks.scenes.moderate import KINDS, draw_moderate
+from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.model.records import scene_record
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS
@@ -67,7 +67,7 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
 
 def refuse_integrator(command: str) -> None:
     """Raise InputError if `command`, which does not answer as a port, is an integrator."""
-    line = request(draw_moderate("", KINDS[0], 0), [1.0], 0.5, 1e-3)
+    line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 
 

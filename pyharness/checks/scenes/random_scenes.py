@@ -1,19 +1,25 @@
-"""Random scenes, listings and parameters, reproducible from a seed and a number."""
+"""Random scenes by kind, listings and parameters, reproducible from a seed and a number."""
 
 import datetime
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from random import Random
 
 import numpy as np
 
-from pyharness.checks.scenes.kinds import KINDS, NASTY
+from pyharness.engine.rescaled import scaled
+from pyharness.engine.rotated import rotated
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw, Wave
 
 COARSEST = 1e-3
 # Defects added later are drawn last, so that the draws of a seed do not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
+MODERATE = ("free", "constant", "wave")
+"""The kinds of moderate scenes: torque-free, constant torque, waves with a linear torque."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ def draw(seed: str, number: int) -> Draw:
     """Return the random inputs of check `number`, the same in all versions of Python."""
     # A generator for each draw, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
-    scene = KINDS["plain"](source)
+    scene = _plain(source)
     if number % 2 == 1:
         name = source.choice(list(NASTY))
         scene = replace(NASTY[name](source), name=name)
@@ -77,5 +83,267 @@ def text_generator(seed: str) -> np.random.Generator:
 
 
 def random_scene(kind: str, seed: str | int, name: str = "") -> Scene:
-    """Return the scene of a kind, a key of `scenes.kinds.KINDS`, for a seed."""
+    """Return the scene of a kind, a key of `KINDS`, for a seed."""
     return replace(KINDS[kind](Random(seed)), name=name)
+
+
+def draw_moderate(seed: str, kind: str, number: int) -> Scene:
+    """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
+
+    The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
+    steps, 6 s in all. Torques are some tenths of a moment times 1/s2.
+    """
+    source = Random(f"{seed}/moderate/{kind}/{number}")
+    size = 10.0 ** source.uniform(-1.0, 1.0)
+    low = source.uniform(1.0, 2.0)
+    middle = low * source.uniform(1.15, 1.6)
+    high = source.uniform(1.1 * middle, 0.95 * (low + middle))
+    moments = [size * moment for moment in (low, middle, high)]
+    source.shuffle(moments)
+
+    def vector(least: float, most: float) -> list[float]:
+        return [source.choice((-1.0, 1.0)) * source.uniform(least, most) for _ in range(3)]
+
+    def torque(factor: float = 1.0) -> list[float]:
+        pairs = zip(vector(0.2, 0.6), moments, strict=True)
+        return [factor * (part * moment) for part, moment in pairs]
+
+    law = TorqueLaw()
+    if kind == "constant":
+        law = TorqueLaw(torque())
+    elif kind == "wave":
+        rate, *waves = torque(0.1), *((torque(), source.uniform(1.0, 3.0)) for _ in range(2))
+        law = TorqueLaw(rate=rate, sines=waves[:1], cosines=waves[1:])
+    omega, attitude = vector(0.4, 1.4), [source.gauss(0.0, 1.0) for _ in range(4)]
+    name = f"{kind}-{number}"
+    return Scene(name, omega, moments, torque=law, attitude=attitude, step_size=0.5, steps=12)
+
+
+def _body(source: Random) -> list[float]:
+    """Return random possible moments (kg m2) in ascending order."""
+    low, middle = sorted((source.uniform(1.0, 50.0), source.uniform(1.0, 50.0)))
+    return [low, middle, source.uniform(middle, low + middle)]
+
+
+def _plain(source: Random) -> Scene:
+    moments = _body(source)
+    source.shuffle(moments)
+    return _scene(source, _vector(source, 5.0), moments)
+
+
+def _near_symmetric(source: Random) -> Scene:
+    moment = source.uniform(1.0, 50.0)
+    apart = 1.0 + source.choice((-1.0, 1.0)) * 10.0 ** -source.uniform(1.0, 16.0)
+    moments = [moment, moment * apart, moment * source.uniform(0.1, 1.9)]
+    source.shuffle(moments)
+    return _scene(source, _vector(source, 5.0), moments)
+
+
+def _near_separatrix(source: Random) -> Scene:
+    moments = _body(source)
+    spin = source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0)
+    omega = _disturbed(source, spin, 10.0 ** -source.uniform(1.0, 12.0))
+    axes = source.sample(range(3), 3)
+    return _scene(source, _pick(omega, axes), _pick(moments, axes), torque=False)
+
+
+def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
+    """Return omega (rad/s): `spin` about axis 2, plus a perturbation of at most `faint`."""
+    return [w + faint * e for w, e in zip((0.0, spin, 0.0), _vector(source, 1.0), strict=True)]
+
+
+def _violent(source: Random) -> Scene:
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(1.0, 4.0)
+    constant, rate = _vector(source, size), _vector(source, size)
+    law = TorqueLaw(constant, rate, [_wave(source, size, 10.0 ** source.uniform(0.0, 4.0))])
+    return replace(scene, torque=law, step_size=1e-2 / size**0.5, steps=50)
+
+
+def _from_rest(source: Random) -> Scene:
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.0)
+    axes = source.choice(((0,), (1,), (2,), (0, 1, 2), (0, 1, 2)))
+    law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
+
+    def kept(values: Triple) -> Triple:
+        return _triple(x if k in axes else 0.0 for k, x in enumerate(values))
+
+    return rotated(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
+
+
+def _slow_waves(source: Random) -> Scene:
+    """Return a random scene under waves of 1e-12 to 0.1 rad/s, whose phase may hardly change."""
+    scene = _plain(source)
+    size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
+    law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
+    start = 0.0 if source.random() < 0.5 else 10.0 ** -source.uniform(0.0, 6.0)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
+
+
+def _many_speeds(source: Random) -> Scene:
+    """Return a random scene with waves of 1e-6 to 630 rad/s, some as both sine and cosine."""
+    scene = _plain(source)
+    some: list[list[Wave]] = [[], []]
+    for _ in range(source.randint(2, 6)):
+        amplitude = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.5)
+        frequency = 10.0 ** source.uniform(-6.0, 2.8)
+        some[source.randrange(2)].append(_wave(source, amplitude, frequency))
+    sines, cosines = some
+    if source.random() < 0.2:
+        # The same frequencies in sines and cosines, which methods may combine.
+        cosines = sines
+    start, law = source.choice((0.0, 0.01, 1.0)), TorqueLaw(sines=sines, cosines=cosines)
+    return replace(scene, omega=_times(start, scene.omega), torque=law)
+
+
+def _far_scale(source: Random) -> Scene:
+    exponent = source.choice((-1, 1)) * source.randint(20, 450)
+    scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
+    if abs(exponent) > 300:
+        # The rate of a torque scales with the cube, and would overflow or underflow.
+        scene = replace(_plain(source), torque=TorqueLaw())
+    found = scaled(scene, 2.0**exponent)
+    mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
+    return replace(rotated(found, lambda each: _times(mass, each), body=True), omega=found.omega)
+
+
+def _sensitive(source: Random) -> Scene:
+    """Return a random scene near a middle axis, where errors may grow by up to 1e6."""
+    low, middle, high = body = _body(source)
+    spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
+    rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5
+    faint = abs(spin) * 10.0 ** -source.uniform(1.0, 8.0)
+    omega, law = _disturbed(source, spin, faint), TorqueLaw()
+    if source.random() < 0.6:
+        size = low * faint * max(rate, 0.1)
+        law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
+    axes, steps = source.sample(range(3), 3), source.randint(10, 60)
+    step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
+    return Scene("", _pick(omega, axes), _pick(body, axes), None, law, step_size, steps)
+
+
+def _long(source: Random) -> Scene:
+    scene = _plain(source)
+    return replace(scene, step_size=10.0 ** source.uniform(0.5, 1.3) / scene.steps)
+
+
+def _no_body(source: Random) -> Scene:
+    """Return a random scene with coefficients A, B, C that no body has."""
+    return _scene(source, _vector(source, 2.0), None, _vector(source, 1.5))
+
+
+def _extreme(source: Random) -> Scene:
+    """Return a random scene with numbers from nearly all of binary64; most such runs overflow."""
+
+    def any_size() -> float:
+        if source.random() < 0.1:
+            return source.choice((0.0, -0.0))
+        return float(source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-300.0, 300.0))
+
+    law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
+    moments = [abs(x) or 1.0 for x in sizes]
+    torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
+    return Scene("", omega, moments, None, torque, 10.0 ** source.uniform(-100.0, 2.0), 20)
+
+
+def _unsorted_body(source: Random) -> Triple:
+    low, middle = source.uniform(5.0, 50.0), source.uniform(5.0, 50.0)
+    return source.uniform(abs(low - middle), low + middle), low, middle
+
+
+def _pointing(source: Random) -> Scene:
+    moments, omega = _unsorted_body(source), _vector(source, 3.0)
+    return Scene("", omega, moments, attitude=[source.gauss(0, 1) for _ in range(4)])
+
+
+def _driven(source: Random) -> Scene:
+    moments = _unsorted_body(source)
+    constant, rate, sine = (_vector(source, size) for size in (20.0, 5.0, 20.0))
+    law = TorqueLaw(constant, rate, [(sine, source.uniform(0.1, 20.0))])
+    return Scene("", _vector(source, 3.0), moments, torque=law)
+
+
+NASTY: dict[str, Callable[[Random], Scene]] = {
+    "near-symmetric": _near_symmetric,
+    "near-separatrix": _near_separatrix,
+    "violent torque": _violent,
+    "from rest": _from_rest,
+    "slow waves": _slow_waves,
+    "many speeds": _many_speeds,
+    "far scale": _far_scale,
+    "sensitive": _sensitive,
+    "long": _long,
+    "coefficients": _no_body,
+    "extreme": _extreme,
+}
+"""The functions that return scenes difficult for numerical methods, by kind."""
+
+KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
+"""The functions that return random scenes, by kind."""
+
+
+def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
+    """Return a random torque law whose components do not exceed `size` (N m, N m/s).
+
+    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are the
+    lowest and the highest (rad/s).
+    """
+    low, high = map(math.log10, frequencies)
+    constant, rate = _vector(source, size), _vector(source, size)
+    sine, cosine = (_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2))
+    return TorqueLaw(
+        constant if kinds & 1 else (0.0, 0.0, 0.0),
+        rate if kinds & 2 else (0.0, 0.0, 0.0),
+        [sine] if kinds & 4 else [],
+        [cosine] if kinds & 8 else [],
+    )
+
+
+def _scene(
+    source: Random,
+    omega: Sequence[float],
+    moments: Sequence[float] | None,
+    coefficients: Sequence[float] | None = None,
+    torque: bool = True,
+) -> Scene:
+    """Return a scene with random torque and steps, from `moments` (kg m2) or `coefficients`."""
+    size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
+
+    def wave(most: float) -> list[Wave]:
+        return [_wave(source, size, source.uniform(0.1, most))]
+
+    laws: tuple[Callable[[], TorqueLaw], ...] = (
+        TorqueLaw,
+        lambda: TorqueLaw(_vector(source, size)),
+        lambda: TorqueLaw(_vector(source, size), _vector(source, size)),
+        lambda: TorqueLaw(sines=wave(30.0), cosines=wave(300.0)),
+    )
+    law = laws[source.randrange(4) if torque else 0]()
+    step_size, steps = 10.0 ** source.uniform(-3.0, -1.3), source.randint(10, 60)
+    return Scene("plain", omega, moments, coefficients, law, step_size, steps)
+
+
+def _largest(scene: Scene) -> float:
+    return max(scene.moments or (1.0,))
+
+
+def _vector(source: Random, size: float) -> Triple:
+    return _triple(source.uniform(-size, size) for _ in range(3))
+
+
+def _wave(source: Random, size: float, frequency: float) -> Wave:
+    return _vector(source, size), frequency
+
+
+def _times(factor: float, values: Triple) -> Triple:
+    return _triple(factor * x for x in values)
+
+
+def _pick(values: list[float], axes: list[int]) -> Triple:
+    return _triple(values[k] for k in axes)
+
+
+def _triple(values: Iterable[float]) -> Triple:
+    first, second, third = values
+    return first, second, third

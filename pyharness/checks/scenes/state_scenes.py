@@ -49,9 +49,7 @@ TIMED = ("table", "pulses")  # ready terms that depend on time alone
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
     """Return a random scene under one to three terms of `names`, and its end time (s)."""
     chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
-    size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
-    moments = [size * x for x in _moments(source)]
-    speed = 10.0 ** source.uniform(-1.0, 1.0)
+    size, moments, speed = _body(source)
     terms = [term(source, name, size, speed) for name in chosen]
     turning = any(name in TURNING for name in chosen)
 
@@ -62,32 +60,40 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
         return torque(t, omega, None)
 
     with_attitude = turning or source.random() < 0.3
-    scene = Scene(
-        " + ".join(chosen),
-        [source.uniform(-speed, speed) for _ in range(3)],
-        moments=moments,
-        torque=torque if turning else still,
-        attitude=[source.gauss(0.0, 1.0) for _ in range(4)] if with_attitude else None,
-    )
-    radians = 10.0 ** source.uniform(-0.5, 1.7)
-    return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
+    return _moving(source, chosen, moments, speed, torque if turning else still, with_attitude)
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
     """Return a random scene under one or two ready-made terms of `names`, and its end time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
-    size = 10.0 ** source.uniform(-2.0, 1.0)  # of the moments, kg m2
-    moments = [size * x for x in _moments(source)]
-    speed = 10.0 ** source.uniform(-1.0, 1.0)
+    _, moments, speed = _body(source)
     torque = sum(ready(source, name, moments, speed) for name in chosen)
     assert isinstance(torque, StateTorque)
-    scene = Scene(
-        " + ".join(chosen),
-        [source.uniform(-speed, speed) for _ in range(3)],
-        moments=moments,
-        torque=torque,
-        attitude=[source.gauss(0.0, 1.0) for _ in range(4)],
-    )
+    return _moving(source, chosen, moments, speed, torque, with_attitude=True)
+
+
+def _body(source: Random) -> tuple[float, list[float], float]:
+    """Return the size of random possible moments, the moments (kg m2), and a speed (rad/s)."""
+    size = 10.0 ** source.uniform(-2.0, 1.0)
+    while True:
+        found = sorted(10.0 ** source.uniform(-0.5, 0.3) for _ in range(3))
+        if found[2] < found[0] + found[1]:
+            source.shuffle(found)
+            return size, [size * x for x in found], 10.0 ** source.uniform(-1.0, 1.0)
+
+
+def _moving(
+    source: Random,
+    chosen: list[str],
+    moments: list[float],
+    speed: float,
+    torque: StateTorque | Callable[..., Any],
+    with_attitude: bool,
+) -> tuple[Scene, float]:
+    """Return a scene with random omega and, if wanted, attitude, and its end time (s)."""
+    omega = [source.uniform(-speed, speed) for _ in range(3)]
+    attitude = [source.gauss(0.0, 1.0) for _ in range(4)] if with_attitude else None
+    scene = Scene(" + ".join(chosen), omega, moments, torque=torque, attitude=attitude)
     radians = 10.0 ** source.uniform(-0.5, 1.7)
     return scene, source.choice((1.0, 1.0, -0.3)) * radians / speed
 
@@ -109,31 +115,20 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
         "magnetic_dipole": lambda: magnetic_dipole([speed * x for x in vector], field),
         "magnetic_damping": lambda: magnetic_damping(0.3 * part, vector),
         "in_space": lambda: in_space([part * speed * x for x in vector]),
-        "table": lambda: _table(source, part * speed, 1.0 / speed),
-        "pulses": lambda: _pulses(source, part * speed, 1.0 / speed),
+        "table": lambda: _of_time(source, part * speed, 1.0 / speed, 12),
+        "pulses": lambda: _of_time(source, part * speed, 1.0 / speed, 6),
     }
     found: StateTorque = made[name]()
     return found
 
 
-def _table(source: Random, size: float, length: float) -> StateTorque:
+def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:
+    """Return a table of 12 values, or 6 pulses."""
     times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
-    values = [[source.uniform(-size, size) for _ in range(3)] for _ in times]
+    values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(count)]
+    if count == 6:
+        return pulses(times[::2], times[1::2] - times[::2], values)
     return table(times, values, source.choice(("held", "linear", "cubic")))
-
-
-def _pulses(source: Random, size: float, length: float) -> StateTorque:
-    ends = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
-    values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(6)]
-    return pulses(ends[::2], ends[1::2] - ends[::2], values)
-
-
-def _moments(source: Random) -> list[float]:
-    while True:
-        found = sorted(10.0 ** source.uniform(-0.5, 0.3) for _ in range(3))
-        if found[2] < found[0] + found[1]:
-            source.shuffle(found)
-            return found
 
 
 def term(source: Random, name: str, size: float, speed: float) -> Term:

@@ -8,8 +8,7 @@ from random import Random
 import pytest
 
 from pyharness.checks.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
-from pyharness.checks.scenes.kinds import KINDS, NASTY
-from pyharness.checks.scenes.random_scenes import draw, random_scene, text_generator
+from pyharness.checks.scenes.random_scenes import KINDS, NASTY, draw, random_scene, text_generator
 from tests.checks.scenes import free_motions, timed_kinds
 from tests.checks.scenes.cancelling import LEFT, MERGED, cancelling
 from tests.checks.scenes.timed_kinds import timed_scenes

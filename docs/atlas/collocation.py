@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from docs.atlas.maps import region_panels, thinned, values_of
-from pyharness.checks.theory.regions import regions
+from pyharness.checks.theory.amplification import regions
 from pyharness.checks.theory.rotations import rates
 from pyharness.model.facts import facts
 from pyharness.model.report import Picture, numbers

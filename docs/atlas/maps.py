@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.checks.theory.regions import Regions
+from pyharness.checks.theory.amplification import Regions
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
 from pyharness.sweep.axes import Axis

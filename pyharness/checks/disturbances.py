@@ -16,9 +16,8 @@ from pyharness.checks.theory.amplification import (
     boundary,
     weight_of_squares,
 )
-from pyharness.checks.theory.collocation_matrices import points, solver_roundings
+from pyharness.checks.theory.collocation_matrices import Exact, points, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING
-from pyharness.checks.theory.rational import Exact
 from pyharness.checks.theory.schemes import Numbers, runge_kutta_punched, spacing
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing

@@ -10,8 +10,8 @@ import numpy as np
 
 from pyharness.checks.check import Check
 from pyharness.checks.stress import Trial
+from pyharness.checks.theory.amplification import Regions
 from pyharness.checks.theory.brouwer import LAWS
-from pyharness.checks.theory.regions import Regions
 from pyharness.model.errors import InputError
 from pyharness.model.report import Column, Picture, Table, digits, numbers
 

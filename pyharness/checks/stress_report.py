@@ -52,7 +52,7 @@ def _picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     from pyharness.checks import pictures
 
     if trial.name == "regions":
-        from pyharness.checks.theory.regions import regions
+        from pyharness.checks.theory.amplification import regions
 
         return pictures.regions_picture(regions())
     if trial.name == "length":

@@ -10,9 +10,13 @@ import pytest
 
 from pyharness.checks.pictures import regions_picture
 from pyharness.checks.theory import collocation_matrices
-from pyharness.checks.theory.amplification import amplification, boundary, weight_of_squares
+from pyharness.checks.theory.amplification import (
+    amplification,
+    boundary,
+    regions,
+    weight_of_squares,
+)
 from pyharness.checks.theory.collocation_matrices import singular_below, solved
-from pyharness.checks.theory.regions import regions
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, Numbers, Series, local_error
 from pyharness.checks.theory.step_errors import Forecaster, path
 from pyharness.cli.main import main

@@ -6,6 +6,8 @@ coefficients are exact fractions. The matrix has m rows for the m vectors that a
 In the original Runge-Kutta program these are two: the result, and U(1), at which the first stage is
 evaluated.
 
+A region of linear stability in the plane of z is where the spectral radius is at most 1.
+
 A collocation program evaluates the right-hand side along a straight line, its first estimate, and
 corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F). Here F is its
 value at s = 0, and Q its quadratic part.
@@ -18,9 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.checks.theory.collocation_matrices import PARTS
-from pyharness.checks.theory.rational import Exact, Fractions, collocation_matrix, inverse
-from pyharness.model.listing import Listing
+from pyharness.checks.theory.collocation_matrices import (
+    PARTS,
+    Exact,
+    Fractions,
+    collocation_matrix,
+    inverse,
+)
+from pyharness.model.listing import Listing, subset
+from pyharness.model.trajectory import Array
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -28,6 +36,12 @@ _HIGHEST = 5
 # A stability boundary nearer to z = 0 than this counts as being at z = 0.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
+# Samples of z: smallest value, largest value, and number of values. The rectangle of _REAL and
+# _IMAGINARY contains all stability boundaries. _DISTANCES are distances of imaginary z from 0.
+_REAL = (-4.6, 1.4, 301)
+_IMAGINARY = (-3.6, 3.6, 361)
+_DISTANCES = (1e-3, 4.0, 181)
+_HIDDEN = 1e-13  # largest growth that is regarded as a rounding error
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +108,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
     """Return a collocation step's weight of Q(F), the integral of s**2 / h**3; exact is 1/3."""
     points, weights = _quadrature(listing, step)
-    found: Fraction = weights @ points**2
-    return found
+    return Fraction(weights @ points**2)
 
 
 def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
@@ -108,9 +121,11 @@ def _quadrature(listing: Listing, step: int) -> tuple[Fractions, Fractions]:
 def _runge_kutta(listing: Listing) -> Amplification:
     """Return the matrix of the Runge-Kutta program (cards 770-1200).
 
-    Stages depend on U(1) and on the base of the step, the previous result.
+    Stages depend on U(1) and on the base of the step, the previous result. A vector has the shape
+    (2, powers of z).
     """
-    first, base = _one(2, 0), _one(2, 1)
+    first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
+    first[0, 0] = base[1, 0] = Fraction(1)
     half = Fraction(1, 2)
 
     def stored(before: Fractions, slope: Fractions, length: Fraction) -> Fractions:
@@ -131,13 +146,6 @@ def _runge_kutta(listing: Listing) -> Amplification:
         return Amplification(matrix)
     # U(1) and the base are the same vector, whose columns are added.
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
-
-
-def _one(size: int, place: int) -> Fractions:
-    """Return the identity for vector `place` of `size`, shape (size, powers of z)."""
-    result = np.full((size, _HIGHEST), Fraction(0), dtype=object)
-    result[place, 0] = Fraction(1)
-    return result
 
 
 def _times_z(x: Fractions) -> Fractions:
@@ -178,3 +186,60 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
     beyond = high * (1.0 + 1e-6)
     rise = float(matrix.radius(np.array(beyond * direction))) - 1.0
     return high, rise / (beyond - high)
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """The spectral radius of an amplification matrix on a grid of z and on the imaginary axis."""
+
+    name: str  # a text that names the programs and methods that have this matrix
+    # shape (imaginary, real); spectral radius on the grid, of the matrix from `moving`
+    radius: Array
+    # spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if it is only rounding
+    growth: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """The stability regions, where the spectral radius is at most 1, on one grid of z."""
+
+    # real and imaginary parts of z on the grid in the complex plane
+    real: Array
+    imaginary: Array
+    distances: Array  # distances of samples of z from 0, along the imaginary axis
+    regions: tuple[Region, ...]  # in the order in which they are drawn
+
+
+def matrices() -> dict[str, Amplification]:
+    """Return the distinct amplification matrices, by the names of programs and `rk4`.
+
+    The Runge-Kutta program has two more, each with a single defect.
+    """
+    return {
+        "two-term and four-term, original and corrected": amplification(
+            Listing.corrected("two-term")
+        ),
+        "runge-kutta corrected, rk4": amplification(Listing.corrected("runge-kutta")),
+        "runge-kutta original": amplification(Listing.original("runge-kutta")),
+        "runge-kutta, stage-base alone": amplification(subset("runge-kutta", keep=["stage-base"])),
+        "runge-kutta, base-not-restored alone": amplification(
+            subset("runge-kutta", keep=["base-not-restored"])
+        ),
+    }
+
+
+def regions() -> Regions:
+    """Return the stability regions of all programs, original and corrected.
+
+    The Runge-Kutta program also has regions with `stage-base` or `base-not-restored` alone. Gauss
+    collocation is omitted; its region is the left half-plane.
+    """
+    real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
+    distances = np.geomspace(*_DISTANCES)
+    plane = real[None, :] + 1j * imaginary[:, None]
+    found = []
+    for name, matrix in matrices().items():
+        growth = matrix.radius(1j * distances) - 1.0
+        growth = np.where(np.abs(growth) < _HIDDEN, 0.0, growth)
+        found.append(Region(name, matrix.moving().radius(plane), growth))
+    return Regions(real, imaginary, distances, tuple(found))

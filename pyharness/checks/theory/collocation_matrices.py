@@ -10,21 +10,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from pyharness.checks.theory.rational import (
-    Fractions,
-    collocation_matrix,
-    fractions,
-    gamma,
-    inverse,
-    norm,
-)
 from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array
 from pyharness.thesis import collocation
 from pyharness.thesis.linear_solver import SINGULAR, leqt1f
 
+Exact = list[list[Fraction]]
+Fractions = NDArray[np.object_]
+
+_UNIT = Fraction(1, 2**53)
 # The collocation points of each program, at which the residual is zero, in units of the step size.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
@@ -54,6 +50,40 @@ SINGULARITY = Basis(
 # is a multiple of 2**-352. In forward substitution every further product costs 202 binary digits,
 # so that each unknown is 0 or at least 2**-756. It is at most 2**600.
 _RANGE = 2.0**-150, 2.0**150
+
+
+def inverse(matrix: Fractions) -> Fractions:
+    """Return the exact inverse, by Gauss-Jordan elimination."""
+    count = len(matrix)
+    rows = np.hstack([matrix, np.eye(count, dtype=object)])
+    for j in range(count):
+        pivot = j + int(abs(rows[j:, j]).argmax())
+        rows[[j, pivot]] = rows[[pivot, j]]
+        rows[j] = rows[j] / rows[j, j]
+        others = np.arange(count) != j
+        rows[others] -= np.outer(rows[others, j], rows[j])
+    return rows[:, count:]
+
+
+def fractions(floats: ArrayLike) -> Fractions:
+    """Return an array of floats as exact fractions."""
+    return np.asarray(np.vectorize(Fraction, otypes=[object])(floats))
+
+
+def gamma(count: int) -> Fraction:
+    """Return n u / (1 - n u), u = 2**-53, the bound of n roundings (Higham 2002, lemma 3.1)."""
+    return count * _UNIT / (1 - count * _UNIT)
+
+
+def norm(matrix: Fractions) -> Fraction:
+    """Return the row-sum norm."""
+    return Fraction(abs(matrix).sum(axis=1).max())
+
+
+def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
+    """Return the matrix of derivatives of t, t**2, ..., t**n, one row per point (eq. 36)."""
+    rows = [[(j + 1) * point**j for j in range(len(points))] for point in points]
+    return np.array(rows, dtype=object)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,9 @@ linearised along the solution, is the resulting error at time t.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -34,6 +36,8 @@ FLOW = Basis(
 _NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 50
 _MOST_NODES = 400_000
+
+_Sample = TypeVar("_Sample")
 
 
 @dataclass(frozen=True)
@@ -75,8 +79,16 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     Raise InputError if the solution grows without bound before, if it would be needed at too many
     times, or if the amplification exceeds binary64.
     """
-    times = _nodes(scene, time)
-    omega, complete = _path(scene, times)
+
+    def sample(times: Array) -> tuple[float, tuple[Array, bool]]:
+        omega, complete = _path(scene, times)
+        with np.errstate(all="ignore"):
+            return float(np.abs(jacobians(scene, omega)).sum(axis=2).max()), (omega, complete)
+
+    if time == 0.0:
+        times, (omega, complete) = np.zeros(2), _path(scene, np.zeros(2))
+    else:
+        times, (omega, complete) = sampled(sample, time, _FEWEST_NODES, _MOST_NODES)
     if not complete:
         raise InputError(f"conditioning: the solution grows without bound before t = {time:g} s")
     return along(scene, times, omega)
@@ -89,10 +101,9 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
     exceeds binary64.
     """
     with np.errstate(all="ignore"):
-        found = _along(scene, times, omega)
-    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
-        raise InputError("conditioning: the error amplification overflows; use a shorter time")
-    return found
+        largest = float(np.abs(omega).max()) or 1.0
+        flow = propagators(scene, times, omega)
+        return of_flow(flow, times, omega, magnitudes(scene, times, omega), largest)
 
 
 def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
@@ -106,34 +117,27 @@ def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
     return np.vstack([scene.omega, path.omega]), path.has_all_rows
 
 
-def _nodes(scene: Scene, time: float) -> Array:
-    """Return equally spaced times up to `time` (s), between which omega changes little.
+def sampled(
+    sample: Callable[[Array], tuple[float, _Sample]], time: float, fewest: int, most: int
+) -> tuple[Array, _Sample]:
+    """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    Raise InputError if more than 400 000 intervals (`_MOST_NODES`) would be needed.
+    `sample` returns the largest rate (1/s) at given times, and what is returned with the last
+    times. Raise InputError if more than `most` intervals would be needed; `fewest` are tried first.
     """
-    if time == 0.0:
-        return np.zeros(2)
-    count = _FEWEST_NODES
+    count = fewest
     while True:
         times = np.linspace(0.0, time, count + 1)
-        omega, _ = _path(scene, times)
-        with np.errstate(all="ignore"):
-            largest = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
-        wanted = largest * abs(time) * _NODES_PER_RADIAN
-        # `wanted` is NaN if the product of very large numbers is undefined.
-        if not wanted <= _MOST_NODES:
+        rate, found = sample(times)
+        wanted = rate * abs(time) * _NODES_PER_RADIAN
+        # `wanted` is NaN where the torque is singular, or very large numbers have no product.
+        if not wanted <= most:
             raise InputError(
                 "conditioning: the motion is too fast for so long a time; use a shorter time"
             )
         if count >= wanted:
-            return times
+            return times, found
         count = math.ceil(wanted)
-
-
-def _along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    largest = float(np.abs(omega).max()) or 1.0
-    flow = propagators(scene, times, omega)
-    return of_flow(flow, times, omega, magnitudes(scene, times, omega), largest)
 
 
 def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: float) -> Conditioning:
@@ -141,7 +145,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 
     `flow` has the matrix from each time to the last, shape (n, m, m). `state` has the shape (n, m),
     and so has `source`, the sums of magnitudes of the terms of its derivative (1/s). Errors are
-    divided by `largest`.
+    divided by `largest`. Raise InputError if the amplification exceeds binary64.
     """
     steps, sizes = np.diff(times), np.abs(flow)
 
@@ -153,7 +157,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
     ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
-    return Conditioning(
+    found = Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
         # The product of the divisors might underflow.
@@ -161,6 +165,9 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
     )
+    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
+        raise InputError("conditioning: the error amplification overflows; use a shorter time")
+    return found
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:

@@ -5,8 +5,9 @@ from functools import partial
 from typing import Any
 
 from pyharness.checks.theory.rotations import Rates, SteadyRotation, SteadyRotations
+from pyharness.checks.theory.rotations_picture import rotations_picture
 from pyharness.model.records import build_record, scene_record
-from pyharness.model.report import Column, Picture, Report, Section, Table, digits, numbers, words
+from pyharness.model.report import Column, Report, Section, Table, digits, numbers, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 
@@ -44,7 +45,7 @@ def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
             "build": build_record(),
         },
         data=numbers(_FULL, [_row(each) for each in found.rotations]),
-        pictures={"rotations": partial(_picture, scene)},
+        pictures={"rotations": partial(rotations_picture, scene)},
     )
 
 
@@ -97,10 +98,3 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
         "stable": each.stable,
         **dict(zip(_TIMES, _times(each), strict=True)),
     }
-
-
-def _picture(scene: Scene) -> Picture:
-    # The table does not need this module.
-    from pyharness.checks.theory.rotations_picture import rotations_picture
-
-    return rotations_picture(scene)

@@ -10,12 +10,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from pyharness.checks.theory.collocation_matrices import PARTS
-from pyharness.checks.theory.rational import collocation_matrix, inverse
+from pyharness.checks.theory.collocation_matrices import PARTS, collocation_matrix, inverse
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
@@ -137,28 +137,22 @@ def collocation_singular(program: str) -> Scheme:
     return scheme
 
 
-def runge_kutta_4(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after a step of classical Runge-Kutta (eq. 31)."""
-    first = on.times_step(on.rate(omega))
-    second = on.times_step(on.rate(omega + 0.5 * first))
-    third = on.times_step(on.rate(omega + 0.5 * second))
-    fourth = on.times_step(on.rate(omega + third))
-    return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
+def runge_kutta_4(on: Arithmetic, omega: Array, punched: bool = False) -> Array:
+    """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-
-def runge_kutta_punched(on: Arithmetic, omega: Array) -> Array:
-    """Return omega after the first step of the original Runge-Kutta program.
-
-    The third stage starts from the point of the second, and the fourth from the point of the third;
-    classically both start from `omega`.
+    If `punched`, it is the first step of the original program: the third stage starts from the
+    point of the second, and the fourth from the point of the third, instead of both from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
     second = on.times_step(on.rate(at))
-    at = at + 0.5 * second
+    at = (at if punched else omega) + 0.5 * second
     third = on.times_step(on.rate(at))
-    fourth = on.times_step(on.rate(at + third))
+    fourth = on.times_step(on.rate((at if punched else omega) + third))
     return np.asarray(omega + (first + 2.0 * (second + third) + fourth) / 6.0)
+
+
+runge_kutta_punched = partial(runge_kutta_4, punched=True)
 
 
 def improved_euler(on: Arithmetic, omega: Array) -> Array:

@@ -5,14 +5,13 @@ recorded operations of the equations. Errors of omega are divided by the largest
 the attitude are angles (rad).
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
 
-from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow
+from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow, sampled
 from pyharness.engine.array_tape import inputs_of, outputs_at, table_values
 from pyharness.engine.linearised import transitions
 from pyharness.engine.recorded import system
@@ -24,7 +23,6 @@ from pyharness.model.tape import ATTITUDE, OMEGA, Functions, Tape, evaluate
 from pyharness.model.tape_derivative import with_derivatives
 from pyharness.model.trajectory import Array
 
-_NODES_PER_RADIAN = 12.0
 _FEWEST_NODES = 100
 _MOST_NODES = 40_000
 # A component of the quaternion is half an angle (rad).
@@ -40,45 +38,29 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
-    each = [_of_state(scene, time) for time in times]
-    return Conditioning(
-        amplification=max(x.amplification for x in each),
-        rounding=max(x.rounding for x in each),
-        storing=max(x.storing for x in each),
-        unamplified=max(x.unamplified for x in each),
-        largest=max(x.largest for x in each),
-    )
+    each = [astuple(_of_state(scene, time)) for time in times]
+    return Conditioning(*map(max, zip(*each, strict=True)))
 
 
 def _of_state(scene: Scene, time: float) -> Conditioning:
     tape = system(scene)
     slots = OMEGA if scene.attitude is None else (*OMEGA, *ATTITUDE)
     slopes = with_derivatives(tape, slots)
-    count = _FEWEST_NODES
-    while True:
-        times = np.linspace(0.0, time, count + 1)
+
+    def sample(times: Array) -> tuple[float, tuple[Array, Array, Array]]:
         state = _path(scene, times)
         largest = float(np.abs(state[:, :3]).max()) or 1.0
         units = np.array([largest] * 3 + [_OF_ANGLE] * (len(slots) - 3))
-        middle = 0.5 * (state[1:] + state[:-1])
-        matrices = (
-            _jacobians(slopes, 0.5 * (times[1:] + times[:-1]), middle) * units / units[:, None]
-        )
-        wanted = float(np.abs(matrices).sum(axis=2).max()) * abs(time) * _NODES_PER_RADIAN
-        # `wanted` is NaN where the torque is singular.
-        if not wanted <= _MOST_NODES:
-            raise InputError(
-                "conditioning: the motion is too fast for so long a time; use a shorter time"
-            )
-        if count >= wanted:
-            break
-        count = math.ceil(wanted)
+        middles = 0.5 * (times[1:] + times[:-1]), 0.5 * (state[1:] + state[:-1])
+        matrices = outputs_at(slopes, *middles)[:, len(slots) :].reshape(-1, len(slots), len(slots))
+        matrices = matrices * units / units[:, None]
+        return float(np.abs(matrices).sum(axis=2).max()), (state, units, matrices)
+
+    times, (state, units, matrices) = sampled(sample, time, _FEWEST_NODES, _MOST_NODES)
     with np.errstate(all="ignore"):
         flow = transitions(times, matrices)
         found = of_flow(flow, times, state / units, _sources(tape, times, state) / units, 1.0)
-    if not (math.isfinite(found.amplification) and math.isfinite(found.rounding)):
-        raise InputError("conditioning: the error amplification overflows; use a shorter time")
-    return replace(found, largest=largest)
+    return replace(found, largest=float(units[0]))
 
 
 def _path(scene: Scene, times: Array) -> Array:
@@ -93,11 +75,6 @@ def _path(scene: Scene, times: Array) -> Array:
         )
     rows = path.omega if path.attitude is None else np.hstack([path.omega, path.attitude])
     return np.vstack([[*scene.omega, *(scene.attitude or ())], rows])
-
-
-def _jacobians(slopes: Tape, times: Array, state: Array) -> Array:
-    n, m = state.shape
-    return outputs_at(slopes, times, state)[:, m:].reshape(n, m, m)
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:

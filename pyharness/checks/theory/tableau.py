@@ -10,11 +10,11 @@ formed.
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from operator import mul
 
 import numpy as np
 from numpy.polynomial import legendre
 
+from pyharness.checks.theory.collocation_matrices import fractions, inverse
 from pyharness.model.trajectory import Array
 
 
@@ -60,32 +60,11 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
             tests = basis(nodes, n)
             if weighting == "galerkin":
                 tests = tests * nodes[:, None]
-    weighted = _exact((tests * quadrature[:, None]).T)
+    weighted = fractions((tests * quadrature[:, None]).T)
     # Computed in fractions, because in floats the tableau would depend on the LAPACK in use.
-    projection = _solved(_product(weighted, _exact(basis(nodes, n))), weighted)
-    matrix = _product(_exact(_integrals(nodes, n)), projection)
-    return Tableau(nodes, np.array(matrix, dtype=float), np.array(projection[0], dtype=float))
-
-
-def _exact(values: Array) -> list[list[Fraction]]:
-    return [[Fraction(x) for x in row] for row in values.tolist()]
-
-
-def _product(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    columns = list(zip(*b, strict=True))
-    return [[sum(map(mul, row, c), Fraction()) for c in columns] for row in a]
-
-
-def _solved(a: list[list[Fraction]], b: list[list[Fraction]]) -> list[list[Fraction]]:
-    rows = [[*left, *right] for left, right in zip(a, b, strict=True)]
-    for k in range(len(rows)):
-        pivot = next(i for i in range(k, len(rows)) if rows[i][k])
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(len(rows)):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return [row[len(a) :] for row in rows]
+    projection = inverse(weighted @ fractions(basis(nodes, n))) @ weighted
+    matrix = fractions(_integrals(nodes, n)) @ projection
+    return Tableau(nodes, matrix.astype(float), projection[0].astype(float))
 
 
 def grid(points: str | tuple[float, ...] | None, n: int) -> Array:

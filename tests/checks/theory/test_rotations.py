@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, solve
-from pyharness.checks.theory.polhodes import growth_of_bodies, polhodes
 from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
+from pyharness.checks.theory.rotations_picture import growth_of_bodies, polhodes
 from pyharness.cli.main import main
 from pyharness.engine.linearised import jacobians
 from pyharness.model.scene import Triple

@@ -1,6 +1,6 @@
 """The problem of `bench --ensemble`, and our contenders."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -60,17 +60,13 @@ class EnsembleLoad:
         """Return torques divided by moments, shape (n, 3), in rad/s2."""
         if self.torque is None:
             return np.zeros_like(self.omega0)
-        found: Array = self.torque / np.array(MOMENTS)
-        return found
+        return np.asarray(self.torque / np.array(MOMENTS))
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
         """Return the load of the bodies in `rows`."""
-        names = ("omega0", "torque", "attitude0")
-        given = {name: getattr(self, name) for name in names}
-        own: dict[str, Any] = {
-            name: None if array is None else np.ascontiguousarray(array[rows])
-            for name, array in given.items()
-        }
+        given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
+        own: dict[str, Any] = {}
+        own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}
         return replace(self, **own)
 
     def ends(self) -> Array:
@@ -78,18 +74,19 @@ class EnsembleLoad:
 
         If attitudes are requested, return the quaternions instead, shape (n, 4).
         """
-        found = np.empty_like(self.omega0 if self.attitude0 is None else self.attitude0)
+        found = []
+        for scene in self.scenes():
+            attitude = scene.attitude is not None
+            path = solve(scene, [self.horizon], tolerance=1e-15, attitude=attitude)
+            found.append((path.omega if self.attitude0 is None else np.asarray(path.attitude))[0])
+        return np.array(found)
+
+    def scenes(self) -> Iterator[Scene]:
+        """Yield the scene of each body."""
         for i, start in enumerate(self.omega0.tolist()):
             law = TorqueLaw() if self.torque is None else TorqueLaw(self.torque[i].tolist())
-            scene = Scene(self.name, start, MOMENTS, torque=law)
-            if self.attitude0 is None:
-                found[i] = solve(scene, [HORIZON], tolerance=1e-15).omega[0]
-            else:
-                turned = replace(scene, attitude=self.attitude0[i].tolist())
-                attitude = solve(turned, [HORIZON], tolerance=1e-15, attitude=True).attitude
-                assert attitude is not None
-                found[i] = attitude[0]
-        return found
+            attitude = None if self.attitude0 is None else self.attitude0[i].tolist()
+            yield Scene(self.name, start, MOMENTS, torque=law, attitude=attitude)
 
 
 # A function of the bodies, the setting (a tolerance or a number of steps) and the number of

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from typing import Any
 
-from pyharness.bench.ensemble_growth import Memory, Size
-from pyharness.bench.ensemble_measure import STEPS, Rate, Rates
+from pyharness.bench.ensemble_measure import STEPS, Memory, Rate, Rates, Size
 from pyharness.bench.page import grouped, measured_report
 from pyharness.model.report import (
     Column,
@@ -121,13 +121,9 @@ def _notes(found: Ensembles) -> list[str]:
 
 
 def _data(rates: Rates) -> Table:
-    rows = [
-        [row.load, row.target, row.method, row.threads, row.setting, row.bodies,
-         row.seconds, row.error, row.bodies_a_second, row.note]
-        for row in rates.rows
-    ]  # fmt: skip
     heads = "load target method cores setting bodies seconds error bodies_a_second note"
-    return numbers(heads, rows)
+    values = attrgetter(*heads.replace("cores", "threads").split())
+    return numbers(heads, [values(row) for row in rates.rows])
 
 
 def _record(found: Ensembles) -> dict[str, Any]:
@@ -135,11 +131,7 @@ def _record(found: Ensembles) -> dict[str, Any]:
         "seed": found.rates.seed,
         "bodies": found.rates.bodies,
         "rows": [
-            asdict(row)
-            | {
-                "bodies_a_second": row.bodies_a_second,
-                "note": row.note or None,
-            }
+            asdict(row) | {"bodies_a_second": row.bodies_a_second, "note": row.note or None}
             for row in found.rates.rows
         ],
         "refused": [
@@ -157,13 +149,11 @@ def size_picture(sizes: Sequence[Size]) -> Picture:
 
     figure = Figure(figsize=(6.5, 4.5), dpi=110, layout="constrained")
     axes = figure.subplots()
-    names = list(sizes[0].seconds)
-    labels = {"prepared": "closed-form, prepared"}
+    names, bodies = list(sizes[0].seconds), [each.bodies for each in sizes]
     for name in names:
-        axes.loglog(
-            [each.bodies for each in sizes], [1e9 * each.seconds[name] for each in sizes],
-            _STYLES[name], label=labels.get(name, name), linewidth=1.2, markersize=5.0,
-        )  # fmt: skip
+        times = [1e9 * each.seconds[name] for each in sizes]
+        label = "closed-form, prepared" if name == "prepared" else name
+        axes.loglog(bodies, times, _STYLES[name], label=label, linewidth=1.2, markersize=5.0)
     axes.set_xlabel("bodies of a call")
     axes.set_ylabel("ns a body, one core")
     axes.set_title(f"To T = 3 s; taylor to 1e-12, rk4 in {STEPS} steps", fontsize=10)

@@ -33,13 +33,9 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     else:
         names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
         names |= dict(zip(unknowns, state, strict=True))
-        rates = compiled.rates(scene, "t", unknowns, _coefficients(scene))
+        rates = compiled.rates(scene, "t", unknowns, list(map(float, exact_coefficients(scene))))
         found = [eval(rate, names) for rate in rates]
     return [(x, heyoka.expression(rate)) for x, rate in zip(state, found, strict=True)]
-
-
-def _coefficients(scene: Scene) -> list[float]:
-    return [float(each) for each in exact_coefficients(scene)]
 
 
 def _by_formula(scene: Scene, formula: Formula, state: Sequence[Any]) -> list[Any]:
@@ -50,7 +46,8 @@ def _by_formula(scene: Scene, formula: Formula, state: Sequence[Any]) -> list[An
     found: list[Any] = [
         coefficient * product + component / moment
         for coefficient, product, component, moment in zip(
-            _coefficients(scene), (y * z, z * x, x * y), torque, scene.moments or (1.0,) * 3,
+            map(float, exact_coefficients(scene)), (y * z, z * x, x * y), torque,
+            scene.moments or (1.0,) * 3,
             strict=True,
         )
     ]  # fmt: skip
@@ -80,12 +77,5 @@ def heyoka_functions() -> Functions[Any]:
     def table(_: Table, time: Any) -> Any:
         raise InputError("heyoka can't evaluate a table; allowed: a torque without tables")
 
-    return Functions(
-        heyoka.expression,
-        heyoka.sqrt,
-        heyoka.exp,
-        heyoka.tanh,
-        heyoka.sin,
-        heyoka.cos,
-        table,
-    )
+    elementary = heyoka.sqrt, heyoka.exp, heyoka.tanh, heyoka.sin, heyoka.cos
+    return Functions(heyoka.expression, *elementary, table)

@@ -1,7 +1,7 @@
 """Third-party integrators for `bench`, set up for speed as their documentation recommends."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -81,23 +81,25 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
     return make
 
 
-def _right_hand_side(scene: Scene) -> RightHandSide:
+def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
+    """Return right-hand side, start, and the ratio of absolute to relative tolerance.
+
+    The ratio is a number, or an array with one for each unknown.
+    """
+    is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
-        return slopes_of(scene)
-    slopes = scene.right_hand_side()
-    return slopes if scene.attitude is None else with_attitude(slopes)
-
-
-def _absolute(scene: Scene) -> Any:
-    """Return the ratio of absolute to relative tolerance: a number, or one for each unknown."""
-    largest = max(map(abs, scene.omega)) or 1.0
-    return largest if scene.attitude is None else np.array([largest] * 3 + [1.0] * 4)
+        slopes = slopes_of(scene)
+    else:
+        slopes = scene.right_hand_side()
+        slopes = slopes if is_free else with_attitude(slopes)
+    size = largest if is_free else np.array([largest] * 3 + [1.0] * 4)
+    return slopes, state_of(scene), size
 
 
 def _solve_ivp(name: str, scene: Scene) -> Maker:
     from scipy.integrate import solve_ivp
 
-    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
+    slope, start, size = _problem(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("solve_ivp", setting)
@@ -117,7 +119,7 @@ def _solve_ivp(name: str, scene: Scene) -> Maker:
 def _odeint(scene: Scene) -> Maker:
     from scipy.integrate import ODEintWarning, odeint
 
-    slope, start, size = _right_hand_side(scene), state_of(scene), _absolute(scene)
+    slope, start, size = _problem(scene)
 
     def make(horizon: float, setting: float) -> Ready:
         refuse_rounding("LSODA", setting)

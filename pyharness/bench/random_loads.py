@@ -1,23 +1,50 @@
 """Random scenes of several kinds, on which no method was tuned.
 
-A seed and a number determine a scene. Its motion, by the second reference (`integer_series`),
-decides whether it is accepted.
+Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
+bodies alike. A seed and a number determine a scene. Its motion, by the second reference
+(`integer_series`), decides whether it is accepted.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
 import numpy as np
 
 from pyharness.bench.measure import Workload
-from pyharness.checks.scenes.by_torque import BODIES, LAWS, MOST_TURNS, SPEEDS, WAVES, by_torque
 from pyharness.checks.theory.conditioning import along, conditioning
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.integer_series import integer_series
 from pyharness.truth.reference import Reference
 
+MOST_TURNS = 300.0
+WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
+LAWS = ("no torque", "constant torque", "ramp", *WAVES)
+# Ranges of the frequencies of waves, relative to the initial |omega|.
+SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
+# Moments in an arbitrary unit, from a random generator.
+BODIES: dict[str, Callable[[Random], list[float]]] = {
+    "compact": lambda source: [source.uniform(2.0, 3.0) for _ in range(3)],
+    "flat": lambda source: [
+        a := source.uniform(1.0, 3.0),
+        b := source.uniform(1.0, 3.0),
+        (a + b) * source.uniform(0.95, 1.0),
+    ],
+    "needle-like": lambda source: [
+        low := source.uniform(0.01, 0.1),
+        1.0,
+        1.0 + low * source.uniform(0.0, 1.0),
+    ],
+    "nearly symmetric": lambda source: [
+        1.0,
+        1.0 + _log(source, 1e-6, 1e-2),
+        source.uniform(0.2, 1.9),
+    ],
+}
 MOST_GROWTH = 1e3  # limit of the error amplification of an accepted scene
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
@@ -62,3 +89,48 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     kinds = tuple(filter(None, ("all", law, speed, body, length)))
     load = Workload(str(number), scene, horizon, kinds, truth, growth, turns)
     return replace(load, scene=replace(scene, attitude=IDENTITY), truth=None) if attitude else load
+
+
+def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tuple[Scene, float]:
+    """Return a random scene, and the time (s) of roughly 1 to 300 revolutions.
+
+    `law`, `speed` and `body` are elements of `LAWS`, `SPEEDS` and `BODIES`.
+    """
+    mass = _log(source, 1.0, 50.0)
+    moments = [mass * each for each in BODIES[body](source)]
+    source.shuffle(moments)
+    size = _log(source, 1.0, 10.0)
+    omega = [size * each for each in _vector(source)]
+    start = math.hypot(*omega)
+    turns = _log(source, 1.0, MOST_TURNS)
+
+    def torque(acceleration: float) -> Triple:
+        x, y, z = (i * acceleration * a for i, a in zip(moments, _vector(source), strict=True))
+        return x, y, z
+
+    found, horizon = TorqueLaw(), 2.0 * math.pi * turns / start
+    if law in ("constant torque", "ramp"):
+        # By the end the torque alone would add `gain` times the initial |omega|. The mean |omega|
+        # determines the time of the desired number of revolutions.
+        gain = _log(source, 0.1, 30.0)
+        constant = law == "constant torque"
+        horizon /= 1.0 + gain / (2.0 if constant else 3.0)
+        rate = gain * start / horizon
+        found = TorqueLaw(torque(rate)) if constant else TorqueLaw(rate=torque(2 * rate / horizon))
+    elif law in WAVES:
+        waves = []
+        for _ in range(WAVES[law]):
+            # Each wave alone would make omega oscillate by a fraction of its initial value.
+            frequency = start * _log(source, *SPEEDS[speed])
+            waves.append((torque(frequency * start * _log(source, 0.01, 1.0)), frequency))
+        sines = source.randint(0, len(waves))
+        found = TorqueLaw(sines=waves[:sines], cosines=waves[sines:])
+    return Scene(name, omega, moments, torque=found), horizon
+
+
+def _log(source: Random, low: float, high: float) -> float:
+    return float(low * (high / low) ** source.random())
+
+
+def _vector(source: Random) -> list[float]:
+    return [source.uniform(-1.0, 1.0) for _ in range(3)]

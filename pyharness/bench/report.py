@@ -5,7 +5,8 @@ A ratio is the run time of the baseline solver divided by that of another, at eq
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
+from operator import attrgetter
 from typing import Any
 
 from pyharness.bench.growth import Growth
@@ -15,15 +16,7 @@ from pyharness.bench.pictures import bench_picture, growth_picture
 from pyharness.bench.random_loads import KINDS
 from pyharness.bench.savings import Saving
 from pyharness.bench.scores import groups, means, scores, spreads, yardstick
-from pyharness.model.report import (
-    Column,
-    Report,
-    Table,
-    digits,
-    numbers,
-    short,
-    words,
-)  # fmt: skip
+from pyharness.model.report import Column, Report, Table, digits, numbers, short, words
 
 _MOST_SHOWN = 3
 _RATIO = Column("ratio", digits(".2f"), full=digits(".2f"))
@@ -57,42 +50,32 @@ def _random(finding: Finding) -> bool:
 
 
 def _spread_data(finding: Finding) -> Table:
-    rows = [
-        [each.method, each.kind, each.target, each.scenes, each.reached, each.mean, each.smallest,
-         *each.quartiles]
-        for each in spreads(finding, KINDS)
-    ]  # fmt: skip
+    # A spread's fields in their order, the last of which are the quartiles.
+    rows = [[*fields, *quartiles] for *fields, quartiles in map(astuple, spreads(finding, KINDS))]
     names = "method kind target scenes reached mean smallest lower_quartile median upper_quartile"
     return numbers(names, rows)
 
 
 def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
     heads = ("mean", "smallest", "25 %", "median", "75 %")
-    columns = [
-        Column("kind", left=True),
-        Column("scenes"),
-        *(Column(head, ratio) for head in heads),
-    ]
+    columns = [*words("kind"), Column("scenes"), *(Column(head, ratio) for head in heads)]
     tables: dict[str, list[list[Any]]] = {}
     for each in spreads(finding, KINDS):
-        title = (
-            f"{yardstick(finding)} time / time of {each.method}, at errors of {_power(each.target)}"
-        )
+        title = f"{yardstick(finding)} time / time of {each.method}, at errors of "
         scenes = f"{each.reached} of {each.scenes}"
         row = [each.kind, scenes, each.mean, each.smallest, *each.quartiles]
-        tables.setdefault(title, []).append(row)
+        tables.setdefault(title + _power(each.target), []).append(row)
     return [(title, Table(columns, rows)) for title, rows in tables.items()]
 
 
 def _data(finding: Finding) -> Table:
+    heads = "method kind setting seconds error evaluations note"
+    values = attrgetter(*heads.split())
     rows = [
-        [
-            row.workload.scene.case or None, row.workload.horizon, row.method, row.kind,
-            row.setting, row.seconds, row.error, row.evaluations, row.note,
-        ]
+        [row.workload.scene.case or None, row.workload.horizon, *values(row)]
         for row in finding.rows
-    ]  # fmt: skip
-    return numbers("case horizon method kind setting seconds error evaluations note", rows)
+    ]
+    return numbers("case horizon " + heads, rows)
 
 
 def savings_report(found: Sequence[Saving]) -> Report:
@@ -149,12 +132,8 @@ def _record(finding: Finding) -> dict[str, Any]:
     if drawn:
         found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
         found["scenes"] = [
-            {
-                "scene": load.scene.name,
-                "kinds": load.kinds,
-                "growth": load.growth,
-                "turns": load.turns,
-            }
+            {"scene": load.scene.name}
+            | {name: getattr(load, name) for name in ("kinds", "growth", "turns")}
             for load in finding.workloads
         ]
     return found
@@ -254,9 +233,8 @@ def not_measured(finding: Finding) -> list[str]:
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]
     came += [(row, row.note.split(" at step")[0]) for row in finding.rows if row.error is None]
-    places = [
-        each.workload.place + ("" if each.setting is None else f" at {each.setting:g}")
-        for each, _ in came
-    ]
-    told = [(each.method, why, where) for (each, why), where in zip(came, places, strict=True)]
+    told = []
+    for each, why in came:
+        at = "" if each.setting is None else f" at {each.setting:g}"
+        told.append((each.method, why, each.workload.place + at))
     return grouped(told, _MOST_SHOWN)

@@ -80,12 +80,11 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
     tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
     nowhere = (None,) * len(TARGETS)
-    return {
-        name: list(
-            map(geometric_mean, zip(*(table.get(name, nowhere) for table in tables), strict=True))
-        )
-        for name in names
-    }
+    found = {}
+    for name in names:
+        by_target = zip(*(table.get(name, nowhere) for table in tables), strict=True)
+        found[name] = list(map(geometric_mean, by_target))
+    return found
 
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:

@@ -1,22 +1,30 @@
-"""The problems of `bench --terms`: torques that depend on the state."""
+"""The problems of `bench --terms`, torques that depend on the state, and its contenders."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from pyharness.bench.ensemble_contenders import EnsembleLoad
+from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, list_own_contenders
+from pyharness.bench.ensemble_contenders import EnsembleContender, EnsembleLoad, own_ensembles
+from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.heyoka_equations import Formula
 from pyharness.bench.measure import Workload
+from pyharness.bench.peers import heyoka_maker, peers
 from pyharness.checks.scenes.random_scenes import text_generator
 from pyharness.engine import field_terms, terms
-from pyharness.engine.solve import solve
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.trajectory import Array
 from pyharness.model.values import Triple
 from pyharness.truth.reference import reference
+
+OURS, HEYOKA, DOP853 = "auto", "heyoka", "solve_ivp-dop853"
+MANY_OURS, MANY_HEYOKA = "taylor", "heyoka-batch"
+# The tolerance of DOP853, at which our solver is compared with it.
+DOP853_TOLERANCE = 1e-9
+# Coarser tolerances give errors above all target errors. The finest is the default of heyoka.
+_TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s
 READY, EXPRESSION = "ready term", "expression"
@@ -66,15 +74,10 @@ class TermBodies(EnsembleLoad):
         """Return the end time (s)."""
         return HORIZONS[0]
 
-    def ends(self) -> Array:
-        """Return omega at the end (rad/s), shape (n, 3), by `solve` with tolerance 1e-15."""
-        attitude = self.body.attitude is not None
-        return np.array([
-            solve(
-                replace(self.body, omega=start), [self.horizon], tolerance=1e-15, attitude=attitude
-            ).omega[0]
-            for start in self.omega0.tolist()
-        ])  # fmt: skip
+    def scenes(self) -> Iterator[Scene]:
+        """Yield the scene of each body."""
+        for start in self.omega0.tolist():
+            yield replace(self.body, omega=start)
 
 
 def term_scenes() -> list[TermScene]:
@@ -123,38 +126,6 @@ def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodi
     return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
 
 
-def _quadratic_drag(t: Any, w: Any) -> Any:
-    return -0.1 * w * np.sqrt(w @ w + 0.01)
-
-
-def _saturated_control(t: Any, w: Any) -> Any:
-    return -0.3 * (w - np.array(_TARGET)) / np.sqrt(1.0 + w @ w)
-
-
-def _friction(t: Any, w: Any) -> Any:
-    return -0.1 * np.tanh(3.0 * w)
-
-
-def _gust(t: Any, w: Any) -> Any:
-    return [0.3 * np.exp(-0.1 * (t - 4.0) ** 2), -0.05 * w[1], 0.1 * np.exp(-w[2] * w[2])]
-
-
-def _rotor(t: Any, w: Any) -> Any:
-    return 0.4 * np.cross([0.1, 0.3, 0.9], w) + [0.1 * np.sin(1.7 * t + 0.4 * w[0]), 0.0, 0.0]
-
-
-def _swing(t: Any, w: Any) -> Any:
-    return np.array([0.2, -0.1, 0.15]) * np.cos(2.0 * w[0] + w[1]) - 0.05 * w
-
-
-def _fading(t: Any, w: Any) -> Any:
-    return np.cross(w, [0.5, 0.1, 0.2]) / (1.0 + 0.1 * t * t) - 0.02 * w / (1.0 + w @ w)
-
-
-def _spring(t: Any, w: Any, q: Any) -> Any:
-    return -0.4 * q[0] * q[1:] - 0.1 * w
-
-
 def _wind(t: Any, w: Any, q: Any) -> Any:
     scalar, vector = q[0], q[1:]
     stream = np.array([1.0, 0.2, 0.0])
@@ -168,14 +139,22 @@ def _beacon(t: Any, w: Any, q: Any) -> Any:
 
 
 EXPRESSIONS: dict[str, Callable[..., Any]] = {
-    "quadratic drag": _quadratic_drag,
-    "saturated control": _saturated_control,
-    "smooth friction": _friction,
-    "gust": _gust,
-    "rotor": _rotor,
-    "swing": _swing,
-    "fading wheel": _fading,
-    "spring": _spring,
+    "quadratic drag": lambda t, w: -0.1 * w * np.sqrt(w @ w + 0.01),
+    "saturated control": lambda t, w: -0.3 * (w - np.array(_TARGET)) / np.sqrt(1.0 + w @ w),
+    "smooth friction": lambda t, w: -0.1 * np.tanh(3.0 * w),
+    "gust": lambda t, w: [
+        0.3 * np.exp(-0.1 * (t - 4.0) ** 2),
+        -0.05 * w[1],
+        0.1 * np.exp(-w[2] * w[2]),
+    ],
+    "rotor": lambda t, w: (
+        0.4 * np.cross([0.1, 0.3, 0.9], w) + [0.1 * np.sin(1.7 * t + 0.4 * w[0]), 0.0, 0.0]
+    ),
+    "swing": lambda t, w: np.array([0.2, -0.1, 0.15]) * np.cos(2.0 * w[0] + w[1]) - 0.05 * w,
+    "fading wheel": lambda t, w: (
+        np.cross(w, [0.5, 0.1, 0.2]) / (1.0 + 0.1 * t * t) - 0.02 * w / (1.0 + w @ w)
+    ),
+    "spring": lambda t, w, q: -0.4 * q[0] * q[1:] - 0.1 * w,
     "wind": _wind,
     "beacon": _beacon,
 }
@@ -242,3 +221,35 @@ def _magnetic_damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[An
 
 def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
     return _about_body(_PUSH, q)
+
+
+def term_methods() -> list[SceneContender]:
+    """Return our contender for single bodies, `auto`, without coarse tolerances."""
+    return [
+        replace(each, settings=_TOLERANCES[:-1])
+        for each in list_own_contenders()
+        if each.name == OURS
+    ]
+
+
+def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
+    """Return heyoka and DOP853, installed or not.
+
+    heyoka computes a ready term's torque by its formula, and an expression's from its tape.
+    """
+    formulas = {each.scene.name: each.formula for each in scenes}
+
+    def prepare(scene: Scene) -> Maker:
+        return heyoka_maker(scene, formulas[scene.name])
+
+    known = {each.name: each for each in peers()}
+    return [
+        replace(known[HEYOKA], prepare=prepare, settings=_TOLERANCES),
+        replace(known[DOP853], settings=(DOP853_TOLERANCE,)),
+    ]
+
+
+def body_contenders() -> list[EnsembleContender]:
+    """Return our and heyoka's contender for many bodies, each on one core."""
+    found = [*own_ensembles(), *ensemble_peers()]
+    return [replace(each, threads=(1,)) for each in found if each.name in (MANY_OURS, MANY_HEYOKA)]

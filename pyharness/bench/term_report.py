@@ -7,6 +7,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from typing import Any
 
 from pyharness.bench.ensemble_measure import TARGETS as BODY_TARGETS
@@ -15,15 +16,17 @@ from pyharness.bench.measure import Finding, Row, Workload
 from pyharness.bench.page import grouped, measured_report
 from pyharness.bench.report import microseconds, not_measured, ratio
 from pyharness.bench.scores import geometric_mean, scores
-from pyharness.bench.term_contenders import (
+from pyharness.bench.term_loads import (
     DOP853,
     DOP853_TOLERANCE,
+    EXPRESSION,
     HEYOKA,
+    HORIZONS,
     MANY_HEYOKA,
     MANY_OURS,
     OURS,
+    READY,
 )
-from pyharness.bench.term_loads import EXPRESSION, HORIZONS, READY
 from pyharness.model.report import Column, Report, Table, digits, numbers
 
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
@@ -32,7 +35,6 @@ _WORTH = (
     "One process, one core and one run: processor times, medians of interleaved batches. Times "
     "drift with the machine and with what else it does: compare the ratios, not the times."
 )
-_SHORT = "{:.0e}"
 
 
 @dataclass(frozen=True)
@@ -201,13 +203,13 @@ def _many_table(found: Terms, names: Sequence[str]) -> Table:
 
 
 def _target(target: float | None) -> str:
-    return "all" if target is None else _SHORT.format(target).replace("e-0", "e-")
+    return "all" if target is None else f"{target:.0e}".replace("e-0", "e-")
 
 
 def _milliseconds(seconds: float | None) -> str:
-    return "-" if seconds is None else f"{1e3 * seconds:.2g}" if seconds < 0.1 else (
-        f"{1e3 * seconds:.0f}"
-    )  # fmt: skip
+    if seconds is None:
+        return "-"
+    return f"{1e3 * seconds:.2g}" if seconds < 0.1 else f"{1e3 * seconds:.0f}"
 
 
 def _notes(found: Terms) -> list[str]:
@@ -247,11 +249,11 @@ def _batches(rates: Rates) -> str:
 
 
 def _data(found: Terms) -> Table:
+    values = attrgetter("method", "setting", "seconds", "error", "preparing", "note")
     rows = [
-        [row.workload.kinds[0], row.workload.label, row.workload.horizon, 1, row.method,
-         row.setting, row.seconds, row.error, row.preparing, row.note]
+        [row.workload.kinds[0], row.workload.label, row.workload.horizon, 1, *values(row)]
         for row in found.single.rows
-    ]  # fmt: skip
+    ]
     kinds = {load.label: load.kinds[0] for load in found.single.workloads}
     rows += [
         [kinds[each.load], each.load, HORIZONS[0], each.bodies, each.method, each.setting,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pyharness.bench import ensemble_growth, ensemble_measure, measure
+from pyharness.bench import ensemble_measure, measure
 
 
 @pytest.fixture
@@ -12,6 +12,6 @@ def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
         (measure, "_ROUNDS", 1), (measure, "_BATCH", 1e-5),
         (ensemble_measure, "ROUNDS", 1), (ensemble_measure, "SAMPLE", 20),
         (ensemble_measure, "_BATCH", 0.0),
-        (ensemble_growth, "_ROUNDS", 1), (ensemble_growth, "_BATCH", 0.0),
+        (ensemble_measure, "_GROWTH_ROUNDS", 1),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)

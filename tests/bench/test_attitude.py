@@ -65,9 +65,14 @@ def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.fixture
 def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
-    slope = peers._right_hand_side
+    problem = peers._problem
     monkeypatch.setattr(compiled_peers, "rates", _backward(compiled_peers.rates))
-    monkeypatch.setattr(peers, "_right_hand_side", lambda scene: _backward(slope(scene)))
+
+    def backward(scene: Scene) -> Any:
+        slope, *rest = problem(scene)
+        return _backward(slope), *rest
+
+    monkeypatch.setattr(peers, "_problem", backward)
 
 
 @pytest.mark.external

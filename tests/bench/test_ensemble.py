@@ -22,8 +22,7 @@ from pyharness.bench.ensemble_contenders import (
     own_ensembles,
     with_attitudes,
 )
-from pyharness.bench.ensemble_growth import memory
-from pyharness.bench.ensemble_measure import Rate, Rates
+from pyharness.bench.ensemble_measure import Rate, Rates, memory
 from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.ensemble_report import Ensembles, ensemble_report, ours_over
 from pyharness.cli.main import main

@@ -12,10 +12,9 @@ import pytest
 
 from pyharness.bench import measure as bench
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
-from pyharness.bench.random_loads import KINDS, MOST_GROWTH, random_load
+from pyharness.bench.random_loads import KINDS, LAWS, MOST_GROWTH, random_load
 from pyharness.bench.report import bench_report
 from pyharness.bench.scores import Spread, spreads
-from pyharness.checks.scenes.by_torque import LAWS
 from pyharness.checks.theory.conditioning import conditioning
 from pyharness.cli.main import main
 from pyharness.model.scene_file import case_scene

@@ -17,12 +17,14 @@ from pyharness.bench.contenders import Contender
 from pyharness.bench.ensemble_measure import Rate, Rates
 from pyharness.bench.heyoka_equations import heyoka_equations
 from pyharness.bench.measure import Finding, Row, Workload, relative_error
-from pyharness.bench.term_contenders import body_contenders, term_methods, term_peers
 from pyharness.bench.term_loads import (
     EXPRESSION,
     READY,
     TermScene,
+    body_contenders,
     term_bodies,
+    term_methods,
+    term_peers,
     term_scenes,
 )
 from pyharness.bench.term_report import Terms, summaries, term_report

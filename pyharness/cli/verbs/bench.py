@@ -189,8 +189,7 @@ def _growth(options: argparse.Namespace) -> int:
 def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench import ensemble_report as ensembles
     from pyharness.bench.ensemble_contenders import draw, own_ensembles, with_attitudes
-    from pyharness.bench.ensemble_growth import memory, sizes
-    from pyharness.bench.ensemble_measure import measure_ensembles
+    from pyharness.bench.ensemble_measure import measure_ensembles, memory, sizes
     from pyharness.bench.ensemble_peers import ensemble_peers
 
     shared.refuse(
@@ -217,27 +216,27 @@ def _ensemble(options: argparse.Namespace) -> int:
 
 
 def _terms(options: argparse.Namespace) -> int:
-    from pyharness.bench import term_contenders, term_loads, term_report
+    from pyharness.bench import term_loads, term_report
     from pyharness.bench.ensemble_measure import measure_ensembles
 
     meaningless = ["case", "horizon", "random", "attitude", "methods", "plan", "growth", "plot"]
     shared.refuse(options, "--terms", meaningless)
     n = _choose_bodies(options, _TERM_BODIES)
     scenes = term_loads.term_scenes()
-    those = term_contenders.term_peers(scenes)
+    those = term_loads.term_peers(scenes)
     others = named(those, options.peers, "peer", "--peers")
-    contenders, missing = _present(term_contenders.term_methods(), others, bool(options.peers))
+    contenders, missing = _present(term_loads.term_methods(), others, bool(options.peers))
     shared.check_outputs(options)
     shared.progress(0, 1, "references")
     loads = term_loads.term_loads(scenes)
     # The first solver imports modules, whose time belongs to no preparation.
-    term_contenders.term_methods()[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
+    term_loads.term_methods()[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
     # All solvers run on one core, because other load hardly affects processor time.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
     many = measure_ensembles(
         term_loads.term_bodies(scenes, options.seed, n),
-        [each for each in term_contenders.body_contenders() if each.package in packages],
+        [each for each in term_loads.body_contenders() if each.package in packages],
         options.seed,
         shared.progress,
         least=n,

@@ -10,7 +10,7 @@ from random import Random
 
 import numpy as np
 
-from pyharness.checks.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
+from pyharness.bench.random_loads import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.engine.rotated import rotated
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from pyharness.checks.scenes.by_torque import BODIES, LAWS, SPEEDS, WAVES, by_torque
+from pyharness.bench.random_loads import BODIES, LAWS, SPEEDS, WAVES, by_torque
 from pyharness.checks.scenes.random_scenes import KINDS, NASTY, draw, random_scene, text_generator
 from tests.checks.scenes import free_motions, timed_kinds
 from tests.checks.scenes.cancelling import LEFT, MERGED, cancelling

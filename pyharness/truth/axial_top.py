@@ -10,8 +10,7 @@ from decimal import Decimal
 
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
-from pyharness.truth.decimal_functions import sine_cosine
-from pyharness.truth.decimal_series import Row
+from pyharness.truth.decimal_functions import Row, sine_cosine
 
 DIGITS = 50
 
@@ -29,7 +28,10 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
             "about axis 3 only"
         )
     waves = law.sines + law.cosines
-    with _arithmetic(times, scene.omega, [f for _, f in waves] + [1.0]):
+    # Enough digits for products of the largest time, the largest omega and the largest frequency.
+    sizes = (*map(abs, times), 0.0), map(abs, scene.omega), (*(abs(f) for _, f in waves), 1.0)
+    digits = DIGITS + sum(max(0, Decimal(max(each)).adjusted() + 1) for each in sizes)
+    with decimal.localcontext(prec=digits, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN):
         moment = Decimal(moments[2])
         ratio = (Decimal(moments[0]) - moment) / Decimal(moments[0])
         first, second, third = (Decimal(w) for w in scene.omega)
@@ -53,11 +55,3 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
             turned = [first * cosine + second * sine, second * cosine - first * sine]
             rows.append([*turned, third + spin / moment])
     return rows
-
-
-def _arithmetic(*sizes: Sequence[float]) -> "decimal._ContextManager":
-    """Return a decimal context precise enough for products of the largest of each of `sizes`."""
-    context = decimal.Context(Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
-    largest = [max(map(abs, each), default=1.0) for each in sizes]
-    context.prec = DIGITS + sum(max(0, Decimal(x).adjusted() + 1) for x in largest)
-    return decimal.localcontext(context)

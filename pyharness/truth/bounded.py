@@ -57,12 +57,9 @@ class ErrorBound(NamedTuple):
     @property
     def larger(self) -> "ErrorBound":
         """Return one bound for both omega and attitude, the larger of the two."""
-        turned = self.turned
-        return (
-            self
-            if turned is None
-            else joined([self._replace(angle=None, angle_basis=None), turned])
-        )
+        if self.turned is None:
+            return self
+        return joined([self._replace(angle=None, angle_basis=None), self.turned])
 
     @property
     def turned(self) -> "ErrorBound | None":
@@ -73,13 +70,10 @@ class ErrorBound(NamedTuple):
 
     def record(self) -> dict[str, Any]:
         """Return the bound as a dictionary for JSON."""
-        turned = {"angle": self.angle, "angle_basis": self.angle_basis}
-        return {
-            "value": self.value,
-            "basis": self.basis,
-            **({} if self.angle is None else turned),
-            "warning": self.warning or None,
-        }
+        found: dict[str, Any] = {"value": self.value, "basis": self.basis}
+        if self.angle is not None:
+            found |= {"angle": self.angle, "angle_basis": self.angle_basis}
+        return found | {"warning": self.warning or None}
 
 
 def at_most(x: float) -> str:
@@ -144,17 +138,11 @@ def error_bound(
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
     found = []
     for side in ([k for k in order if times[k] < 0.0], [k for k in order if times[k] >= 0.0]):
-        if not side:
-            continue
-        stated = _Statement(
-            scene,
-            [float(times[k]) for k in side],
-            [rows[k] for k in side],
-            claimed,
-            None if attitude is None else attitude[side].tolist(),
-            claimed_angle,
-        )
-        found.append(stated.bound(any_torque, effort))
+        if side:
+            there, own = times[side].tolist(), [rows[k] for k in side]
+            turned = None if attitude is None else attitude[side].tolist()
+            stated = _Statement(scene, there, own, claimed, turned, claimed_angle)
+            found.append(stated.bound(any_torque, effort))
     angle = (None, None) if attitude is None else (claimed_angle, ESTIMATED)
     return joined(found) if found else ErrorBound(claimed, ESTIMATED, *angle)
 
@@ -163,11 +151,8 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
     rows: list[list[float]] = omega.tolist()
     if remainder is None:
         return rows
-    rests = remainder.tolist()
-    return [
-        [Fraction(x) + Fraction(rest) for x, rest in zip(row, each, strict=True)]
-        for row, each in zip(rows, rests, strict=True)
-    ]
+    pairs = zip(rows, remainder.tolist(), strict=True)
+    return [[Fraction(x) + Fraction(rest) for x, rest in zip(*each, strict=True)] for each in pairs]
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:

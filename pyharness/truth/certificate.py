@@ -25,9 +25,8 @@ from pyharness.truth.certificate_checker import (
     NotProvedError,
     System,
 )
-from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of
-from pyharness.truth.scales import scales_of
-from pyharness.truth.times import check_order
+from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, row_of, scales_of
+from pyharness.truth.reference import check_order
 
 _TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
 _GUARD_BITS = 16
@@ -40,14 +39,6 @@ _MOST_ATTEMPTS = 6
 # digits, _MORE are added to them.
 _EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
-
-
-@dataclass(frozen=True)
-class _Step:
-    length: int
-    tube: int
-    radius: int
-    middle: list[int]
 
 
 @dataclass(frozen=True)
@@ -64,11 +55,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that errors grow so much that `digits` more digits are needed."""
-
-    def __init__(self, digits: float) -> None:
-        super().__init__()
-        self.digits = digits
+    """Signal that errors grow so much that more digits are needed; their number is the argument."""
 
 
 def has_certificate(scene: Scene) -> bool:
@@ -106,7 +93,7 @@ def prove(
             last = attempt == _MOST_ATTEMPTS - 1
             run.prove(limit, effort, progress, 1.0 if last else _EARLY)
         except _AmplifiedError as error:
-            wanted += error.digits
+            wanted += error.args[0]
             continue
         excess = largest_radius(run.omega, digits)
         if excess <= 1:
@@ -168,7 +155,7 @@ class _Run:
         self._system = System(record, self._bits, self._clock, whole)
         # By step: the fraction of the last time, and the logarithm of the amplification so far.
         self._amplified: list[tuple[float, float]] = [(0.0, 0.0)]
-        self.steps: list[_Step] = []
+        self.steps: list[list[Any]] = []  # length, tube, radius and middle of each
         self.omega: list[Balls] = []
 
     def prove(self, limit: float, effort: float, progress: Progress, early: float) -> None:
@@ -216,7 +203,7 @@ class _Run:
                 raise _AmplifiedError(more + _MORE)
             # The checker adds the distance from the stated middle, which is 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
-            self.steps.append(_Step(h, tube, radius, middle))
+            self.steps.append([h, tube, radius, middle])
             length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
             progress(abs(time * 100 // end), 100, f"t = {time / 2.0**clock:.4g} s")
 
@@ -263,6 +250,6 @@ class _Run:
             "clock": self._clock,
             "order": self._order,
             "scales": list(self._system.scales),
-            "steps": [[x.length, x.tube, x.radius, x.middle] for x in self.steps],
+            "steps": self.steps,
             "rows": [row_of(float(t), balls) for t, balls in rows if t],
         }

@@ -1,7 +1,8 @@
-"""Sine, cosine, pi and products of series in the current decimal context."""
+"""Sine, cosine, pi, series, vectors and fractions in the current decimal context."""
 
 import decimal
 from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from operator import mul
 
@@ -64,3 +65,22 @@ def product(x: Row, reversed_y: Row) -> Decimal:
             n -= 1
         x = x[:n]
     return sum(map(mul, x, reversed_y), Decimal(0))
+
+
+def value_at(series: Row, offset: Decimal) -> Decimal:
+    """Return the value of a Taylor series at `offset` from its centre."""
+    total = Decimal(0)
+    for term in reversed(series):
+        total = total * offset + term
+    return total
+
+
+def unit(row: Row) -> Row:
+    """Return a vector divided by its length."""
+    length = sum((x * x for x in row), Decimal(0)).sqrt()
+    return [x / length for x in row]
+
+
+def to_decimal(x: Fraction) -> Decimal:
+    """Return a fraction, rounded to the digits of the current context."""
+    return Decimal(x.numerator) / x.denominator

@@ -12,8 +12,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.truth.decimal_functions import Row as Row
-from pyharness.truth.decimal_functions import product, sine_cosine
+from pyharness.truth.decimal_functions import Row, product, sine_cosine, to_decimal, value_at
 from pyharness.truth.tape_series import TapeSeries, series_products
 
 _MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
@@ -211,17 +210,7 @@ def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decim
 
 
 def _evaluate(coefficients: list[Row], t: Decimal) -> Row:
-    totals = []
-    for row in coefficients:
-        total = Decimal(0)
-        for term in reversed(row):
-            total = total * t + term
-        totals.append(total)
-    return totals
-
-
-def _derivatives(coefficients: list[Row], t: Decimal) -> Row:
-    return _evaluate([[k * x for k, x in enumerate(row)][1:] for row in coefficients], t)
+    return [value_at(row, t) for row in coefficients]
 
 
 def _is_continued(
@@ -237,7 +226,7 @@ def _is_continued(
     A pulse of the torque within the step may be invisible at its beginning. The last element of
     `equations` determines the effect of rounding, which is allowed.
     """
-    slopes = _derivatives(series, length)
+    slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
 
     def rates(which: _Equations, factor: Decimal) -> Row:
         # Where a table changes at the end of the step, its earlier piece is meant.
@@ -281,7 +270,7 @@ class _Equations:
         self._changing = scene.changing
         # The equations of a changing inertia contain the torque, not divided by moments.
         exact = divisors(scene) if scene.changing is None else (Fraction(1),) * 3
-        self._moments = [Decimal(x.numerator) / x.denominator for x in exact]
+        self._moments = list(map(to_decimal, exact))
         self._velocity, self._attitude = velocity, scene.attitude is not None
         self._acceleration = [Decimal(force) / Decimal(scene.masses[0]) for force in scene.forces]
 

@@ -12,8 +12,7 @@ from fractions import Fraction
 
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.truth.decimal_functions import sine_cosine
-from pyharness.truth.decimal_series import Row
+from pyharness.truth.decimal_functions import Row, sine_cosine, to_decimal
 
 # Digits of the arithmetic, beside those that the squares of small components need.
 _DIGITS = 90
@@ -30,9 +29,9 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
     if i is not None and not rounded:
         a = [(i[k - 2] - i[k - 1]) / i[k] for k in range(3)]
-    with decimal.localcontext() as context:
-        context.prec = _DIGITS
-        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
+    with decimal.localcontext(
+        prec=_DIGITS, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN
+    ) as context:
         if not any(a[k] * w[k - 1] * w[k - 2] for k in range(3)):
             return [Decimal(x) for x in scene.omega]
         context.prec += 2 * _decades(w) + 2 * _decades(a)
@@ -40,7 +39,7 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
 
 
 def _decades(values: Sequence[Fraction]) -> int:
-    powers = [_decimal(value).adjusted() for value in values if value]
+    powers = [to_decimal(value).adjusted() for value in values if value]
     return max(powers) - min(powers) if powers else 0
 
 
@@ -62,7 +61,7 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
     if a[0] and a[2]:
         found = _general(a, omega, time)
     else:
-        found = _move_on_ellipse([_decimal(x) for x in a], [_decimal(x) for x in omega], time)
+        found = _move_on_ellipse([to_decimal(x) for x in a], [to_decimal(x) for x in omega], time)
     result = [Decimal(0)] * 3
     for axis, value in zip(axes, found, strict=True):
         result[axis] = sign * value
@@ -83,9 +82,9 @@ def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) ->
     with decimal.localcontext() as context:
         if p != q:
             # Near the separatrix the solution loses digits by cancellation.
-            context.prec += max(0, -_decimal(abs(q - p) / max(p, q)).adjusted())
-        factors = [_decimal(f).sqrt() for f in squares]
-        x, y, z = (f * _decimal(w) for f, w in zip(factors, omega, strict=True))
+            context.prec += max(0, -to_decimal(abs(q - p) / max(p, q)).adjusted())
+        factors = [to_decimal(f).sqrt() for f in squares]
+        x, y, z = (f * to_decimal(w) for f, w in zip(factors, omega, strict=True))
         scaled = [x, y, z] if p <= q else [z, y, x]
         found = _normal(scaled, min(p, q), max(p, q), time)
         return [x / f for f, x in zip(factors, found if p <= q else found[::-1], strict=True)]
@@ -116,10 +115,10 @@ def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
     """
     x, y, z = start
     sign = -1 if z < 0 else 1
-    root_p, root_q, k2 = _decimal(p).sqrt(), _decimal(q).sqrt(), _decimal(p / q)
+    root_p, root_q, k2 = to_decimal(p).sqrt(), to_decimal(q).sqrt(), to_decimal(p / q)
     # x = root_p cn, y = -sign root_p sn, z = sign root_q dn.
     s0, c0, d0 = -sign * y / root_p, x / root_p, abs(z) / root_q
-    s, c, d = jacobi(root_q * time, _decimal(1 - p / q))
+    s, c, d = jacobi(root_q * time, to_decimal(1 - p / q))
     under = 1 - k2 * s0 * s0 * s * s
     sn = (s0 * c * d + s * c0 * d0) / under
     cn = (c0 * c - s0 * s * d0 * d) / under
@@ -156,7 +155,3 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         sn, cn = (1 + k1) * sn / (1 + square), cn * dn / (1 + square)
         dn = (1 - square) / (1 + square)
     return sn, cn, dn
-
-
-def _decimal(x: Fraction) -> Decimal:
-    return Decimal(x.numerator) / x.denominator

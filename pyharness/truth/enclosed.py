@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from pyharness.model.scene import Scene
 
+_LEAST = 1e-4  # of the square of the largest unit of errors
+
 
 class Balls(NamedTuple):
     """Balls with exact middles and one common radius."""
@@ -114,3 +116,15 @@ def _decimal(x: Fraction, digits: int) -> str:
     sign = "-" if x < 0 and whole else ""
     text = str(whole).rjust(digits + 1, "0")
     return sign + (f"{text[:-digits]}.{text[-digits:]}" if digits else text)
+
+
+def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
+    """Return the units in which proofs measure errors of the components of omega, at most 1.
+
+    They are the square roots of abs(A), abs(B) and abs(C) over the largest, and at least 0.01. The
+    logarithmic norm is then 0 for rotations about the axes of the largest and smallest moment,
+    unless a unit is 0.01.
+    """
+    sizes = [abs(x) for x in coefficients]
+    largest = max(sizes) or Fraction(1)
+    return [math.sqrt(max(float(x / largest), _LEAST)) for x in sizes]

@@ -14,7 +14,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
 from pyharness.truth.certificate import has_certificate, prove
 from pyharness.truth.enclosed import Enclosure, with_energy
-from pyharness.truth.times import check_order
+from pyharness.truth.reference import check_order
 
 MOST_DIGITS = 1000
 

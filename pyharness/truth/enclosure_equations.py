@@ -16,8 +16,8 @@ from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.balls import ball, functions_at
+from pyharness.truth.enclosed import scales_of
 from pyharness.truth.integer_series import exact_body
-from pyharness.truth.scales import scales_of
 
 # The right-hand side f(t, y): derivatives of all unknowns at a time (s) and a state.
 Rates = Callable[[Any, Sequence[Any]], list[Any]]

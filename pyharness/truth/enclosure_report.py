@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from pyharness.model.records import scene_record
-from pyharness.model.report import Column, Report, Section, Table, counted, short
+from pyharness.model.report import Column, Report, Section, Table, counted, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 from pyharness.truth.enclosed import Enclosure
@@ -33,13 +33,7 @@ def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
             _table([lines]),
         ],
     ]
-    columns = [
-        Column("time", unit="s"),
-        Column("quantity"),
-        Column("value"),
-        Column("radius"),
-        Column("unit"),
-    ]
+    columns = [Column("time", unit="s"), *map(Column, ("quantity", "value", "radius", "unit"))]
     return Report(
         "prove",
         text,
@@ -76,18 +70,12 @@ def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]])
     An entry of `found` has the file's name, and the certificate or, if it does not hold, None and
     the reason.
     """
-    verdicts = [
-        [name, "not proved", None, why]
-        if proved is None
-        else [name, "proved", len(proved["steps"]), "-"]
-        for name, proved, why in found
-    ]
-    columns = [
-        Column("certificate", left=True),
-        Column("verdict", left=True),
-        Column("steps"),
-        Column("reason", left=True, fit="wrap"),
-    ]
+    verdicts = []
+    for name, proved, why in found:
+        steps = None if proved is None else len(proved["steps"])
+        verdicts.append([name, "proved", steps, "-"] if proved else [name, "not proved", None, why])
+    reason = Column("reason", left=True, fit="wrap")
+    columns = [*words("certificate verdict"), Column("steps"), reason]
     text: list[Section] = [[Table(columns, verdicts)]]
     for name, proved, _ in found:
         if proved is not None:
@@ -98,11 +86,8 @@ def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]])
         text,
         record=lambda: {
             "certificates": [
-                {
-                    **{"file": name, "proved": proved is not None},
-                    **{"steps": steps, "reason": why},
-                    **{key: proved and proved[key] for key in ("scene", "rows")},
-                }
+                {"file": name, "proved": proved is not None, "steps": steps, "reason": why}
+                | {key: proved and proved[key] for key in ("scene", "rows")}
                 for (name, proved, why), (_, _, steps, _) in zip(found, verdicts, strict=True)
             ]
         },
@@ -111,10 +96,6 @@ def certificates_report(found: Sequence[tuple[str, dict[str, Any] | None, str]])
 
 
 def _table(lines: Sequence[Sequence[Sequence[Any]]]) -> Table:
-    columns = [
-        Column("time", lambda x: f"{x:.6g}", unit="s"),
-        Column("quantity", left=True),
-        Column("value", left=True),
-        Column("radius", short),
-    ]
+    time = Column("time", lambda x: f"{x:.6g}", unit="s")
+    columns = [time, *words("quantity value"), Column("radius", short)]
     return Table(columns, [line[:4] for row in lines for line in row])

@@ -12,9 +12,8 @@ Equations I.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import ExitStack
 from fractions import Fraction
 from typing import Any
 
@@ -59,18 +58,20 @@ def enclose_steps(
     wanted = float(digits + 2)
     for _ in range(_MOST_ATTEMPTS):
         bits = math.ceil((wanted + _GUARD_DIGITS) * math.log2(10.0))
-        with ctx.workprec(bits), _kept_length():
+        with ctx.workprec(bits), ExitStack() as afterwards:
+            # The steps change python-flint's global length of power series.
+            afterwards.callback(setattr, ctx, "cap", ctx.cap)
             proof = _Proof(Equations(scene, velocity, transition), wanted, times[-1] >= 0.0)
             found, steps = [], 0
             for time in map(Fraction, times):
-                while proof.state.time != time:
+                while proof.time != time:
                     if steps >= limit:
-                        share = max(abs(float(proof.state.time)) / abs(times[-1]), 1e-3)
+                        share = max(abs(float(proof.time)) / abs(times[-1]), 1e-3)
                         instead = advice("use a shorter time", effort, effort / share)
                         raise InputError(f"prove: more than {limit:.0f} steps; {instead}")
                     proof.step(time)
                     steps += 1
-                    at = float(proof.state.time)
+                    at = float(proof.time)
                     progress(int(abs(at / times[-1]) * 100), 100, f"t = {at:.4g} s")
                 found.append(proof.balls(scene.attitude is not None))
         excess = largest_radius([each[0] for each in found], digits)
@@ -89,27 +90,8 @@ def enclose_steps(
     raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
 
 
-@contextmanager
-def _kept_length() -> Iterator[None]:
-    """Restore python-flint's global length of power series, which the steps change."""
-    length = ctx.cap
-    try:
-        yield
-    finally:
-        ctx.cap = length
-
-
 class _NoStepError(Exception):
     """Signal that a step is too long for a proof."""
-
-
-@dataclass
-class _State:
-    """The middles of the unknowns, and the radius of each block's ball in scaled units."""
-
-    time: Fraction
-    middle: list[Any]  # exact balls
-    radii: list[Any]  # exact, not negative
 
 
 def _upper(x: Any) -> Any:
@@ -147,8 +129,11 @@ class _Proof:
         # With few digits, the precision is below binary64, and these balls are not exact.
         start = [ball(x) for x in equations.start]
         rounding = [x - x.mid() for x in start]
-        radii = [self.norm(rounding, block) for block in self.blocks]
-        self.state = _State(Fraction(0), [x.mid() for x in start], radii)
+        self.time = Fraction(0)
+        # The middles of the unknowns, as exact balls, and the radius of each block's ball in scaled
+        # units, exact and not negative.
+        self.middle = [x.mid() for x in start]
+        self.radii = [self.norm(rounding, block) for block in self.blocks]
 
     def norm(self, errors: Sequence[Any], block: slice) -> Any:
         parts = zip(errors[block], self.scales[block], strict=True)
@@ -157,8 +142,8 @@ class _Proof:
     def balls(self, attitude: bool) -> list[Balls]:
         """Return the balls of each group of unknowns, with the attitude normalised."""
         found = []
-        for n, (block, radius) in enumerate(zip(self.blocks, self.state.radii, strict=True)):
-            pairs = zip(self.state.middle[block], self.scales[block], strict=True)
+        for n, (block, radius) in enumerate(zip(self.blocks, self.radii, strict=True)):
+            pairs = zip(self.middle[block], self.scales[block], strict=True)
             row = [x + arb(0, _upper(radius * s)) for x, s in pairs]
             if attitude and n == 1:
                 length = sum((x * x for x in row), arb(0)).sqrt()
@@ -168,28 +153,28 @@ class _Proof:
 
     def step(self, last: Fraction) -> None:
         """Take a step, at most to `last` (s)."""
-        state, side = self.state, 1 if self.forward else -1
-        rates = self.equations.at(state.time, self.forward)
-        begin = ball(state.time)
-        terms = _expanded(rates, begin, state.middle, self.order)
+        side = 1 if self.forward else -1
+        rates = self.equations.at(self.time, self.forward)
+        begin = ball(self.time)
+        terms = _expanded(rates, begin, self.middle, self.order)
         length = self._length(terms)
-        ends = [last, *(t for t in self.breaks if (t - state.time) * side > 0)]
+        ends = [last, *(t for t in self.breaks if (t - self.time) * side > 0)]
         while length > _SHORTEST:
-            end = min((state.time + side * length, *ends), key=lambda t: (t - state.time) * side)
+            end = min((self.time + side * length, *ends), key=lambda t: (t - self.time) * side)
             try:
-                radii = self._radii(rates, terms, end - state.time)
+                radii = self._radii(rates, terms, end - self.time)
             except (_NoStepError, ZeroDivisionError):
                 length /= 2
                 continue
-            found = [_value(each, ball(end - state.time)) for each in terms]
+            found = [_value(each, ball(end - self.time)) for each in terms]
             rounding = [x - x.mid() for x in found]
-            after = [
+            self.time, self.middle = end, [x.mid() for x in found]
+            self.radii = [
                 _upper(r + self.norm(rounding, block))
                 for r, block in zip(radii, self.blocks, strict=True)
             ]
-            self.state = _State(end, [x.mid() for x in found], after)
             return
-        raise InputError(f"prove: no enclosure is found beyond t = {float(state.time):.6g} s")
+        raise InputError(f"prove: no enclosure is found beyond t = {float(self.time):.6g} s")
 
     def _length(self, terms: list[list[Any]]) -> Fraction:
         """Return a step (s) at which the last Taylor terms are about the tolerance."""
@@ -206,15 +191,14 @@ class _Proof:
 
     def _radii(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
         """Return bounds on the error of each block during a step `h` (s)."""
-        length, state = abs(ball(h)), self.state
-        begin = ball(state.time)
+        length, begin = abs(ball(h)), ball(self.time)
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
         half = [_upper(sum(each[1:], arb(0)) / 2) for each in sizes]
         middles = [each[0] + _value([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
         residuals = self._residuals(rates, terms, h)
         tubes = [
             _upper(2 * r + self.norm([each[0] for each in terms], block) * _TUBE + _LEAST_TUBE)
-            for r, block in zip(state.radii, self.blocks, strict=True)
+            for r, block in zip(self.radii, self.blocks, strict=True)
         ]
         inputs = []
         for block, tube in zip(self.blocks, tubes, strict=True):
@@ -224,7 +208,7 @@ class _Proof:
         matrix = self._growth(rates, time, inputs) * length
         count = len(self.blocks)
         pushed = arb_mat(
-            count, 1, [r + d * length for r, d in zip(state.radii, residuals, strict=True)]
+            count, 1, [r + d * length for r, d in zip(self.radii, residuals, strict=True)]
         )
         found = (matrix.exp() * pushed).entries()
         radii = [_upper(x) for x in found]
@@ -234,7 +218,7 @@ class _Proof:
 
     def _residuals(self, rates: Rates, terms: list[list[Any]], h: Fraction) -> list[Any]:
         count = 2 * self.order + 2
-        length, begin = abs(ball(h)), ball(self.state.time)
+        length, begin = abs(ball(h)), ball(self.time)
         ctx.cap = count
         found = rates(arb_series([begin, 1]), [arb_series(each) for each in terms])
         rests = self._rests(rates, terms, h, count)
@@ -263,7 +247,7 @@ class _Proof:
                 inputs.append(acb(arb(each[0], radius), arb(0, radius)))
             # A square contains the disc.
             radius = _upper(around)
-            centre = ball(self.state.time)
+            centre = ball(self.time)
             found = rates(acb(centre + arb(0, radius), arb(0, radius)), inputs)
             sizes = [arb(acb(x).abs_upper()) for x in found]
             if all(x.is_finite() for x in sizes):

@@ -13,8 +13,8 @@ from fractions import Fraction
 from pyharness.model.attitude import product
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.truth.decimal_functions import pi, sine_cosine
-from pyharness.truth.decimal_series import Row, taylor_series
+from pyharness.truth.decimal_functions import Row, pi, sine_cosine, to_decimal, unit
+from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import exact_coefficients
 
@@ -38,10 +38,8 @@ def free_attitude(scene: Scene, time: float) -> Row:
     """
     checked_scene(scene)
     assert scene.attitude is not None
-    with decimal.localcontext() as context:
-        context.prec = _DIGITS
-        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
-        begin = _unit([Decimal(x) for x in scene.attitude])
+    with decimal.localcontext(prec=_DIGITS, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN):
+        begin = unit([Decimal(x) for x in scene.attitude])
         end = Decimal(time)
         if is_steady(scene):
             return _rotated(begin, [Decimal(w) for w in scene.omega], end)
@@ -57,7 +55,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
         after_rest, after_period = _followed(scene, [rest, period], rate)
         # One period changes the attitude by this rotation in space, whenever it begins.
         turn = list(product(after_period, conjugate(begin)))
-        return _unit(list(product(_power(turn, int(whole)), after_rest)))
+        return unit(list(product(_power(turn, int(whole)), after_rest)))
 
 
 def period_of(scene: Scene) -> Decimal | None:
@@ -134,7 +132,7 @@ def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
             f"{_MOST_RADIANS:.0e} rad; give a time closer to 0, or moments farther from symmetry"
         )
     coefficients = exact_coefficients(scene)
-    q, begin, rows = _unit([Decimal(x) for x in scene.attitude or ()]), Decimal(0), []
+    q, begin, rows = unit([Decimal(x) for x in scene.attitude or ()]), Decimal(0), []
     for time in times:
         count = int(abs(time - begin) * rate / _SEGMENT) + 1
         ends = [begin + (time - begin) * k / count for k in range(1, count)]
@@ -143,7 +141,7 @@ def _followed(scene: Scene, times: Row, rate: Decimal) -> list[Row]:
             series = taylor_series(
                 scene, coefficients, [end - begin], False, _ORDER, _TOLERANCE, None, state
             )
-            q, begin = _unit(series[0][3:]), end
+            q, begin = unit(series[0][3:]), end
         rows.append(q)
     return rows
 
@@ -157,10 +155,5 @@ def _power(turn: Row, count: int) -> Row:
     return found
 
 
-def _unit(q: Row) -> Row:
-    length = sum((x * x for x in q), Decimal(0)).sqrt()
-    return [x / length for x in q]
-
-
 def _root(x: Fraction) -> Decimal:
-    return (Decimal(x.numerator) / x.denominator).sqrt()
+    return to_decimal(x).sqrt()

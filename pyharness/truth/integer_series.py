@@ -41,11 +41,7 @@ class Path:
 
 
 class _OtherUnitError(Exception):
-    """Signal that the unit of omega must be multiplied by 2**power."""
-
-    def __init__(self, power: int) -> None:
-        super().__init__()
-        self.power = power
+    """Signal that the unit of omega must be multiplied by 2**n; n is the argument."""
 
 
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
@@ -53,12 +49,13 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
     Before rounding, its error is some 1e-29 of the largest omega, times the error amplification.
     """
-    power = _power_of(_guess(scene, abs(Fraction(times[-1]))))
+    size = _guess(scene, abs(Fraction(times[-1])))
+    power = size.numerator.bit_length() - size.denominator.bit_length() if size else 0
     for _ in range(_MOST_GUESSES):
         try:
             return _integrate(scene, times, power)
         except _OtherUnitError as other:
-            power += other.power
+            power += other.args[0]
     raise InputError("integer series: omega grows without bound")
 
 
@@ -71,10 +68,6 @@ def _guess(scene: Scene, span: Fraction) -> Fraction:
         push += sum(abs(Fraction(amplitude[axis])) for amplitude, _ in law.sines + law.cosines)
         found.append(push * span / Fraction(moment))
     return max(found)
-
-
-def _power_of(size: Fraction) -> int:
-    return size.numerator.bit_length() - size.denominator.bit_length() if size else 0
 
 
 def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:

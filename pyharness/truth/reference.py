@@ -19,9 +19,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
-from pyharness.truth.decimal_functions import sine_cosine
-from pyharness.truth.decimal_series import Row, divisors, taylor_series
-from pyharness.truth.times import check_order
+from pyharness.truth.decimal_functions import Row, sine_cosine, to_decimal, unit
+from pyharness.truth.decimal_series import divisors, taylor_series
 
 DIGITS = 40
 # Order and local tolerance (relative to the solution) of the two Taylor series that are compared.
@@ -88,15 +87,13 @@ def reference(
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)
     check_order(times, "reference")
-    with decimal.localcontext() as context:
-        context.prec = DIGITS
-        context.Emax, context.Emin = decimal.MAX_EMAX, decimal.MIN_EMIN
+    with decimal.localcontext(prec=DIGITS, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN):
         exact = [Decimal(t) for t in times]
         known = known_solution(scene, exact)
         if known is not None and not velocity and scene.attitude is None:
             largest = max(abs(x) for row in known for x in (*row, *map(Decimal, scene.omega)))
             estimate = min(Decimal(1), largest).scaleb(3 - DIGITS)
-            within = list(itertools.takewhile(lambda row: all(map(_is_number, row)), known))
+            within = list(itertools.takewhile(lambda row: np.isfinite(_array([row])).all(), known))
             return _rounded(times[: len(within)], within, None, "known solution", estimate)
         coefficients = exact_coefficients(scene) if scene.changing is None else []
         coarse, fine = _PRECISE if precise else _QUICK
@@ -115,9 +112,22 @@ def reference(
         found = _rounded(times[:rows], omega, speed, source, estimate)
         if scene.attitude is None:
             return found
-        turned, coarser = ([_unit(row[-4:]) for row in each[:rows]] for each in (second, first))
+        turned, coarser = ([unit(row[-4:]) for row in each[:rows]] for each in (second, first))
         angle = float(4 * _largest_difference(coarser, turned))
         return replace(found, attitude=_array(turned, 4), angle_estimate=angle)
+
+
+def check_order(times: Sequence[float], who: str) -> None:
+    """Raise InputError unless times are finite, of one sign, and lead away from 0.
+
+    The first time may be 0. `who` names the computation in the message.
+    """
+    if not all(map(math.isfinite, times)):
+        raise InputError(f"{who}: a time is not finite; allowed: finite numbers, in seconds")
+    away = [abs(t) for t in times]
+    one_side = bool(times) and (min(times) >= 0.0 or max(times) <= 0.0)
+    if not (one_side and all(t1 < t2 for t1, t2 in itertools.pairwise(away))):
+        raise InputError(f"{who}: times do not lead away from 0 on one side; give times that do")
 
 
 def _check_torque(scene: Scene) -> None:
@@ -190,8 +200,6 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
     torque = scene.body_torque
     row = []
     for axis in range(3):
-        divisor = divisors(scene)[axis]
-        moment = Decimal(divisor.numerator) / divisor.denominator
         total = Decimal(torque.constant[axis]) * t + Decimal(torque.rate[axis]) * t * t / 2
         for amplitude, frequency in torque.sines:
             if frequency:
@@ -202,7 +210,7 @@ def _sphere(scene: Scene, t: Decimal) -> Row:
             sine, _ = sine_cosine(Decimal(frequency) * t)
             rate = Decimal(frequency)
             total += Decimal(amplitude[axis]) * (sine / rate if frequency else t)
-        row.append(Decimal(scene.omega[axis]) + total / moment)
+        row.append(Decimal(scene.omega[axis]) + total / to_decimal(divisors(scene)[axis]))
     return row
 
 
@@ -211,17 +219,7 @@ def exact_coefficients(scene: Scene) -> Row:
     if scene.coefficients is not None:
         return [Decimal(x) for x in scene.coefficients]
     i1, i2, i3 = divisors(scene)
-    exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
-    return [Decimal(x.numerator) / x.denominator for x in exact]
-
-
-def _is_number(x: Decimal) -> bool:
-    return math.isfinite(float(x))
-
-
-def _unit(row: Row) -> Row:
-    length = sum((x * x for x in row), Decimal(0)).sqrt()
-    return [x / length for x in row]
+    return [to_decimal(x) for x in ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)]
 
 
 def _array(rows: Sequence[Row], width: int = 3) -> Array:

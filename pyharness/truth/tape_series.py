@@ -10,7 +10,7 @@ from decimal import Context, Decimal
 from typing import NamedTuple
 
 from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
-from pyharness.truth.decimal_functions import Row, product, sine_cosine
+from pyharness.truth.decimal_functions import Row, product, sine_cosine, value_at
 
 # A larger angle has no sine in any method; its reduction would take as many digits as it has.
 _LARGEST_ANGLE = Decimal("1e308")
@@ -195,7 +195,7 @@ class TapeSeries:
             if most is None:
                 continue
             sizes = [Decimal(0), *map(abs, self._slots[operation.operands[-1]][1:])]
-            while (change := _value(sizes, length)) > 2 * most:
+            while (change := value_at(sizes, length)) > 2 * most:
                 length /= 2
             if change > most:
                 # The change is a convex function of the length, so that the quotient is enough.
@@ -246,8 +246,8 @@ class TapeSeries:
         """
         for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
             if operation.kind == "sqrt":
-                root = _value(self._slots[slot], offset)
-                operand = _value(self._slots[operation.operands[0]], offset)
+                root = value_at(self._slots[slot], offset)
+                operand = value_at(self._slots[operation.operands[0]], offset)
                 if root < 0 and abs(root * root - operand) <= _TRUSTED * abs(operand):
                     return True
         return False
@@ -326,10 +326,3 @@ def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
     if root[0] == 0 == rest:
         return rest
     return rest / (2 * root[0])
-
-
-def _value(series: Row, offset: Decimal) -> Decimal:
-    total = Decimal(0)
-    for term in reversed(series):
-        total = total * offset + term
-    return total

@@ -7,15 +7,7 @@ from typing import Any
 
 from pyharness.bench.ensemble_measure import STEPS, Memory, Rate, Rates, Size
 from pyharness.bench.page import grouped, measured_report
-from pyharness.model.report import (
-    Column,
-    Picture,
-    Report,
-    Table,
-    digits,
-    numbers,
-    short,
-)
+from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short
 
 _DRIFT = (
     "One process and one run: the shortest times of interleaved rounds, on one core in the "

@@ -11,7 +11,6 @@ import numpy as np
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.hold import FORMS, refusable, scene_of
 from pyharness.checks.judge import (
-    Answer,
     MethodRun,
     Policy,
     Truth,
@@ -33,17 +32,11 @@ from pyharness.checks.theory.conditioning import (
     conditioning,
 )
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.checks.trials.length import CLOSED_FORM
+from pyharness.checks.trials.length import CLOSED_FORM, MOTIONS
 from pyharness.engine.registry import METHODS
 from pyharness.engine.rotated import rotated
 from pyharness.engine.solve import solve
-from pyharness.model.attitude import (
-    SEQUENCES,
-    Quaternion,
-    angle_between,
-    angles,
-    product,
-)
+from pyharness.model.attitude import SEQUENCES, Quaternion, angle_between, angles, product
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array, turned_to_space
@@ -63,13 +56,6 @@ _OPERATIONS = Basis(
     "a count of the rounding errors (`checks/trials/attitude.py`)",
 )
 _BODIES = 8
-
-_MOTIONS = {
-    "case-4": Scene("case-4", (0.0, 1.0, 10.0), moments=(40.0, 30.0, 20.0), attitude=POINTED),
-    "tumbling": Scene(
-        "tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0), attitude=POINTED
-    ),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -97,7 +83,7 @@ TURNS = {
     # The axes of space can be chosen at will.
     "space": Turn(
         lambda scene: replace(scene, attitude=product(POINTED, scene.attitude or POINTED)),
-        lambda q: _from_left((POINTED[0], -POINTED[1], -POINTED[2], -POINTED[3]), q),
+        lambda q: np.array(product((POINTED[0], *(-x for x in POINTED[1:])), q.T)).T,
     ),
 }
 
@@ -135,7 +121,8 @@ def _attempts() -> Iterator[Attempt]:
             for tolerance in _TOLERANCES.get(method, (METHODS["closed-form"].finest,)):
                 own = replace(name, subject=method, setting=f"{tolerance:.0e}")
                 yield Attempt(own, partial(_judged, known, tolerance))
-    for motion, scene in _MOTIONS.items():
+    for motion, axial in MOTIONS.items():
+        scene = replace(axial, attitude=POINTED)
         turn = 2.0 * math.pi / max(map(abs, scene.omega))
         for k in range(2, 13):
             known = partial(_truth, scene, 10.0 ** (0.5 * k) * turn, _unknown)
@@ -169,27 +156,15 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
         # An error of the angle changes the direction of the angular momentum by at most that angle.
-        # The moments multiply omega, and the rotation takes two products.
-        limit = ATTITUDE + _omega_limit(scene)
-        yield name.with_quantity("momentum").bounded(
-            _momentum_drift(scene, answer), limit, CLOSED_FORM
-        )
-
-
-def _omega_limit(scene: Scene) -> float:
-    """Return the relative error of the angular momentum from 16 rounding errors of omega."""
-    momentum = np.array(scene.moments) * scene.omega
-    size = float(np.linalg.norm(momentum)) or 1.0
-    largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
-    return 16.0 * ROUNDING * math.sqrt(3.0) * largest / size
-
-
-def _momentum_drift(scene: Scene, found: Answer) -> float:
-    moments = np.array(scene.moments)
-    assert found.attitude is not None
-    before = turned_to_space(np.array([scene.attitude]), (moments * scene.omega)[None, :])[0]
-    change = turned_to_space(found.attitude, moments * found.omega)[0] - before
-    return float(np.linalg.norm(change)) / (float(np.linalg.norm(before)) or 1.0)
+        # The moments multiply omega, which has 16 rounding errors; the rotation takes two products.
+        moments = np.array(scene.moments)
+        momentum = moments * scene.omega
+        largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
+        off = 16.0 * ROUNDING * math.sqrt(3.0) * largest / (float(np.linalg.norm(momentum)) or 1.0)
+        before = turned_to_space(np.array([scene.attitude]), momentum[None, :])[0]
+        change = turned_to_space(answer.attitude, moments * answer.omega)[0] - before
+        drift = float(np.linalg.norm(change)) / (float(np.linalg.norm(before)) or 1.0)
+        yield name.with_quantity("momentum").bounded(drift, ATTITUDE + off, CLOSED_FORM)
 
 
 def _montgomery(name: Name) -> Check:
@@ -261,9 +236,7 @@ def _back(name: Name) -> Check:
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
     there = solve(scene, [time], method, tolerance, attitude=True)
     assert there.attitude is not None
-    x, y, z = there.omega[0].tolist()
-    a, b, c, d = there.attitude[0].tolist()
-    start = replace(scene, omega=(x, y, z), attitude=(a, b, c, d))
+    start = replace(scene, omega=there.omega[0].tolist(), attitude=there.attitude[0].tolist())
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
@@ -299,10 +272,6 @@ def _angles(off: float, name: Name) -> Check:
 
 def _product(q: Array, by: Quaternion) -> Array:
     return np.array(product(q.T, by)).T
-
-
-def _from_left(by: Quaternion, q: Array) -> Array:
-    return np.array(product(by, q.T)).T
 
 
 TRIAL = Trial(

@@ -25,7 +25,7 @@ from pyharness.engine.rotated import restarted_at, rotated
 from pyharness.engine.solve import finest, solve
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene, Triple
+from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 
@@ -34,7 +34,7 @@ _PREPARED = ("quick", "auto")
 
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.1, 2.7)
-_PUSHED = TorqueLaw(constant=(10.0, -20.0, 15.0))
+_PUSHED = TorqueLaw((10.0, -20.0, 15.0))
 _DRIVEN = TorqueLaw(
     (3.0, 2.0, -4.0), (0.0, 1.0, 2.0), (((20.0, 0.0, 5.0), 7.0),), (((0.0, 30.0, 0.0), 11.0),)
 )
@@ -63,11 +63,8 @@ class Symmetry:
 
 
 def _signs(first: float, second: float, third: float) -> Symmetry:
-    def turn(v: Triple) -> Triple:
-        return first * v[0], second * v[1], third * v[2]
-
     return Symmetry(
-        lambda scene: rotated(scene, turn, body=False),
+        lambda s: rotated(s, lambda v: (first * v[0], second * v[1], third * v[2]), body=False),
         1.0,
         lambda omega: omega * [first, second, third],
         # Rounding to nearest does not depend on the sign. Radau and LSODA difference their Jacobian
@@ -113,17 +110,15 @@ def _attempts() -> Iterator[Attempt]:
                 ways["back"] = _back
                 if method not in FIXED_STEP:
                     ways["split"] = _split
+                own = replace(name, subject=method, quantity=f"{tolerance:.0e}")
                 for way, make in ways.items():
-                    own = replace(
-                        name, subject=method, circumstance=way, quantity=f"{tolerance:.0e}"
-                    )
-                    yield Attempt(own, partial(make, time, tolerance))
+                    place = replace(own, circumstance=way)
+                    yield Attempt(place, partial(make, time, tolerance))
         for listing in LISTINGS:
+            own = replace(name, subject=listing.program, quantity=listing.label)
             for what, symmetry in SYMMETRIES.items():
-                own = replace(
-                    name, subject=listing.program, circumstance=what, quantity=listing.label
-                )
-                yield Attempt(own, partial(_program, listing, symmetry))
+                place = replace(own, circumstance=what)
+                yield Attempt(place, partial(_program, listing, symmetry))
 
 
 def _tolerances(name: str, scene: Scene, time: float) -> list[float]:

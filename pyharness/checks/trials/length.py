@@ -153,15 +153,13 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
         for k, revolutions in enumerate(horizons):
             value = float(np.nanmax(np.abs(found[:, k])))
             note = f"{steps[k]:.0f} steps, {steps[k] ** LAWS[what]:.1e} to the power {LAWS[what]}"
-            yield name.with_quantity(f"{what}/{revolutions:.0f}").bounded(
-                value, limits[k], WALK, note
-            )
+            own = name.with_quantity(f"{what}/{revolutions:.0f}")
+            yield own.bounded(value, limits[k], WALK, note)
         fitted = (horizons >= 0.99 * _FIT_FROM) & ~np.isnan(found).any(axis=0)
         power = brouwer.exponent(steps[fitted], found[:, fitted])
         due = LAWS[what] + (0.5 if integrator.preference else 0.0)
-        yield name.with_quantity(f"{what}/power").bounded(
-            power, due + _HALFWAY, POWER, f"due {due}"
-        )
+        own = name.with_quantity(f"{what}/power")
+        yield own.bounded(power, due + _HALFWAY, POWER, f"due {due}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from pyharness.checks.theory.collocation_matrices import (
     PARTS,
     PIVOTS,
     SINGULARITY,
-    Solved,
     declared_singular_below,
     singular_below,
     solved,
@@ -45,11 +44,12 @@ def _attempts() -> Iterator[Attempt]:
 def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
     found = solved(program, step)
     expected = SINGULAR if step <= singular_below(program) else 0
-    yield name.with_quantity("ier").bounded(
-        abs(found.ier - expected), 0.0, SINGULARITY, f"IER = {found.ier}"
-    )
+    note = f"IER = {found.ier}"
+    yield name.with_quantity("ier").bounded(abs(found.ier - expected), 0.0, SINGULARITY, note)
     yield name.with_quantity("bits").bounded(found.differing, 0.0, BITS)
-    yield name.with_quantity("condition").described(found.condition, _condition_note(found))
+    growth = "" if math.isnan(found.growth) else f", growth {found.growth:.3g}"
+    note = f"with scaled columns {found.scaled_condition:.3g}{growth}"
+    yield name.with_quantity("condition").described(found.condition, note)
     if found.ier == SINGULAR:
         return
     rows = ", ".join(str(row + 1) for row in found.order)
@@ -59,11 +59,6 @@ def _matrix(program: str, step: float, name: Name) -> Iterator[Check]:
     note = f"{found.increment_error:.1e} of the step"
     yield name.with_quantity("increment").bounded(found.increment, 1.0, HIGHAM, note)
     yield name.with_quantity("numpy").described(found.yardstick, f"ours {found.forward:.2g}")
-
-
-def _condition_note(found: Solved) -> str:
-    growth = "" if math.isnan(found.growth) else f", growth {found.growth:.3g}"
-    return f"with scaled columns {found.scaled_condition:.3g}{growth}"
 
 
 def _threshold(name: Name) -> Check:

@@ -60,11 +60,9 @@ def _attempt(listing: Listing, name: Name) -> Iterator[Attempt]:
             yield _probed(name, f"first-step-{kind}-{step:g}", probe, scene, note)
     for kind, coefficients in _TOPS.items():
         for step in (0.125, 0.5, 2.0):
+            top = Scene(f"top, {kind} eigenvalues", (1.0, 0.0, 1.0), coefficients=coefficients)
             for count in _COUNTS:
-                scene = Scene(
-                    f"top, {kind} eigenvalues", (1.0, 0.0, 1.0), coefficients=coefficients,
-                    step_size=step, steps=count,
-                )  # fmt: skip
+                scene = replace(top, step_size=step, steps=count)
                 probe = partial(later_steps, scene, listing)
                 yield _probed(name, f"{count}-steps-{kind}-{step:g}", probe, scene)
     if listing.program != "runge-kutta":
@@ -91,11 +89,7 @@ def _collocation(listing: Listing, name: Name) -> Iterator[Attempt]:
 
 
 def _probed(
-    name: Name,
-    setting: str,
-    probe: Callable[[], Probe],
-    scene: Scene | None = None,
-    note: str = "",
+    name: Name, setting: str, probe: Callable[[], Probe], scene: Scene | None = None, note: str = ""
 ) -> Attempt:
     def make(name: Name) -> Check:
         found = probe()

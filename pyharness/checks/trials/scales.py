@@ -56,9 +56,8 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
 
 def _beyond(name: Name) -> Check:
     run = _tried(name.subject, scene_of(name), 1e300)
-    silent = run.has_result
-    note = "a silent wrong number" if silent else run.ended
-    return name.judged(not silent, note, float(silent), 0.0, _OVERFLOW)
+    note = "a silent wrong number" if run.has_result else run.ended
+    return name.judged(not run.has_result, note, float(run.has_result), 0.0, _OVERFLOW)
 
 
 def _tried(name: str, scene: Scene, time: float) -> End:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import product
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
         yield named("threads", subject, scene=scene).bounded(len(wrong), 0.0, BITS, note)
 
 
-def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEATS) -> list[Job]:
+def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
     """Return the jobs whose bits in threads differ from a call alone, once per difference."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
@@ -74,7 +75,7 @@ def different(jobs: Sequence[Job], threads: int = THREADS, repeats: int = _REPEA
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH)
     try:
-        with ThreadPoolExecutor(threads) as pool:
+        with ThreadPoolExecutor(THREADS) as pool:
             found = list(pool.map(lambda index: bits(jobs[index]), order))
     finally:
         sys.setswitchinterval(before)
@@ -93,18 +94,13 @@ def jobs() -> list[Job]:
     """Return jobs for every method, prepared solver and program, for LEQT1F, and for refusals."""
     found = []
     for scene in SCENES:
-        for name in METHODS:
-            found.append(Job(name, scene, partial(_rows, scene, name)))
-        for name in PREPARED:
-            found.append(Job(f"prepared-{name}", scene, partial(_prepared, scene, name)))
-        for listing in LISTINGS:
-            for implementation in IMPLEMENTATIONS:
-                call = partial(_program, scene, listing, implementation)
-                found.append(Job(listing.program, scene, call))
+        found += [Job(name, scene, partial(_rows, scene, name)) for name in METHODS]
+        found += [Job(f"prepared-{x}", scene, partial(_prepared, scene, x)) for x in PREPARED]
+        for listing, implementation in product(LISTINGS, IMPLEMENTATIONS):
+            call = partial(_program, scene, listing, implementation)
+            found.append(Job(listing.program, scene, call))
         found.append(Job("refusals", scene, partial(_refusal, scene)))
-    for case in range(1, 8):
-        found.append(Job("linear-solver", case_scene(case), partial(_linear, case)))
-    return found
+    return found + [Job("linear-solver", case_scene(n), partial(_linear, n)) for n in range(1, 8)]
 
 
 def _rows(scene: Scene, name: str) -> bytes:

@@ -18,7 +18,7 @@ from pyharness.bench.ensemble_contenders import (
     EnsembleLoad,
     coefficients,
 )
-from pyharness.bench.heyoka_equations import heyoka_equations
+from pyharness.bench.peers import heyoka_equations
 from pyharness.model.attitude import quaternion_rates
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque

@@ -6,7 +6,7 @@ from operator import attrgetter
 from typing import Any
 
 from pyharness.bench.ensemble_measure import STEPS, Memory, Rate, Rates, Size
-from pyharness.bench.page import grouped, measured_report
+from pyharness.bench.report import grouped, measured_report
 from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short
 
 _DRIFT = (

@@ -9,9 +9,8 @@ import numpy as np
 from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, list_own_contenders
 from pyharness.bench.ensemble_contenders import EnsembleContender, EnsembleLoad, own_ensembles
 from pyharness.bench.ensemble_peers import ensemble_peers
-from pyharness.bench.heyoka_equations import Formula
 from pyharness.bench.measure import Workload
-from pyharness.bench.peers import heyoka_maker, peers
+from pyharness.bench.peers import Formula, heyoka_maker, peers
 from pyharness.checks.scenes.random_scenes import text_generator
 from pyharness.engine import field_terms, terms
 from pyharness.model.scene import Scene

@@ -13,8 +13,7 @@ from typing import Any
 from pyharness.bench.ensemble_measure import TARGETS as BODY_TARGETS
 from pyharness.bench.ensemble_measure import Rate, Rates
 from pyharness.bench.measure import Finding, Row, Workload
-from pyharness.bench.page import grouped, measured_report
-from pyharness.bench.report import microseconds, not_measured, ratio
+from pyharness.bench.report import grouped, measured_report, microseconds, not_measured, ratio
 from pyharness.bench.scores import geometric_mean, scores
 from pyharness.bench.term_loads import (
     DOP853,

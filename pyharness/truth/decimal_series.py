@@ -281,7 +281,9 @@ class _Equations:
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)
-        inertia = self._inertia_series(time)
+        # Taylor coefficients of a changing inertia around `time`.
+        elements = [] if self._changing is None else self._changing.elements
+        inertia = [[_moved(each, time) for each in row] for row in elements]
         momentum: list[Row] = [[], [], []]
         for k in range(order):
             # Reversed once for all Cauchy products.
@@ -306,12 +308,6 @@ class _Equations:
             for each, rate in zip(series, rates, strict=True):
                 each.append(rate / (k + 1))
         return series
-
-    def _inertia_series(self, time: Decimal) -> list[list[Row]]:
-        """Return the Taylor coefficients of a changing inertia around `time` (s), else []."""
-        if self._changing is None:
-            return []
-        return [[_moved(each, time) for each in row] for row in self._changing.elements]
 
     @property
     def least_order(self) -> int:

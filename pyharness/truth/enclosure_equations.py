@@ -51,10 +51,6 @@ class Equations:
         ends = [sum(sizes[:k]) for k in range(len(sizes) + 1)]
         self.blocks = [slice(*each) for each in pairwise(ends)]
         self.breaks = [t for each in tapes for t in each.breaks]
-        self._exact()
-
-    def _exact(self) -> None:
-        scene = self._scene
         self._principal: list[Any] | None = None
         self._moments = [arb(1)] * 3
         self.scales = [1.0] * len(self.start)

@@ -238,7 +238,7 @@ class _Proof:
         number k is at most M c**-k at the end of the step. The bounds are geometric series.
         """
         length = abs(ball(h))
-        best: list[Any] | None = None
+        candidates = []
         for circle in _CIRCLES:
             around = length * circle
             inputs = []
@@ -252,12 +252,10 @@ class _Proof:
             sizes = [arb(acb(x).abs_upper()) for x in found]
             if all(x.is_finite() for x in sizes):
                 ratio = arb(1) / circle
-                rests = [x * ratio**count / (1 - ratio) for x in sizes]
-                if best is None or sum(map(float, rests)) < sum(map(float, best)):
-                    best = rests
-        if best is None:
+                candidates.append([x * ratio**count / (1 - ratio) for x in sizes])
+        if not candidates:
             raise _NoStepError
-        return best
+        return min(candidates, key=lambda rests: sum(map(float, rests)))
 
     def _growth(self, rates: Rates, time: Any, inputs: list[Any]) -> Any:
         """Return the matrix M of the module's docstring (1/s)."""

@@ -15,8 +15,8 @@ from pyharness.bench import measure as bench
 from pyharness.bench import term_loads
 from pyharness.bench.contenders import Contender
 from pyharness.bench.ensemble_measure import Rate, Rates
-from pyharness.bench.heyoka_equations import heyoka_equations
 from pyharness.bench.measure import Finding, Row, Workload, relative_error
+from pyharness.bench.peers import heyoka_equations
 from pyharness.bench.term_loads import (
     EXPRESSION,
     READY,

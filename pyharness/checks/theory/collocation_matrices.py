@@ -121,21 +121,16 @@ def points(program: str, step: float) -> list[float]:
     return [step * 0.2, step * 0.4, step * 0.6, step * 0.8]
 
 
-def _right_hand_sides(count: int) -> Array:
-    """Return six right-hand sides, three regular and three random, shape (6, count)."""
-    rough = np.random.default_rng(count).normal(size=(3, count))
-    places = range(count)
-    return np.array(
-        [[1.0] * count, [k / count for k in places], [(-1.0) ** k for k in places], *rough]
-    )
-
-
 def solved(program: str, step: float) -> Solved:
     """Return LEQT1F's accuracy for the collocation matrix of one step size (s)."""
     from pyharness.model.extension import extension
 
     matrix = collocation.collocation_matrix(points(program, step))
-    sides = _right_hand_sides(len(matrix))
+    count = len(matrix)
+    places = np.arange(count)
+    # Six right-hand sides, three regular and three random.
+    rough = np.random.default_rng(count).normal(size=(3, count))
+    sides = np.array([np.ones(count), places / count, (-1.0) ** places, *rough])
     factors, found, ier = extension().solve_linear(
         np.asfortranarray(matrix), np.asfortranarray(sides.T)
     )

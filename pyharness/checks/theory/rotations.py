@@ -276,12 +276,15 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
         told += ", and the margin of stability"
     vertex = math.sqrt(abs(product))
     places: Places = []
-    for factor in sorted(along):
-        omega = [0.0, 0.0, 0.0]
-        omega[one] = vertex * factor
-        omega[other] = math.copysign(vertex / factor, product)
-        places.append((along[factor], (omega[0], omega[1], omega[2])))
+    for factor, name in sorted(along.items()):
+        omega = {one: vertex * factor, other: math.copysign(vertex / factor, product)}
+        places.append((name, _three(omega)))
     return told, places
+
+
+def _three(components: dict[int, float]) -> Triple:
+    x, y, z = (components.get(axis, 0.0) for axis in range(3))
+    return x, y, z
 
 
 def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
@@ -299,11 +302,9 @@ def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
     )
     vertex = math.sqrt(math.hypot(*across))
     places: Places = []
-    for factor in _ALONG:
-        omega = [0.0, 0.0, 0.0]
-        omega[axis] = vertex * factor
-        omega[one], omega[other] = (each / omega[axis] for each in across)
-        places.append(("hyperbola", (omega[0], omega[1], omega[2])))
+    for spin in (vertex * factor for factor in _ALONG):
+        omega = {axis: spin, one: across[0] / spin, other: across[1] / spin}
+        places.append(("hyperbola", _three(omega)))
     return told, places
 
 

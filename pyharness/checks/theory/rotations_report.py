@@ -22,16 +22,12 @@ _KEY = (
     "flips: shortest time between flips, s. linear: time after which the linear approximation has "
     "an error of a tenth, s. Q: rates of equation 32, 1/s."
 )
-_OMEGA = digits(".4g")
-_SECONDS = digits(".3g")
 
 
 def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
     """Return the report of a scene's steady rotations."""
-    text: list[Section] = [
-        [*heading(scene), f"perturbation: {found.disturbance:g} of the rotation"]
-    ]
-    text.append([found.told])
+    perturbed = f"perturbation: {found.disturbance:g} of the rotation"
+    text: list[Section] = [[*heading(scene), perturbed], [found.told]]
     if found.rotations:
         text += [[_KEY], [_table(found.rotations)]]
     return Report(
@@ -52,9 +48,9 @@ def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
 def _table(rotations: Sequence[SteadyRotation]) -> Table:
     columns = [
         *words("rotation"),
-        *(Column(f"w{axis}", _OMEGA) for axis in (1, 2, 3)),
+        *(Column(f"w{axis}", digits(".4g")) for axis in (1, 2, 3)),
         Column("stable", lambda stable: "yes" if stable else "no", left=True),
-        *(Column(head, _SECONDS) for head in ("doubling", "period", "flips", "linear")),
+        *(Column(head, digits(".3g")) for head in ("doubling", "period", "flips", "linear")),
         Column("Q", _rates, left=True, fit="wrap"),
     ]
     rows = [[each.place, *each.omega, each.stable, *_times(each), each.rates] for each in rotations]

@@ -63,7 +63,10 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     weighted = fractions((tests * quadrature[:, None]).T)
     # Computed in fractions, because in floats the tableau would depend on the LAPACK in use.
     projection = inverse(weighted @ fractions(basis(nodes, n))) @ weighted
-    matrix = fractions(_integrals(nodes, n)) @ projection
+    # Integrals of `basis` from 0 to the nodes.
+    antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
+    integrals = legendre.legval(2.0 * nodes - 1.0, antiderivatives).T
+    matrix = fractions(integrals) @ projection
     return Tableau(nodes, matrix.astype(float), projection[0].astype(float))
 
 
@@ -104,9 +107,3 @@ def _legendre(m: int, x: Fraction) -> tuple[Fraction, Fraction]:
 def basis(s: Array, n: int) -> Array:
     """Return Legendre polynomials 0 to n - 1, shifted to [0, 1], at m points, shape (m, n)."""
     return np.asarray(legendre.legvander(2.0 * s - 1.0, n - 1), dtype=float)
-
-
-def _integrals(s: Array, n: int) -> Array:
-    """Return the integrals of `basis` from 0 to m points, shape (m, n)."""
-    antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)
-    return np.asarray(legendre.legval(2.0 * s - 1.0, antiderivatives).T, dtype=float)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -28,17 +29,10 @@ class Ensembles:
 
 def ensemble_report(found: Ensembles, packages: Iterable[str], command: str) -> Report:
     """Return the report: tables of speeds, of time per body, and of memory."""
-    return measured_report(
-        "## Ensembles",
-        _DRIFT,
-        _make_tables(found),
-        _notes(found),
-        lambda: _record(found),
-        _data(found.rates),
-        {"growth": lambda: size_picture(found.sizes)},
-        packages,
-        command,
-    )
+    text = [*_make_tables(found), _notes(found)]
+    pictures = {"growth": partial(size_picture, found.sizes)}
+    report = Report("bench", text, partial(_record, found), _data(found.rates), pictures=pictures)
+    return measured_report("## Ensembles", _DRIFT, report, packages, command)
 
 
 def ours_over(rows: Sequence[Rate], row: Rate) -> float | None:

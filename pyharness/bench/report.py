@@ -4,7 +4,7 @@ A ratio is the run time of the baseline solver divided by that of another, at eq
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple
 from operator import attrgetter
 from typing import Any
@@ -19,7 +19,6 @@ from pyharness.model.build import build, machine
 from pyharness.model.report import (
     Column,
     Line,
-    Picture,
     Report,
     Section,
     Table,
@@ -38,24 +37,16 @@ _DRIFT = (
 
 
 def measured_report(
-    title: str,
-    worth: str,
-    parts: Sequence[tuple[str, Table]],
-    notes: Sequence[str],
-    record: Callable[[], dict[str, Any]],
-    data: Table,
-    pictures: Mapping[str, Callable[[], Picture]],
-    packages: Iterable[str],
-    command: str,
+    title: str, worth: str, found: Report, packages: Iterable[str], command: str
 ) -> Report:
-    """Return the report of a benchmark.
+    """Return the report of a benchmark with its page, machine and build.
 
-    `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers, and
-    `parts` are titled tables. `record` returns the JSON, `data` is the table with full precision,
-    `pictures` are functions by name. The versions of `packages` are listed. `command` repeats the
-    benchmark.
+    `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers. The text
+    of `found` has titled tables, then the notes. The versions of `packages` are listed. `command`
+    repeats the benchmark.
     """
     here, built = machine(packages), build()
+    *parts, notes = found.text
     versions = [
         *here.items(),
         ("pyharness", built.version),
@@ -76,14 +67,8 @@ def measured_report(
         [Line(f"{mark} Notes")],
         [Line(f"- {line}") for line in notes],
     ]
-    return Report(
-        "bench",
-        text=[*parts, notes],
-        record=lambda: record() | {"machine": here, "build": asdict(built)},
-        data=data,
-        page=page,
-        pictures=pictures,
-    )
+    about = {"machine": here, "build": asdict(built)}
+    return found._replace(record=lambda: found.record() | about, page=page)
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
@@ -110,17 +95,15 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     For random scenes, tables of the distribution of ratios replace the others.
     """
     drawn, data = _random(finding), _data(finding)
-    return measured_report(
-        "# Run time against error" + (" of omega and attitude" if finding.attitude else ""),
-        _DRIFT,
-        (_spread_parts if drawn else _make_tables)(finding),
-        _notes(finding),
+    title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
+    found = Report(
+        "bench",
+        [*(_spread_parts if drawn else _make_tables)(finding), _notes(finding)],
         lambda: _record(finding),
         _spread_data(finding) if drawn else data,
-        {"precision": lambda: bench_picture(finding, data)},
-        packages,
-        command,
+        pictures={"precision": lambda: bench_picture(finding, data)},
     )
+    return measured_report(title, _DRIFT, found, packages, command)
 
 
 def _random(finding: Finding) -> bool:

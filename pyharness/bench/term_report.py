@@ -7,6 +7,7 @@ import statistics
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -58,17 +59,9 @@ class Summary:
 
 def term_report(found: Terms, packages: Iterable[str], command: str) -> Report:
     """Return the report: tables for single bodies, for many bodies, and of mean ratios."""
-    return measured_report(
-        "# Torques that depend on the state",
-        _WORTH,
-        _make_tables(found),
-        _notes(found),
-        lambda: _record(found),
-        _data(found),
-        {},
-        packages,
-        command,
-    )
+    text = [*_make_tables(found), _notes(found)]
+    report = Report("bench", text, partial(_record, found), _data(found), pictures={})
+    return measured_report("# Torques that depend on the state", _WORTH, report, packages, command)
 
 
 def summaries(found: Terms) -> list[Summary]:
@@ -79,8 +72,8 @@ def summaries(found: Terms) -> list[Summary]:
         rows = [_ratios(found.single, load) for load in loads]
         result += _summary(kind, 1, TARGETS, rows)
         names = dict.fromkeys(load.label for load in loads)
-        many = [[_body_ratio(found.many, name, target) for target in BODY_TARGETS]
-                for name in names]  # fmt: skip
+        ratios = partial(_body_ratio, found.many)
+        many = [[ratios(name, target) for target in BODY_TARGETS] for name in names]
         result += _summary(kind, found.many.bodies, BODY_TARGETS, many)
     return result
 

@@ -16,7 +16,7 @@ from pyharness.model.effort import advice, checked_effort
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
-from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.certificate_checker import (
     FORMAT,
     MOST_BITS,
@@ -114,10 +114,10 @@ def _decades(x: Fraction) -> float:
 def _scene_record(scene: Scene) -> dict[str, Any]:
     law = scene.law
     body = "moments" if scene.coefficients is None else "coefficients"
-
-    def waves(given: Sequence[Wave]) -> list[list[Any]]:
-        return [[list(amplitude), frequency] for amplitude, frequency in given]
-
+    waves = {
+        name: [[list(amplitude), frequency] for amplitude, frequency in getattr(law, name)]
+        for name in ("sines", "cosines")
+    }
     return {
         "name": scene.name,
         # The moments of a `PrincipalScene` have more digits than a binary64 number.
@@ -126,12 +126,7 @@ def _scene_record(scene: Scene) -> dict[str, Any]:
             for x in scene.exact_moments or scene.coefficients or ()
         ],
         "omega": list(scene.omega),
-        "torque": {
-            "constant": list(law.constant),
-            "rate": list(law.rate),
-            "sines": waves(law.sines),
-            "cosines": waves(law.cosines),
-        },
+        "torque": {"constant": list(law.constant), "rate": list(law.rate), **waves},
     }
 
 

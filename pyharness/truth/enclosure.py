@@ -76,12 +76,9 @@ def _in_closed_form(scene: Scene, times: Sequence[float], digits: int) -> Enclos
 
     turns = scene.attitude is not None
     rows = enclose_free(scene, times, digits, turns)
-    return Enclosure(
-        tuple(times),
-        tuple(balls(row[:3]) for row in rows),
-        "elliptic functions in ball arithmetic",
-        attitude=tuple(balls(row[3:]) for row in rows) if turns else None,
-    )
+    omega, how = tuple(balls(row[:3]) for row in rows), "elliptic functions in ball arithmetic"
+    attitude = tuple(balls(row[3:]) for row in rows) if turns else None
+    return Enclosure(tuple(times), omega, how, attitude=attitude)
 
 
 def _is_bounded(scene: Scene) -> bool:

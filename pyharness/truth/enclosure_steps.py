@@ -76,16 +76,11 @@ def enclose_steps(
                 found.append(proof.balls(scene.attitude is not None))
         excess = largest_radius([each[0] for each in found], digits)
         if excess <= 1:
-            groups = iter(zip(*found, strict=True))
-            return Enclosure(
-                tuple(times),
-                next(groups),
-                "Taylor steps in ball arithmetic",
-                steps,
-                attitude=next(groups) if scene.attitude is not None else None,
-                velocity=next(groups) if velocity else None,
-                transition=next(groups) if transition else None,
-            )
+            omega, *others = zip(*found, strict=True)
+            names = ["attitude"] * (scene.attitude is not None)
+            names += ["velocity"] * velocity + ["transition"] * transition
+            more = dict(zip(names, others, strict=True))
+            return Enclosure(tuple(times), omega, "Taylor steps in ball arithmetic", steps, **more)
         wanted += math.log10(float(min(excess, Fraction(10) ** 300))) + 1.0
     raise InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
 

@@ -238,11 +238,6 @@ def _rounded(
     source: str,
     estimate: Decimal,
 ) -> Reference:
-    return Reference(
-        time=np.array(times, dtype=float),
-        omega=_array(omega),
-        velocity=None if velocity is None else _array(velocity),
-        source=source,
-        estimate=float(estimate),
-        remainder=_array([[x - Decimal(float(x)) for x in row] for row in omega]),
-    )
+    remainder = _array([[x - Decimal(float(x)) for x in row] for row in omega])
+    time, speed = np.array(times, dtype=float), None if velocity is None else _array(velocity)
+    return Reference(time, _array(omega), speed, source, float(estimate), remainder)

@@ -6,6 +6,7 @@ Only one scene has a torque: Case 6 of the thesis.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 from pyharness.engine.rescaled import scaled
@@ -162,11 +163,10 @@ POINTED: Quaternion = unit_quaternion("attitude", (0.5, -0.1, 0.7, 0.5))[0]
 def _attitude() -> Iterator[Circumstance]:
     for name, scene, time in _separatrix():
         yield Circumstance(f"separatrix-{name}", replace(scene, attitude=POINTED), time)
-    bodies: list[tuple[str, str, Triple, Triple]] = []
-    for k in range(1, 17, 3):
-        for sign in (1.0, -1.0):
-            moments = (3.0, 3.0 * (1.0 + sign * 10.0**-k), 2.0)
-            bodies.append((f"symmetry-{sign * 10.0**-k:.0e}", "", moments, _SHAPED))
+    for k, sign in product(range(1, 17, 3), (1.0, -1.0)):
+        moments = (3.0, 3.0 * (1.0 + sign * 10.0**-k), 2.0)
+        scene = Scene("", _SHAPED, moments, attitude=POINTED)
+        yield _stepped(f"symmetry-{sign * 10.0**-k:.0e}", scene, _SHORT)
     for name, moments, omega in (
         ("symmetric", (3.0, 3.0, 2.0), _SHAPED),
         ("sphere", (3.0, 3.0, 3.0), _SHAPED),
@@ -175,10 +175,7 @@ def _attitude() -> Iterator[Circumstance]:
         ("needle", _NEEDLE, _SHAPED),
         ("plate", _PLATE, _SHAPED),
     ):
-        bodies.append((name, name, moments, omega))
-    for circumstance, name, moments, omega in bodies:
-        scene = Scene(name, omega, moments=moments, attitude=POINTED)
-        yield _stepped(circumstance, scene, _SHORT)
+        yield _stepped(name, Scene(name, omega, moments, attitude=POINTED), _SHORT)
 
 
 EXTREMES: dict[str, Callable[[], Iterator[Circumstance]]] = {

@@ -183,9 +183,8 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
     method = name.subject
     kind = prepared_candidate if method in _PREPARED else method_candidate
     candidate = kind(_PREPARED.get(method, method), tolerance)
-    yield judge(
-        name, by_end(method, candidate, tolerance, scene_of(name), truth.end), truth, POLICY
-    )
+    tried = by_end(method, candidate, tolerance, scene_of(name), truth.end)
+    yield judge(name, tried, truth, POLICY)
 
 
 def _describe_axial(name: Name) -> Iterator[Attempt]:

@@ -39,6 +39,7 @@ class EnsembleLoad:
     torque: Array | None  # (n, 3), N m about the body's axes
     # (n, 4), unit quaternions; None if attitudes are not requested
     attitude0: Array | None = field(default=None, kw_only=True)
+    horizon: float = field(default=HORIZON, kw_only=True)  # end time, s
 
     @property
     def n(self) -> int:
@@ -49,11 +50,6 @@ class EnsembleLoad:
     def scene(self) -> Scene:
         """Return a scene with the shared moments, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
-
-    @property
-    def horizon(self) -> float:
-        """Return the end time (s)."""
-        return HORIZON
 
     @property
     def acceleration(self) -> Array:

@@ -68,11 +68,6 @@ class TermBodies(EnsembleLoad):
         """Return the shared scene."""
         return self.body
 
-    @property
-    def horizon(self) -> float:
-        """Return the end time (s)."""
-        return HORIZONS[0]
-
     def scenes(self) -> Iterator[Scene]:
         """Yield the scene of each body."""
         for start in self.omega0.tolist():
@@ -122,7 +117,10 @@ def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodi
     """Return the problems of `n` bodies; `seed` determines their initial omegas."""
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
-    return [TermBodies(each.scene.name, omega0, None, each.scene) for each in scenes]
+    horizon = HORIZONS[0]
+    return [
+        TermBodies(each.scene.name, omega0, None, each.scene, horizon=horizon) for each in scenes
+    ]
 
 
 def _wind(t: Any, w: Any, q: Any) -> Any:

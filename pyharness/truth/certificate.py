@@ -99,16 +99,13 @@ def prove(
         if excess <= 1:
             found = Enclosure(tuple(times), tuple(run.omega), _WORDS, len(run.steps))
             return Proof(found, run)
-        wanted += _decades(excess) + 1.0
+        bits = excess.numerator.bit_length() - excess.denominator.bit_length() + 1
+        wanted += bits * math.log10(2.0) + 1.0
     raise _many_digits(digits)
 
 
 def _many_digits(digits: int) -> InputError:
     return InputError(f"prove: the motion amplifies errors too much for {digits} digits; use fewer")
-
-
-def _decades(x: Fraction) -> float:
-    return (x.numerator.bit_length() - x.denominator.bit_length() + 1) * math.log10(2.0)
 
 
 def _scene_record(scene: Scene) -> dict[str, Any]:
@@ -178,8 +175,7 @@ class _Run:
                 last = max(abs(x) for each in expansion[0] for x in each[-2:])
                 excess = (last.bit_length() - most) / self._order
                 if excess <= _TOLERATED / self._order:
-                    source = self._source(radius, wave_radius, expansion, h)
-                    tube = self._tube(source, expansion)
+                    source, tube = self._tube(radius, wave_radius, expansion, h)
                     try:
                         radii = system.radii(radius, wave_radius, expansion, tube, h)
                         break
@@ -215,16 +211,13 @@ class _Run:
         unit = max(1 << self._bits, *map(abs, middle))
         return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
 
-    def _source(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> int:
-        """Return a bound on the error of one step without amplification."""
-        _, residuals, wave_residual = expansion
+    def _tube(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> tuple[int, int]:
+        """Return the error of one step without amplification, and a tube radius larger than it."""
+        series, residuals, wave_residual = expansion
         forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
-        return radius + self._system.norm(residuals) + forced
-
-    def _tube(self, source: int, expansion: Expansion) -> int:
-        """Return a tube radius larger than the error of an ordinary step."""
-        thick: int = max(max(map(abs, each)) for each in expansion[0][:3]) >> _TUBE_BITS
-        return 8 * source + thick + 8
+        source = radius + self._system.norm(residuals) + forced
+        thick: int = max(max(map(abs, each)) for each in series[:3]) >> _TUBE_BITS
+        return source, 8 * source + thick + 8
 
     def _add_balls(self, series: list[list[int]], radius: int, time: int, h: int) -> None:
         """Add the balls at the requested times in a step, or at its beginning if h is 0."""

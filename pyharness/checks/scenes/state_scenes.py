@@ -142,6 +142,7 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
     if name in SUDDEN:
         width = 10.0 ** source.uniform(-2.0 if name == "sigmoid" else -3.0, -0.5)
         middle = source.uniform(0.0, 5.0)
+    push = scale * speed * vector
     terms: dict[str, Term] = {
         "damping": lambda t, w, q: -0.2 * scale * ((matrix @ matrix.T) @ w),
         "wheel": lambda t, w, q: scale * np.cross(vector, w),
@@ -150,23 +151,19 @@ def term(source: Random, name: str, size: float, speed: float) -> Term:
         "control": lambda t, w, q: -scale * (w - speed * vector),
         "quotient": lambda t, w, q: scale * w * (a + b * f * t) / (1.0 + (f * t) ** 2),
         "root": lambda t, w, q: scale * vector * w[0] / np.sqrt(1.5 + (w[1] / speed) ** 2),
-        "decay": lambda t, w, q: scale * speed * vector * np.exp(-((w[2] / speed) ** 2) - c * c),
-        "swing": lambda t, w, q: scale * speed * vector * np.cos(w[0] / speed + a * w[1] / speed),
+        "decay": lambda t, w, q: push * np.exp(-((w[2] / speed) ** 2) - c * c),
+        "swing": lambda t, w, q: push * np.cos(w[0] / speed + a * w[1] / speed),
         "gradient": lambda t, w, q: gradient(t, q, scale * speed * (1.0 + np.abs(vector)), f),
         "field": lambda t, w, q: scale * speed * np.cross(vector, to_body(q, orbit(t, f) + other)),
         "spring": lambda t, w, q: -scale * speed * q[0] * q[1:] - 0.3 * scale * w,
         "switch": lambda t, w, q: -scale * speed * vector * np.tanh(w[0] / (width * speed)),
         "friction": lambda t, w, q: -scale * speed * w / np.sqrt(w @ w + (width * speed) ** 2),
-        "bell": lambda t, w, q: scale * speed * vector * np.exp(-((w[1] / (width * speed)) ** 2)),
-        "peak": lambda t, w, q: scale * speed * vector / (1.0 + (w[2] / (width * speed)) ** 2) ** 2,
-        "burst": lambda t, w, q: (
-            scale * speed * vector * np.exp(-(((speed * t - middle) / width) ** 2))
-        ),
-        "flash": lambda t, w, q: (
-            scale * speed * vector / (1.0 + ((speed * t - middle) / width) ** 2)
-        ),
-        "sigmoid": lambda t, w, q: scale * speed * vector / (1.0 + np.exp(-w[0] / (width * speed))),
-        "swings": lambda t, w, q: scale * speed * vector * np.sin(f * t + a) ** 24,
+        "bell": lambda t, w, q: push * np.exp(-((w[1] / (width * speed)) ** 2)),
+        "peak": lambda t, w, q: push / (1.0 + (w[2] / (width * speed)) ** 2) ** 2,
+        "burst": lambda t, w, q: push * np.exp(-(((speed * t - middle) / width) ** 2)),
+        "flash": lambda t, w, q: push / (1.0 + ((speed * t - middle) / width) ** 2),
+        "sigmoid": lambda t, w, q: push / (1.0 + np.exp(-w[0] / (width * speed))),
+        "swings": lambda t, w, q: push * np.sin(f * t + a) ** 24,
         "mixed": lambda t, w, q: scale * vector * (w @ vector) * q[1] * np.sin(q[2] + f * t),
     }
     return terms[name]

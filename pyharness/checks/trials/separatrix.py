@@ -1,12 +1,14 @@
-"""Trial of spin about the middle axis over several flips, with perturbations from .1 to 0 rad/s."""
+"""Trials of the motions near a separatrix, of nearly equal moments, and of extreme shapes."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.hold import ALL, check_all, run_method
-from pyharness.checks.scenes.extreme import MIDDLE_AXIS, in_steps
+from pyharness.checks.hold import ALL, FORMS, check_all, check_methods, run_method, truth_of
+from pyharness.checks.judge import unknown_flow
+from pyharness.checks.scenes.extreme import LONG, MIDDLE_AXIS, SYMMETRIC_START, in_steps
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.engine.registry import FIXED_STEP
@@ -14,6 +16,8 @@ from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 
 _STAYS = 50.0  # s
+# The long time is for closed forms only, whose limits need no error amplification.
+_UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 _UNDISTURBED = Basis(
     "derived",
     "change of a rotation about the middle axis without a perturbation",
@@ -46,7 +50,7 @@ def _attempts() -> Iterator[Attempt]:
     yield from _undisturbed()
 
 
-TRIAL = Trial(
+SEPARATRIX = Trial(
     "separatrix",
     "spin about the middle axis, with perturbations of 1e-1 to 1e-15 and 0, over up to five flips",
     "Closed form: 1e-14 plus the effect of rounding A, B, C. Other methods: the tolerance, or "
@@ -54,4 +58,28 @@ TRIAL = Trial(
     "motion. If fewer than two digits are left, energy and momentum, whose errors the motion "
     "does not amplify. Without a perturbation: no error.",
     lambda only: _attempts(),
+)
+
+
+def _checks_at(name: Name, time: float) -> Iterator[Attempt]:
+    if time == LONG:
+        return check_methods(name, time, FORMS, partial(truth_of, flow=_UNKNOWN))
+    return check_methods(name, time)
+
+
+NEAR_SYMMETRY = Trial(
+    "near-symmetry",
+    "moments that differ by 1e-1 to 1e-16 of their size, two equal moments, and the sphere",
+    "As in the trial separatrix. The difference of two nearly equal moments is exact, so that no "
+    "digits are lost.",
+    lambda only: check_all("near-symmetry", _checks_at, lambda each: each.time != LONG),
+)
+
+
+SHAPES = Trial(
+    "shapes",
+    "needles with ratios of moments up to 1e12, flat plates, and moments that no body can have",
+    "As in the trial separatrix. A change of energy or momentum counts as the smallest error of "
+    "omega that causes it.",
+    lambda only: check_all("shapes"),
 )

@@ -14,8 +14,7 @@ from flint import acb, arb, ctx
 
 from pyharness.model.attitude import product
 from pyharness.model.errors import InputError
-from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.values import integer
+from pyharness.model.scene import Scene
 from pyharness.truth.balls import ball
 from pyharness.truth.integer_series import exact_body
 
@@ -32,10 +31,9 @@ def enclose_free(
 
     With `attitude`, four more contain the unit quaternion from body to space, scalar first and
     continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, and times the largest
-    initial component if that exceeds 1 rad/s. Raise InputError if there is a torque, motions may be
-    unbounded, the attitude cannot be computed, or 20 000 bits do not suffice.
+    initial component if that exceeds 1 rad/s. The motion must be bounded, and have moments for an
+    attitude. Raise InputError if 20 000 bits do not suffice.
     """
-    _check(scene, times, digits, attitude)
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
     while True:
@@ -52,23 +50,6 @@ def enclose_free(
                 "closer to 0"
             )
         bits = min(2 * bits, _MOST_BITS)
-
-
-def _check(scene: Scene, times: Sequence[float], digits: int, attitude: bool) -> None:
-    if not checked_scene(scene).torque.is_zero:
-        raise InputError("the scene has a torque; allowed: a scene without torque")
-    if not all(map(math.isfinite, times)):
-        raise InputError("a time is not finite; allowed: finite numbers, in seconds")
-    if integer("digits", digits) < 0:
-        raise InputError(f"digits is {digits}; allowed: 0 or more")
-    if attitude and (scene.attitude is None or scene.moments is None):
-        raise InputError("the attitude needs moments and an initial attitude; give both")
-    signs = {(a > 0) - (a < 0) for a in exact_body(scene)[1]}
-    if signs != {0} and not signs >= {1, -1}:
-        raise InputError(
-            "the coefficients allow unbounded motions; allowed: one of them above 0 and one below "
-            "0, or all 0"
-        )
 
 
 def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:

@@ -10,6 +10,7 @@ Calls on one core are timed in processor time.
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
@@ -180,8 +181,7 @@ def _fastest(rows: Iterable[Rate]) -> Iterable[Rate]:
     found: dict[tuple[object, ...], Rate] = {}
     for row in rows:
         place = (row.load, row.target, row.method, row.threads)
-        if place not in found or row.rate > found[place].rate:
-            found[place] = row
+        found[place] = max(found.get(place, row), row, key=lambda each: each.rate)
     return found.values()
 
 
@@ -273,20 +273,16 @@ def _prepared(load: EnsembleLoad) -> Callable[[], object]:
     return lambda: solver.many(load.omega0, HORIZON, out=out)
 
 
-def memory(bodies: int, methods: Sequence[EnsembleContender] | None = None) -> list[Memory]:
-    """Measure the memory of a call for each of `methods`, by default all our methods.
+def memory(bodies: int) -> list[Memory]:
+    """Measure the memory of a call for each of our methods.
 
     Each method runs in a new process, because peak memory never decreases.
     """
     found = []
-    for method in own_ensembles() if methods is None else methods:
+    for method in own_ensembles():
         command = f"from pyharness.bench.ensemble_measure import needed; needed({method.name!r}, "
-        told = subprocess.run(
-            [sys.executable, "-c", f"{command}{bodies})"],
-            check=True,
-            capture_output=True,
-            text=True,
-        )
+        call = [sys.executable, "-c", f"{command}{bodies})"]
+        told = subprocess.run(call, check=True, capture_output=True, text=True)
         arrays, peak = map(int, told.stdout.split())
         found.append(Memory(method.name, bodies, arrays, peak if peak > 0 else None))
     return found
@@ -311,11 +307,8 @@ def needed(method: str, bodies: int) -> None:
 
 def _resident(name: str) -> int:
     """Return Linux's ``VmRSS`` (present) or ``VmHWM`` (peak) in bytes; 0 elsewhere."""
-    try:
-        with open("/proc/self/status", encoding="ascii") as file:
-            for line in file:
-                if line.startswith(name + ":"):
-                    return 1024 * int(line.split()[1])
-    except OSError:
-        pass
+    with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
+        for line in file:
+            if line.startswith(name + ":"):
+                return 1024 * int(line.split()[1])
     return 0

@@ -157,49 +157,28 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     import heyoka
 
     unknowns = compiled.state_names(scene)
-    state = heyoka.make_vars(*unknowns)
+    coefficients = list(map(float, exact_coefficients(scene)))
+    x, y, z, *q = state = heyoka.make_vars(*unknowns)
+    found: list[Any]
     if formula is not None:
-        found = _by_formula(scene, formula, state)
-    elif isinstance(scene.torque, StateTorque):
-        found = _by_tape(scene, state)
-    else:
+        torque = formula(heyoka.time, (x, y, z), q, heyoka.sin, heyoka.cos)
+        products, moments = (y * z, z * x, x * y), scene.moments or (1.0,) * 3
+        terms = zip(coefficients, products, torque, moments, strict=True)
+        found = [a * product + push / moment for a, product, push, moment in terms]
+        found += quaternion_rates((x, y, z), q) if q else ()
+    elif not isinstance(scene.torque, StateTorque):
         names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
         names |= dict(zip(unknowns, state, strict=True))
-        rates = compiled.rates(scene, "t", unknowns, list(map(float, exact_coefficients(scene))))
-        found = [eval(rate, names) for rate in rates]
-    return [(x, heyoka.expression(rate)) for x, rate in zip(state, found, strict=True)]
-
-
-def _by_formula(scene: Scene, formula: Formula, state: Sequence[Any]) -> list[Any]:
-    import heyoka
-
-    x, y, z, *q = state
-    torque = formula(heyoka.time, (x, y, z), q, heyoka.sin, heyoka.cos)
-    found: list[Any] = [
-        coefficient * product + component / moment
-        for coefficient, product, component, moment in zip(
-            map(float, exact_coefficients(scene)), (y * z, z * x, x * y), torque,
-            scene.moments or (1.0,) * 3,
-            strict=True,
-        )
-    ]  # fmt: skip
-    if q:
-        found += quaternion_rates((x, y, z), q)
-    return found
-
-
-def _by_tape(scene: Scene, state: Sequence[Any]) -> list[Any]:
-    import heyoka
-
-    assert isinstance(scene.torque, StateTorque)
-    if scene.torque.tape is None:
+        found = [eval(rate, names) for rate in compiled.rates(scene, "t", unknowns, coefficients)]
+    elif scene.torque.tape is None:
         raise InputError(
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
         )
-
-    # The inputs without attitude are not read.
-    inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
-    return evaluate(system_of(scene, scene.attitude is not None), inputs, heyoka_functions())
+    else:
+        # The inputs without attitude are not read.
+        inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
+        found = evaluate(system_of(scene, bool(q)), inputs, heyoka_functions())
+    return [(x, heyoka.expression(rate)) for x, rate in zip(state, found, strict=True)]
 
 
 def heyoka_functions() -> Functions[Any]:

@@ -5,7 +5,8 @@ the balls bounds its error. The reference and its estimate do not depend on the 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from decimal import ROUND_CEILING, Decimal, localcontext
 from fractions import Fraction
@@ -17,7 +18,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array
-from pyharness.truth.enclosed import Balls, Enclosure
+from pyharness.truth.enclosed import Balls
 from pyharness.truth.reference import Reference
 
 PROVED, ESTIMATED = "proved", "estimated"
@@ -210,24 +211,21 @@ class _Statement(NamedTuple):
         digits = self._digits()
         if digits is None:
             return None, None
-        omega = attitude = None
+        omega: Sequence[Balls] | None = None
+        attitude: Sequence[Balls] | None = None
         if has_certificate(self.scene):
             # Used also with python-flint, so that the bound of omega is the same without it.
             bare = replace(self.scene, attitude=None)
-            found = _tried(
-                lambda: prove(bare, self.times, digits, effort * _INTEGER_WORK).enclosure
-            )
-            omega = None if found is None else found.omega
+            with suppress(InputError):
+                omega = prove(bare, self.times, digits, effort * _INTEGER_WORK).enclosure.omega
             if self.attitude is None:
                 return omega, None
         from pyharness.truth.enclosure import can_enclose, enclose
 
         is_free, is_short = self.scene.torque.is_zero, len(self.times) <= _MOST_TIMES
         if (is_free or (any_torque and is_short)) and can_enclose(self.scene):
-            found = _tried(
-                lambda: enclose(self.scene, self.times, digits, effort=effort * _BALL_WORK)
-            )
-            if found is not None:
+            with suppress(InputError):
+                found = enclose(self.scene, self.times, digits, effort=effort * _BALL_WORK)
                 omega, attitude = omega or found.omega, found.attitude
         return omega, attitude
 
@@ -239,13 +237,6 @@ class _Statement(NamedTuple):
             return _DIGITS
         wanted = math.ceil(math.log10(largest) - math.log10(self.claimed)) + _SPARE_DIGITS
         return max(1, wanted) if wanted <= _MOST_DIGITS else None
-
-
-def _tried(prove: Callable[[], Enclosure]) -> Enclosure | None:
-    try:
-        return prove()
-    except InputError:
-        return None
 
 
 def _extremes(rows: Sequence[Row], found: Sequence[Balls]) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.bench import compiled_peers, peers
+from pyharness.bench import peers
 from pyharness.bench.contenders import SceneContender, list_own_contenders
 from pyharness.bench.measure import Finding, error_of, workloads
 from pyharness.bench.random_loads import random_load
@@ -66,7 +66,7 @@ def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
 @pytest.fixture
 def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = peers._problem
-    monkeypatch.setattr(compiled_peers, "rates", _backward(compiled_peers.rates))
+    monkeypatch.setattr(peers, "rates", _backward(peers.rates))
 
     def backward(scene: Scene) -> Any:
         slope, *rest = problem(scene)

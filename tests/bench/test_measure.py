@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from pyharness.bench import measure as bench
-from pyharness.bench.compiled_peers import RK4, compiled_function, steps_source
 from pyharness.bench.contenders import Maker, SceneContender, list_own_contenders
 from pyharness.bench.measure import (
     Finding,
@@ -25,7 +24,7 @@ from pyharness.bench.measure import (
     relative_error,
     workloads,
 )
-from pyharness.bench.peers import peers
+from pyharness.bench.peers import RK4, compiled_function, peers, steps_source
 from pyharness.bench.pictures import draw_slopes
 from pyharness.bench.report import bench_report, ratio
 from pyharness.bench.scores import Score, groups, means, scores, yardstick

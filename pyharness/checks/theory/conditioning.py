@@ -79,14 +79,21 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     Raise InputError if the solution grows without bound before, if it would be needed at too many
     times, or if the amplification exceeds binary64.
     """
+    from pyharness.engine.problem import closed_form
+    from pyharness.engine.solve import solve
+
+    # Near the separatrix a numerical integration would deviate from the solution after a few turns.
+    method = "closed-form" if closed_form(scene) else "taylor"
 
     def sample(times: Array) -> tuple[float, tuple[Array, bool]]:
-        omega, complete = _path(scene, times)
+        path = solve(scene, times[1:].tolist(), method, 1e-13)
+        omega = np.vstack([scene.omega, path.omega])
         with np.errstate(all="ignore"):
-            return float(np.abs(jacobians(scene, omega)).sum(axis=2).max()), (omega, complete)
+            rate = float(np.abs(jacobians(scene, omega)).sum(axis=2).max())
+        return rate, (omega, path.has_all_rows)
 
     if time == 0.0:
-        times, (omega, complete) = np.zeros(2), _path(scene, np.zeros(2))
+        times, (_, (omega, complete)) = np.zeros(2), sample(np.zeros(2))
     else:
         times, (omega, complete) = sampled(sample, time, _FEWEST_NODES, _MOST_NODES)
     if not complete:
@@ -104,17 +111,6 @@ def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
         largest = float(np.abs(omega).max()) or 1.0
         flow = propagators(scene, times, omega)
         return of_flow(flow, times, omega, magnitudes(scene, times, omega), largest)
-
-
-def _path(scene: Scene, times: Array) -> tuple[Array, bool]:
-    """Return omega (rad/s, shape (n, 3)), and whether it reaches the last time."""
-    from pyharness.engine.problem import closed_form
-    from pyharness.engine.solve import solve
-
-    # Near the separatrix a numerical integration would deviate from the solution after a few turns.
-    method = "closed-form" if closed_form(scene) else "taylor"
-    path = solve(scene, times[1:].tolist(), method, 1e-13)
-    return np.vstack([scene.omega, path.omega]), path.has_all_rows
 
 
 def sampled(

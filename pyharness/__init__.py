@@ -27,10 +27,9 @@ if TYPE_CHECKING:
     from pyharness.model.changing import ChangingInertia, ChangingMoments
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.errors import InputError, NotBuiltError
-    from pyharness.model.impossible import ImpossibleBodyWarning
     from pyharness.model.listing import Listing, subset
     from pyharness.model.principal import principal
-    from pyharness.model.scene import Scene
+    from pyharness.model.scene import ImpossibleBodyWarning, Scene
     from pyharness.model.scene_file import case_scene
     from pyharness.model.state_torque import StateTorque, opaque
     from pyharness.model.torque_law import TorqueLaw
@@ -88,10 +87,9 @@ _SUBMODULES = {
     "model.changing": ("ChangingInertia", "ChangingMoments"),
     "model.dense_output": ("DenseOutput",),
     "model.errors": ("InputError", "NotBuiltError"),
-    "model.impossible": ("ImpossibleBodyWarning",),
     "model.listing": ("Listing", "subset"),
     "model.principal": ("principal",),
-    "model.scene": ("Scene",),
+    "model.scene": ("ImpossibleBodyWarning", "Scene"),
     "model.scene_file": ("case_scene",),
     "model.state_torque": ("StateTorque", "opaque"),
     "model.torque_law": ("TorqueLaw",),

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.model.array_type import Array
-from pyharness.model.chebyshev import points, to_coefficients
+from pyharness.model.dense_output import points, to_coefficients
 
 
 class Slow(NamedTuple):

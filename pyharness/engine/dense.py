@@ -15,8 +15,7 @@ import numpy as np
 from pyharness.engine.rates import rates
 from pyharness.engine.stepper import step_lengths
 from pyharness.model.array_type import Array
-from pyharness.model.chebyshev import nodes
-from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces
+from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces, nodes
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque

@@ -22,8 +22,7 @@ from pyharness.engine.event_roots import (
     joined,
 )
 from pyharness.model.array_type import Array
-from pyharness.model.chebyshev import nodes
-from pyharness.model.dense_output import DenseOutput, Pieces
+from pyharness.model.dense_output import DenseOutput, Pieces, nodes
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14

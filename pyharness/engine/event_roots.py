@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from pyharness.model.array_type import Array
-from pyharness.model.chebyshev import points, to_coefficients
+from pyharness.model.dense_output import points, to_coefficients
 
 # A slice, a mask or indices of the elements of an array.
 Index = Any

@@ -7,9 +7,8 @@ import numpy as np
 
 from pyharness.engine.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
-from pyharness.model.law_symbols import law_derivative, law_value, to_body
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw, law_derivative, law_value, to_body
 from pyharness.model.values import Number, Numbers, finite, three
 
 

@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, quaternion_rates
-from pyharness.model.changing import Changing
+from pyharness.model.changing import Changing, rates_of_changing, rates_of_inertia
+from pyharness.model.dual import with_parameters
 from pyharness.model.expressions import components
-from pyharness.model.inertia_rates import rates_of_changing, rates_of_inertia
-from pyharness.model.law_symbols import body_torque
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import N_INPUTS, Tape, evaluate
-from pyharness.model.tape_derivative import with_parameters
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Triple
 
 OMEGA0, ATTITUDE = "omega0", "attitude"

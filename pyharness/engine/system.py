@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from pyharness.model.attitude import IDENTITY, quaternion_rates
-from pyharness.model.inertia_rates import rates_of_changing
+from pyharness.model.changing import rates_of_changing
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law, replayed, torque_of
 from pyharness.model.symbols import Recorder

@@ -9,9 +9,8 @@ import numpy as np
 from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.law_symbols import law_integral, law_value
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
 from pyharness.model.values import Number, Numbers, number_list, three
 
 # A number stands for a multiple of the identity matrix, three numbers for a diagonal matrix.

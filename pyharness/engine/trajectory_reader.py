@@ -25,7 +25,6 @@ from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.schema import check_schema
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape_record import tape_of
 from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.model.trajectory_file import (
     AXES,
@@ -38,6 +37,7 @@ from pyharness.model.trajectory_file import (
     TEXTS,
     add_entry,
     checked_path,
+    tape_of,
 )
 from pyharness.model.values import three_floats
 

@@ -1,4 +1,4 @@
-"""Inertias that are polynomials of time: principal moments, and full matrices."""
+"""Inertias that are polynomials of time, and the derivative of omega of bodies that have them."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError
-from pyharness.model.polynomials import Polynomial, derivative, powers, value
 from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list
 
+Polynomial = tuple[float, ...]  # coefficients in ascending powers of time
 # Largest number of coefficients. Higher powers of time have no physical use, and lose digits.
 _MOST = 10
 _POLYNOMIALS = f"allowed: three lists of 1 to {_MOST} numbers"
@@ -35,7 +35,7 @@ class Changing:
         return not any(any(each[1:]) for row in self.elements for each in row)
 
     def _check_derivative(self) -> None:
-        coefficients = (c for row in self.elements for each in row for c in derivative(each))
+        coefficients = (c for row in self.elements for each in row for c in _derivative(each))
         if not all(map(math.isfinite, coefficients)):
             raise InputError(
                 f"[body] {self.place}: a coefficient of the derivative overflows; allowed: finite "
@@ -48,11 +48,11 @@ class Changing:
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:
         """Return the time derivative of the inertia matrix (kg m2/s)."""
-        return self._values([[derivative(each) for each in row] for row in self.elements], time)
+        return self._values([[_derivative(each) for each in row] for row in self.elements], time)
 
     def _values(self, elements: Sequence[Sequence[Polynomial]], time: Any) -> list[list[Any]]:
-        known = powers(time, max(len(each) for row in elements for each in row))
-        return [[value(each, known) for each in row] for row in elements]
+        known = _powers(time, max(len(each) for row in elements for each in row))
+        return [[_value(each, known) for each in row] for row in elements]
 
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
@@ -239,3 +239,65 @@ def _polynomial(where: str, values: object) -> Polynomial:
     if not 1 <= len(given) <= _MOST:
         raise InputError(f"{where}: {_count(given, _MOST)} numbers; {_POLYNOMIALS}")
     return tuple(finite(where, each) for each in given)
+
+
+def _powers(time: Any, count: int) -> list[Any]:
+    """Return the powers 0 to `count` - 1 of a time, which may be a symbol."""
+    found: list[Any] = [1.0]
+    while len(found) < count:
+        found.append(found[-1] * time)
+    return found
+
+
+def _value(polynomial: Polynomial, time_powers: Sequence[Any]) -> Any:
+    """Return the value of a polynomial from the powers of the time."""
+    total: Any = 0.0
+    for coefficient, power in zip(polynomial, time_powers, strict=False):
+        if coefficient:
+            total = total + coefficient * power
+    return total
+
+
+def _derivative(polynomial: Polynomial) -> Polynomial:
+    """Return the derivative of a polynomial with respect to time."""
+    return tuple(n * c for n, c in enumerate(polynomial))[1:]
+
+
+def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
+    """Return the derivative of omega for an inertia that changes with time."""
+    matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
+    if isinstance(changing, ChangingMoments):
+        a, b, c = (matrix[k][k] for k in range(3))
+        # Differences of nearly equal moments, unlike of products, have no rounding errors.
+        products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
+        return [
+            (torque[k] - rate[k][k] * omega[k] + products[k]) / moment
+            for k, moment in enumerate((a, b, c))
+        ]
+    return rates_of_inertia(matrix, omega, [torque[k] - _dot(rate[k], omega) for k in range(3)])
+
+
+def rates_of_inertia(matrix: Any, omega: Any, torque: Any) -> list[Any]:
+    """Return the derivative of omega for a full inertia matrix."""
+    (x, y, z), (u, v, w) = omega, (_dot(row, omega) for row in matrix)
+    products = z * v - y * w, x * w - z * u, y * u - x * v
+    return _solved(matrix, [torque[k] + products[k] for k in range(3)])
+
+
+def _dot(first: Any, second: Any) -> Any:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+def _solved(matrix: list[list[Any]], right: list[Any]) -> list[Any]:
+    """Return the solution by L D L^T (Golub and Van Loan 2013, Matrix Computations, 4.1)."""
+    (a, f, e), (_, b, d), (_, _, c) = matrix
+    l21, l31 = f / a, e / a
+    second, below = b - l21 * f, d - l31 * f
+    l32 = below / second
+    third = c - l31 * e - l32 * below
+    u = right[0]
+    v = right[1] - l21 * u
+    w = right[2] - l31 * u - l32 * v
+    z = w / third
+    y = v / second - l32 * z
+    return [u / a - l21 * y - l31 * z, y, z]

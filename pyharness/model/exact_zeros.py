@@ -6,8 +6,6 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 
-from pyharness.model.polynomials import Polynomial
-
 # A zero is located to this fraction of its distance from time 0.
 _CLOSE = Fraction(1, 1 << 60)
 _LARGEST = Fraction(sys.float_info.max)
@@ -21,7 +19,7 @@ def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Frac
     return found
 
 
-def determinant(elements: Sequence[Sequence[Polynomial]]) -> list[Fraction]:
+def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
     """Return the determinant of a symmetric matrix of polynomials."""
     (a, f, e), (_, b, d), (_, _, c) = ([[Fraction(x) for x in p] for p in row] for row in elements)
     terms = ((1, (a, b, c)), (2, (d, e, f)), (-1, (a, d, d)), (-1, (b, e, e)), (-1, (c, f, f)))

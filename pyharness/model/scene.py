@@ -2,6 +2,8 @@
 
 import math
 import os
+import sys
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
@@ -10,7 +12,6 @@ from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
-from pyharness.model.impossible import breaks_triangle, warn_of_impossible
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
@@ -34,6 +35,13 @@ _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # right-hand sides.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
+# Modules whose stack frames are between the user's call and the creation of the scene.
+_BETWEEN = (
+    *("copy", "dataclasses", "pyharness.engine.scene_reader"),
+    *("pyharness.model.scene_file", __name__),
+)
+# Ratio of the largest moment to an excess that rounding may cause.
+_ROUNDED = 2**50
 FULL_INERTIA = (
     "the scene has a full inertia matrix, and this takes principal axes; allowed: moments, or the "
     "scene of pyharness.principal"
@@ -51,6 +59,23 @@ SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "
     "methods auto and taylor, with the attitude"
 )
+
+
+class ImpossibleBodyWarning(UserWarning):
+    """A warning that the largest moment of a body exceeds the sum of the other two.
+
+    The results are nevertheless computed.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from pyharness import ImpossibleBodyWarning, Scene
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", ImpossibleBodyWarning)
+    ...     scene = Scene("impossible", (0.0, 1.0, 0.0), moments=(3.0, 1.0, 1.0))
+    >>> scene.is_impossible
+    True
+    """
 
 
 @dataclass(frozen=True)
@@ -187,7 +212,7 @@ class Scene:
         self._set("forces", three("forces", self.forces))
         if self.case is not None:
             self._set("case", integer("case", self.case))
-        warn_of_impossible(self)
+        _warn_of_impossible(self)
 
     def __repr__(self) -> str:
         """Return the fields as the arguments of a call."""
@@ -315,6 +340,26 @@ class Scene:
             return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
 
         return constant
+
+
+def breaks_triangle(moments: Iterable[Any]) -> bool:
+    """Return whether the largest moment exceeds the sum of the others by more than rounding."""
+    low, middle, high = sorted(moments)
+    return bool((high - middle - low) * _ROUNDED > high)
+
+
+def _warn_of_impossible(scene: Scene) -> None:
+    """Warn, at the line of user code, of impossible moments."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
+        frame, level = frame.f_back, level + 1
+    name = str(frame.f_globals.get("__name__"))
+    if name.partition(".")[0] != "pyharness" and scene.is_impossible:
+        warnings.warn(
+            "no rigid body has these moments: the largest exceeds the sum of the others",
+            ImpossibleBodyWarning,
+            stacklevel=level,
+        )
 
 
 def most_steps() -> int:

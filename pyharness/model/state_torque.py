@@ -12,10 +12,9 @@ import numpy as np
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of
-from pyharness.model.law_symbols import body_torque
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
-from pyharness.model.torque_law import FRAMES, TorqueLaw
+from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
 from pyharness.model.values import Triple, converted, three_floats
 
 Function = Callable[..., Any]

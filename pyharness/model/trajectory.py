@@ -1,8 +1,9 @@
-"""Trajectories: the results for a scene."""
+"""Trajectories, the results for a scene; and the base class of results for many bodies."""
 
 import math
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+import textwrap
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,8 @@ from numpy.typing import NDArray
 from pyharness.model.array_type import Array as Array
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.conversions import Conversions
-from pyharness.model.mechanics import Mechanics
+from pyharness.model.extension import ENDS
 from pyharness.model.mechanics import turned_to_space as turned_to_space
-from pyharness.model.shown import short_repr
 
 if TYPE_CHECKING:
     from pyharness.model.dense_output import DenseOutput
@@ -23,7 +23,37 @@ ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
 ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "event")
+_RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
+_WIDTH, _LINES = 100, 10
+_LONGEST = 60  # most characters of one value
+
+
+def short_repr(result: Any) -> str:
+    """Return a result as at most ten lines, with arrays by type and shape."""
+    shown = [
+        f"{each.name}={_short(value)}"
+        for each in fields(result)
+        if each.repr and (value := getattr(result, each.name)) is not None
+    ]
+    text = f"{type(result).__name__}({', '.join(shown)})"
+    lines = textwrap.wrap(
+        text, _WIDTH, subsequent_indent="  ", max_lines=_LINES, placeholder=" ...)",
+        break_on_hyphens=False,
+    )  # fmt: skip
+    return "\n".join(lines)
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"<{value.dtype} {value.shape}>"
+    if isinstance(value, (tuple, list)) and value and is_dataclass(value[0]):
+        return f"<{len(value)} {type(value[0]).__name__}>"
+    name = getattr(value, "name", None)
+    if is_dataclass(value):
+        return f"<{type(value).__name__}{f' {name!r}' if isinstance(name, str) else ''}>"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
 @dataclass(frozen=True)
@@ -55,7 +85,7 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Mechanics, Conversions):
+class Trajectory(Conversions):
     """The results of an integration, one row for each time, and how the integration ended.
 
     An attribute that was not computed or requested is None.
@@ -159,3 +189,27 @@ class Trajectory(Mechanics, Conversions):
 def digits_left(error: float | None) -> float | None:
     """Return the number of correct decimal digits, 0 to 15.95 (binary64), or None."""
     return None if error is None else max(0.0, -math.log10(max(error, ROUNDING)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BatchResult:
+    """The angular velocities of n bodies, and how the computation of each body ended.
+
+    `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,), has
+    integers of `pyharness.model.codes.Statuses`.
+    """
+
+    omega: Array
+    status: NDArray[np.int8]
+
+    __repr__ = short_repr
+
+    @property
+    def ended(self) -> NDArray[np.str_]:
+        """The statuses as text, such as "complete", shape (n,)."""
+        return np.array(ENDS)[self.status]
+
+    @property
+    def has_result(self) -> NDArray[np.bool_]:
+        """Whether all results of each body are present, shape (n,)."""
+        return np.isin(self.status, _RESULTS)

@@ -17,7 +17,6 @@ from pyharness.model.arrays import (
     spread,
     threads_of,
 )
-from pyharness.model.batch_result import BatchResult
 from pyharness.model.codes import Blocks
 from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
@@ -26,7 +25,7 @@ from pyharness.model.listing import PROGRAMS, Listing, checked_listing
 from pyharness.model.pieces import share
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
-from pyharness.model.trajectory import Array
+from pyharness.model.trajectory import Array, BatchResult
 from pyharness.model.values import Number, boolean, integer, number_list
 from pyharness.thesis.compiled import stop_reads_velocity
 from pyharness.thesis.equations import card_torque

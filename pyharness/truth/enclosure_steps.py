@@ -21,10 +21,10 @@ from typing import Any
 from flint import acb, arb, arb_mat, arb_series, ctx
 
 from pyharness.model.attitude import IDENTITY, quaternion_rates
+from pyharness.model.changing import rates_of_inertia
 from pyharness.model.dual import Dual
 from pyharness.model.effort import advice, checked_effort
 from pyharness.model.errors import InputError
-from pyharness.model.inertia_rates import rates_of_inertia
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law

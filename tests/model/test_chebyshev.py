@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
-from pyharness.model.chebyshev import nodes, points, to_coefficients
+from pyharness.model.dense_output import nodes, points, to_coefficients
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 9, 16, 33])

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pyharness import Scene
-from pyharness.model.diagonal import diagonalised
-from pyharness.model.inertia import Matrix, principal_axes, principal_frame
+from pyharness.model.inertia import Matrix, diagonalised, principal_axes, principal_frame
 
 _ACCURATE = Fraction(1, 1 << 100)
 

@@ -10,7 +10,7 @@ import pytest
 
 from pyharness import ImpossibleBodyWarning, Scene, compare_programs, read_scene, solve, subset
 from pyharness.cli.main import main
-from pyharness.model.impossible import breaks_triangle
+from pyharness.model.scene import breaks_triangle
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.programs import run_program
 

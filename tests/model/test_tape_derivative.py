@@ -9,9 +9,9 @@ import pytest
 
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.system import system_of
+from pyharness.model.dual import with_derivatives
 from pyharness.model.state_torque import StateTorque, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
-from pyharness.model.tape_derivative import with_derivatives
 
 SLOTS = (TIME, *OMEGA, *ATTITUDE)
 

@@ -69,7 +69,7 @@ export function momentsFrom(text, word = "moments") {
   const [least, most] = MOMENTS;
   check(word, moments, (x) => x >= least && x <= most, `numbers from ${least} to ${most}`);
   const [low, middle, high] = [...moments].sort((a, b) => a - b);
-  // As in pyharness/model/impossible.py.
+  // As in pyharness/model/scene.py.
   if ((high - middle - low) * 2 ** 50 <= high) return moments;
   const told = `${low} + ${middle} is less than ${high}`;
   throw new StateError(`${word}: ${told}; each moment is at most the sum of the other two`);

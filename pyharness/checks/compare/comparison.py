@@ -31,8 +31,7 @@ from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
 from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.shown import short_repr
-from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left
+from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left, short_repr
 from pyharness.model.values import boolean
 from pyharness.thesis.compiled_in_word import compiled_words
 from pyharness.thesis.programs import (

@@ -16,11 +16,11 @@ from pyharness.engine.array_tape import inputs_of, outputs_at, table_values
 from pyharness.engine.linearised import transitions
 from pyharness.engine.recorded import system
 from pyharness.engine.solve import solve
+from pyharness.model.dual import with_derivatives
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import ATTITUDE, OMEGA, Functions, Tape, evaluate
-from pyharness.model.tape_derivative import with_derivatives
 from pyharness.model.trajectory import Array
 
 _FEWEST_NODES = 100

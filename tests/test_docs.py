@@ -25,7 +25,7 @@ from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.history import figures
 from pyharness.model.report import Report
 from pyharness.views import render as views
-from pyharness.views.csv import csv_text
+from pyharness.views.render import csv_text
 from tests.conftest import Printed
 from tests.json_reference import SCHEMA, fields, meaning, schema_of
 

@@ -37,7 +37,7 @@ from pyharness.thesis.cells import all_cells
 from pyharness.thesis.programs import run_program
 from pyharness.thesis.word import WORDS
 from pyharness.truth import reference
-from pyharness.views import markdown
+from pyharness.views.render import render
 
 _LONG = 300  # steps of the printed collocation decks
 _FINER = 10  # the step size of the thesis over that of its experiment with a small step
@@ -381,4 +381,4 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def _markdown(table: Table) -> str:
-    return markdown.write(Report("article", [], dict, page=[[table]])).strip()
+    return render(Report("article", [], dict, page=[[table]]), "markdown").strip()

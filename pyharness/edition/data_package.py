@@ -31,9 +31,7 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import numbers
 from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck
-from pyharness.views.csv import csv_text
-from pyharness.views.json import json_text
-from pyharness.views.json import write as json_of
+from pyharness.views.render import csv_text, json_text, render
 
 _CSV, _JSON, _TEXT = "text/csv", "application/json", "text/plain"
 _COLUMNS = "card kind text scan entries port twin swhid"
@@ -83,7 +81,7 @@ def _list_files(progress: Progress) -> Iterator[Part]:
         "apparatus.json", "The critical apparatus",
         "The defects, doubtful readings, conjectures and other entries, each with its cards and "
         "its evidence; the output of `pyharness defects --format json`.",
-        _JSON, json_of(apparatus_report(entries())).encode(),
+        _JSON, render(apparatus_report(entries()), "json").encode(),
     )  # fmt: skip
     rows = [[path, content_identifier(each)] for path, each in source_files().items()]
     yield Part(
@@ -97,7 +95,7 @@ def _list_files(progress: Progress) -> Iterator[Part]:
         "claims.json", "The claims of the thesis, and our verdicts",
         "Verdicts for the programs as printed and as corrected, with the numbers behind them and "
         "the assumptions; the output of `pyharness claims --format json`.",
-        _JSON, json_of(claims_report(judgements())).encode(),
+        _JSON, render(claims_report(judgements()), "json").encode(),
     )  # fmt: skip
     progress(2, 5, "figures")
     for each in findings():

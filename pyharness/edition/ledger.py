@@ -106,7 +106,7 @@ def context(judged: Sequence[Judgement]) -> dict[str, Any]:
         "kinds": kinds(judged),
         "about": KINDS,
         "groups": claim_stories(judged),
-        "evidence": Markup(html.write(evidence_report(list(evidence())))),
+        "evidence": Markup(html.sections(evidence_report(list(evidence())).text)),
     }
 
 

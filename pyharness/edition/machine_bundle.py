@@ -18,7 +18,7 @@ from pyharness.model.report import numbers
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.decks import SYSTEMS, card_steps, deck_text, job_text
 from pyharness.thesis.programs import WORD_NAMES
-from pyharness.views.csv import csv_text
+from pyharness.views.render import csv_text
 
 # The machine's arithmetics, one for each option of its compiler.
 _MACHINE = ("cdc48", "cdc48-rounded")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pyharness.views.json import json_text
+from pyharness.views.render import json_text
 
 # An example with its output, or a picture in the folder of the document.
 _PART = re.compile(

@@ -15,7 +15,7 @@ from pyharness.model.report import numbers
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import run_program
-from pyharness.views.csv import csv_text
+from pyharness.views.render import csv_text
 
 FAULTS_CASE = 5
 """The case for the effects of single faults; its initial omega is on the cards."""

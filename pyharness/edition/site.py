@@ -42,7 +42,7 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck
-from pyharness.views.json import json_text
+from pyharness.views.render import json_text
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -3,12 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
-from pyharness.model.report import Field, Line, Report, Section, Table
-
-
-def write(report: Report) -> str:
-    """Return a report as an HTML fragment."""
-    return sections(report.text)
+from pyharness.model.report import Field, Line, Section, Table
 
 
 def sections(text: Sequence[Section]) -> str:

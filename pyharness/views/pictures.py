@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError
 from pyharness.model.report import Picture
-from pyharness.views.csv import csv_text
+from pyharness.views.render import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

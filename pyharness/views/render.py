@@ -1,11 +1,168 @@
-"""Choice of the output format; each has a module of the same name."""
+"""Reports in every output format: text, CSV, Markdown, JSON, JUnit XML, and HTML.
 
-from importlib import import_module
+Text has paragraphs wrapped at 100 columns, and aligned tables.
+"""
 
-from pyharness.model.report import Report
+import io
+import math
+import textwrap
+from typing import Any
+
+from pyharness.model.report import Field, Line, Report, Section, Table
+
+SCHEMA = 1  # of JSON
+_WIDTH = 100
+_NARROWEST = 12  # least width to which a last column is wrapped
+_MOST_ROWS = 200
+_END_ROWS = 10
 
 
 def render(report: Report, form: str) -> str:
     """Return a report as ``table``, ``csv``, ``markdown``, ``json``, ``junit`` or ``html``."""
-    text: str = import_module(f"pyharness.views.{form}").write(report)
-    return text
+    match form:
+        case "table":
+            return _text(report)
+        case "csv":
+            assert report.data is not None
+            return csv_text(report.data)
+        case "markdown":
+            return _markdown(report)
+        case "json":
+            return json_text({"schema": SCHEMA, **report.record()})
+        case "junit":
+            return _junit(report)
+    from pyharness.views.html import sections
+
+    return sections(report.text)
+
+
+def _text(report: Report) -> str:
+    sections = []
+    for section in filter(None, report.text):
+        lines = []
+        for each in section:
+            lines += _aligned(each) if isinstance(each, Table) else _paragraph(each)
+        sections.append("\n".join(lines))
+    return "\n\n".join(sections) + "\n"
+
+
+def _paragraph(told: str | Field) -> list[str]:
+    """Return the lines of a paragraph; a Line is not wrapped, a Field has a label."""
+    if isinstance(told, Line):
+        return [told]
+    if isinstance(told, Field):
+        indent = " " * len(told.label)
+        return textwrap.wrap(told.text, _WIDTH, initial_indent=told.label, subsequent_indent=indent)
+    # Users may copy names with hyphens, which must not be broken.
+    lines = textwrap.wrap(told, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return lines or [""]
+
+
+def _aligned(table: Table) -> list[str]:
+    """Return a table's lines, aligned; above 200 rows only the first and last ten."""
+    n = len(table.rows)
+    if n > _MOST_ROWS:
+        table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])
+    cells = table.written()
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    fit = table.columns[-1].fit
+    if fit == "wrap":
+        room = _WIDTH - sum(widths[:-1]) - 2 * (len(widths) - 1)
+        widths[-1] = min(widths[-1], max(_NARROWEST, room))
+    gap = "  " if sum(widths) + 2 * (len(widths) - 1) <= _WIDTH else " "
+    lines = []
+    for *row, last in cells:
+        for part in textwrap.wrap(last, widths[-1]) if fit == "wrap" else [last]:
+            columns = zip(table.columns, [*row, part], widths, strict=True)
+            line = gap.join(
+                cell.ljust(width) if column.left else cell.rjust(width)
+                for column, cell, width in columns
+            )
+            lines.append((line[:_WIDTH] if fit == "cut" else line).rstrip())
+            row = [""] * len(row)
+    if n > _MOST_ROWS:
+        left_out = f"... {n - 2 * _END_ROWS} rows left out; --format csv gives all ..."
+        lines.insert(len(lines) - _END_ROWS, left_out)
+    return lines
+
+
+def csv_text(table: Table) -> str:
+    """Return a table as CSV with heads."""
+    import csv
+
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(table.in_full())
+    return buffer.getvalue()
+
+
+def _markdown(report: Report) -> str:
+    """Return a report's page, or else its data with all digits."""
+    if report.page is not None:
+        return "\n".join(map(_markdown_section, report.page))
+    assert report.data is not None
+    return _markdown_table(report.data.in_full())
+
+
+def _markdown_section(section: Section) -> str:
+    parts: list[str] = []
+    for each in section:
+        if isinstance(each, Table):
+            # Markdown recognises a table only after a blank line.
+            parts += ["\n"] if parts else []
+            parts.append(_markdown_table(each.written()))
+        else:
+            parts += [f"{line}\n" for line in _paragraph(each)]
+    return "".join(parts)
+
+
+def _markdown_table(cells: list[list[str]]) -> str:
+    head, *rows = cells
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def json_text(record: dict[str, Any], indent: int | None = None) -> str:
+    """Return strict JSON, in one line or indented.
+
+    Floats can be read back exactly; NaN and infinity become null.
+    """
+    import json
+
+    try:
+        return json.dumps(record, allow_nan=False, indent=indent) + "\n"
+    except ValueError:
+        return json.dumps(_finite(record), allow_nan=False, indent=indent) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(each) for each in value]
+    return value
+
+
+def _junit(report: Report) -> str:
+    """Return a test suite with a case for each check.
+
+    A failed case has the reason, and the command that repeats the check.
+    """
+    from xml.etree import ElementTree as xml
+
+    suite = xml.Element(
+        "testsuite",
+        name=report.title,
+        tests=str(len(report.cases)),
+        failures=str(sum(bool(why) for _, _, why, _ in report.cases)),
+        errors="0",
+        skipped="0",
+    )
+    for kind, id, why, replay in report.cases:
+        named = {"classname": f"{report.title}.{kind}", "name": id}
+        case = xml.SubElement(suite, "testcase", named)
+        if why:
+            xml.SubElement(case, "failure", message=why).text = f"{why}\n{replay}"
+    xml.indent(suite)
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + xml.tostring(suite, "unicode") + "\n"

@@ -20,7 +20,6 @@ from pyharness.history.family.members import Member
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, names_of, switches
 from pyharness.model.report import Report
-from pyharness.views import markdown
 from pyharness.views.render import render
 from tests.conftest import Printed
 
@@ -134,7 +133,7 @@ def test_kinds_are_counted_apart_and_judged_as_what_they_are(judged: Judged) -> 
     table = kinds_table([*judged.values()])
     assert [row[0] for row in table.rows] == [*KINDS]
     assert sum(row[1] for row in table.rows) == len(judged)
-    lines = markdown.write(Report("claims", [[table]], dict, page=[[table]])).strip()
+    lines = render(Report("claims", [[table]], dict, page=[[table]]), "markdown").strip()
     assert lines in (ROOT / "docs/article/article.md").read_text()
     for found in judged.values():
         both = {found.original.verdict, found.corrected.verdict}

@@ -20,8 +20,8 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.thesis import compiled
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
-from pyharness.views.csv import csv_text
 from pyharness.views.pictures import saved
+from pyharness.views.render import csv_text
 
 Capture = pytest.CaptureFixture[str]
 STEMS = ["06", "07", "08", "09", "10a", "10b", "11", "12"]

@@ -20,7 +20,7 @@ from pyharness.thesis.printer import page
 from pyharness.thesis.programs import run_program
 from pyharness.thesis.vectors import OURS
 from pyharness.thesis.word import RULES
-from pyharness.views.csv import csv_text
+from pyharness.views.render import csv_text
 from tests.conftest import Printed
 from tests.json_reference import schema_of
 

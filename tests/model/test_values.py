@@ -21,8 +21,7 @@ from pyharness.model.records import scene_record
 from pyharness.model.scene_file import scene_text
 from pyharness.model.scene_report import heading
 from pyharness.thesis import compiled
-from pyharness.views.json import json_text
-from pyharness.views.render import render
+from pyharness.views.render import json_text, render
 
 LAW = TorqueLaw((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (((1.0, 0.0, 0.5), 4.0),))
 PLAIN = Scene("brick", (0.5, 1.0, 2.0), (40.0, 30.0, 20.0), torque=LAW, step_size=0.5, steps=7)

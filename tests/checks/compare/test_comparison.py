@@ -23,9 +23,8 @@ from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Trajectory, turned_to_space
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
 from pyharness.truth.reference import reference
-from pyharness.views.json import json_text
 from pyharness.views.pictures import saved
-from pyharness.views.render import render
+from pyharness.views.render import json_text, render
 
 
 def _text(found: room.Comparison) -> str:

@@ -3,7 +3,8 @@
 import argparse
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
@@ -15,20 +16,27 @@ from pyharness.checks.port_report import port_report
 from pyharness.checks.scenes.random_scenes import MODERATE as KINDS
 from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
-from pyharness.cli.forecast import CHECKS, Cost, check_count
 from pyharness.model.errors import InputError
 
 _OF_THE_CHECKS = ("only", "external", "update", "record")
-_SCENES = Cost("random scenes of each kind", 1.0, 1e5, 1000)
+_SCENES = shared.Cost("random scenes of each kind", 1.0, 1e5, 1000)
 _HIGHEST = 40.0
 
 
 def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequence[int]) -> int:
     """Check the port that `options.port` starts; return 0 if all checks pass, or 1."""
     shared.refuse(options, "--port", _OF_THE_CHECKS)
-    cells, seed = requested_cells(
-        shared.names(options.cell), programs, cases, options.draws, shared.chosen_seed(options)
-    )
+    names, seed = shared.names(options.cell), shared.chosen_seed(options)
+    count = shared.chosen_count(options.draws, "--draws", 0, 0, shared.CHECKS)
+    used = Selection().seed if seed is None else seed
+    drawn = random_cells(used, count, names, programs)
+    if seed is not None and not drawn:
+        raise InputError("--seed has no meaning without random scenes; give --draws N")
+    cells = [*port_cells(programs, cases, names), *drawn]
+    if not cells:
+        raise InputError(
+            f"--cell {','.join(names)}: there is no such cell; give one as in two-term/case-3"
+        )
     shared.check_outputs(options)
     if options.self_test:
         return _port_self_test(options, cells)
@@ -38,7 +46,7 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
         shared.progress(len(checks), len(cells), check.id)
     if checks[0].value is None:
         refuse_integrator(options.port)
-    shared.show(port_report(options.port, checks, len(cells), seed), options)
+    shared.show(port_report(options.port, checks, len(cells), used if drawn else ""), options)
     return 0 if all(check.passed for check in checks) else 1
 
 
@@ -47,39 +55,10 @@ def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
     from pyharness.checks.plants.port_self_test import self_test
 
     command = options.port
-    found = collect(self_test(command, cells), len(PLANTS))
-    if not found[0].passed:
-        refuse_integrator(command)
     title = [f"{command}: faults planted in its answers"]
     again = f"python -m pyharness verify --port {shlex.quote(command)} --self-test"
-    return show_outcomes(options, found, title, again, port=command)
-
-
-def requested_cells(
-    names: Sequence[str],
-    programs: Sequence[str],
-    cases: Sequence[int],
-    draws: str | None,
-    seed: str | None,
-) -> tuple[list[Cell], str]:
-    """Return the runs to check, those of Table 1 first, and the seed of random scenes.
-
-    `names` are beginnings of names, such as ``two-term/case-3`` or ``random/7``, or empty for all.
-    `draws` is the number of random scenes as text. The seed is by default the present year and
-    week, and empty without random scenes.
-    """
-    count = 0 if draws is None else shared.whole(draws, "--draws")
-    check_count("--draws", count, 0, CHECKS)
-    used = Selection().seed if seed is None else seed
-    drawn = random_cells(used, count, names, programs)
-    if seed is not None and not drawn:
-        raise InputError("--seed has no meaning without random scenes; give --draws N")
-    found = [*port_cells(programs, cases, names), *drawn]
-    if not found:
-        raise InputError(
-            f"--cell {','.join(names)}: there is no such cell; give one as in two-term/case-3"
-        )
-    return found, used if drawn else ""
+    outcomes, refuse = self_test(command, cells), partial(refuse_integrator, command)
+    return show_self_test(options, outcomes, len(PLANTS), title, again, refuse, port=command)
 
 
 def check_integrator(options: argparse.Namespace) -> int:
@@ -89,8 +68,7 @@ def check_integrator(options: argparse.Namespace) -> int:
     due = shared.positive(options.order, "--order", 1.0)
     if due > _HIGHEST:
         raise InputError(f"--order: {due:g}; allowed: a number above 0, at most {_HIGHEST:g}")
-    draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
-    check_count("--draws", draws, 1, _SCENES)
+    draws = shared.chosen_count(options.draws, "--draws", DRAWS, 1, _SCENES)
     given = shared.chosen_seed(options)
     seed = Selection().seed if given is None else given
     names = shared.names(options.cell)
@@ -134,26 +112,29 @@ def _integrator_self_test(
     from pyharness.checks.integrators.plants import PLANTS, self_test
 
     command = options.integrator
-    found = collect(self_test(command, chosen, due), len(PLANTS))
-    if not found[0].passed:
-        refuse_port(command)
     title = [f"{command}: faults planted in its requests and answers"]
-    return show_outcomes(options, found, title, again, integrator=command)
+    outcomes, refuse = self_test(command, chosen, due), partial(refuse_port, command)
+    return show_self_test(options, outcomes, len(PLANTS), title, again, refuse, integrator=command)
 
 
-def collect(outcomes: Iterable[Outcome], count: int) -> list[Outcome]:
-    """Return the outcomes of a self-test with `count` faults and a control, showing progress."""
+def show_self_test(
+    options: argparse.Namespace,
+    outcomes: Iterable[Outcome],
+    count: int,
+    title: Sequence[str],
+    again: str,
+    refuse: Callable[[], None] = lambda: None,
+    **extra: Any,
+) -> int:
+    """Write the report of a self-test with `count` faults and a control.
+
+    Return 0 if every outcome passes, else 1. If the control fails, `refuse` is called.
+    """
     found = []
     for each in outcomes:
         found.append(each)
         shared.progress(len(found), count + 1, each.check.id)
-    return found
-
-
-def show_outcomes(
-    options: argparse.Namespace, found: Sequence[Outcome], title: Sequence[str], again: str,
-    **extra: Any,
-) -> int:  # fmt: skip
-    """Write the report of a self-test; return 0 if every outcome passes, else 1."""
+    if not found[0].passed:
+        refuse()
     shared.show(self_test_report(title, found, again, **extra), options)
     return 0 if all(each.passed for each in found) else 1

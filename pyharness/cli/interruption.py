@@ -16,8 +16,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, TextIO
 
-from pyharness.cli import say
-from pyharness.cli.progress import end_progress
+from pyharness.cli import end_progress, say
 
 _AGAIN = 0.25  # time (s) after which a dropped interrupt is raised again
 _MOST = 3  # number of interrupts by the user after which the process ends at once

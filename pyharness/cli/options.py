@@ -5,17 +5,18 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
+from pyharness.cli import end_progress as end_progress
+from pyharness.cli import progress as progress
 from pyharness.cli import say, shown, write_text
-from pyharness.cli.progress import end_progress as end_progress
-from pyharness.cli.progress import progress as progress
 from pyharness.engine.scene_reader import read_scene
 from pyharness.model.attitude import NEAR_ONE
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset
-from pyharness.model.report import Report
+from pyharness.model.output_files import check_writable, write_files
+from pyharness.model.report import Report, format_duration
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.values import parsed_float, parsed_whole
@@ -61,6 +62,23 @@ ALSO = {
     "format: .md (Markdown), .xml (JUnit) or .json."
 }
 _BY_SUFFIX = {".md": "markdown", ".xml": "junit", ".json": "json"}
+_WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
+
+
+class Cost(NamedTuple):
+    """The time and memory of a draw, on one core of 2026, and the limit on draws."""
+
+    what: str  # plural noun for the draws, as in "random scenes"
+    seconds: float  # per draw
+    n_bytes: float  # per draw
+    most: int  # largest allowed number of draws
+
+
+# A draw of `verify` makes nearly three checks, which stay in memory until the report.
+CHECKS = Cost("random draws", 0.035, 2e3, 1_000_000)
+# On each random scene of `bench`, the reference is computed, and every solver runs with all its
+# settings.
+SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
@@ -82,6 +100,18 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 def chosen_effort(options: argparse.Namespace) -> float:
     """Return --effort, the factor on work limits; 1 by default."""
     return positive(options.effort, "--effort", 1.0)
+
+
+def chosen_case(options: argparse.Namespace) -> int | None:
+    """Return the number of --case, or None."""
+    check_known("case", options.case, [str(each) for each in case_numbers()])
+    return None if options.case is None else int(options.case)
+
+
+def chosen_cases(options: argparse.Namespace) -> list[int]:
+    """Return the number of --case, or all numbers by default."""
+    case = chosen_case(options)
+    return list(case_numbers()) if case is None else [case]
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
@@ -134,11 +164,8 @@ def chosen_scene(
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
-    if options.case is not None:
-        check_known("case", options.case, [str(each) for each in case_numbers()])
-        scene = case_scene(int(options.case))
-    else:
-        scene = read_scene(options.scene)
+    case = chosen_case(options)
+    scene = read_scene(options.scene) if case is None else case_scene(case)
     changes: dict[str, Any] = {}
     if options.omega0 is not None:
         values = numbers(options.omega0, "--omega0")
@@ -159,13 +186,10 @@ def chosen_scene(
 def warn_of_attitude(scene: Scene) -> None:
     """Warn if the attitude was normalised."""
     if abs(scene.attitude_length - 1.0) > NEAR_ONE:
-        warn(f"the attitude has {_norm(scene.attitude_length)}; it was normalised")
-
-
-def _norm(length: float) -> str:
-    if math.isinf(length):
-        return f"a norm above {sys.float_info.max:.6g}"
-    return f"the norm {length:.6g}"
+        norm = f"the norm {scene.attitude_length:.6g}"
+        if math.isinf(scene.attitude_length):
+            norm = f"a norm above {sys.float_info.max:.6g}"
+        warn(f"the attitude has {norm}; it was normalised")
 
 
 def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
@@ -217,11 +241,15 @@ def chosen_lipschitz(options: argparse.Namespace) -> float:
     return positive(options.lipschitz, "--lipschitz", facts("cases")["deck"]["lipschitz"])
 
 
-def refuse(options: argparse.Namespace, chosen: str, names: Sequence[str]) -> None:
-    """Raise InputError if an option of `names`, such as "no_stop", is given besides `chosen`."""
+def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
+    """Raise InputError if an option of `names` is given besides `chosen`.
+
+    The names are those of attributes, such as "no_stop", or keys such as "--case N".
+    """
     for name in names:
-        if getattr(options, name):
-            raise InputError(f"--{name.replace('_', '-')} has no meaning with {chosen}")
+        option = name.partition(" ")[0].removeprefix("--").replace("_", "-")
+        if getattr(options, option.replace("-", "_")):
+            raise InputError(f"--{option} has no meaning with {chosen}")
 
 
 def names(text: str | None) -> list[str]:
@@ -263,6 +291,39 @@ def whole(text: str, option: str) -> int:
         raise InputError(f"{option}: '{text}' where a whole number belongs") from None
 
 
+def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
+    """Return an option's whole number, or the default; raise InputError beyond 1 to `most`."""
+    count = default if text is None else whole(text, option)
+    if not 1 <= count <= most:
+        raise InputError(f"{option}: {count}; allowed: 1 to {most}")
+    return count
+
+
+def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
+    """Return an option's number of draws, or the default; raise InputError if it is not allowed.
+
+    Print a forecast if they take more than a minute.
+    """
+    if text is None:
+        return default
+    count = whole(text, option)
+    if not least <= count <= cost.most:
+        shown = str(count) if abs(count) < 10**18 else "a number of more than 18 digits"
+        longest = format_duration(cost.most * cost.seconds)
+        raise InputError(
+            f"{option}: {shown}; allowed: a whole number from {least} to {cost.most}, which takes "
+            f"about {longest}"
+        )
+    seconds = count * cost.seconds
+    if seconds > _WORTH_SAYING:
+        memory = max(1.0, count * cost.n_bytes / 1e6)
+        say(
+            f"pyharness: {count} {cost.what} take about {format_duration(seconds)} and "
+            f"{memory:.0f} MB of memory\n"
+        )
+    return count
+
+
 def warn(message: str) -> None:
     """Print a message as a warning on stderr."""
     say(f"pyharness: warning: {message}\n")
@@ -288,18 +349,9 @@ def check_outputs(options: argparse.Namespace) -> None:
 
     Verbs call it before any computation.
     """
-    more = also_files(options)
-    if more:
-        from pyharness.model.output_files import check_writable
-
-        for path in more:
-            check_writable(path, "--also")
+    for path in also_files(options):
+        check_writable(path, "--also")
     picture = getattr(options, "plot", None)
-    if picture is None and options.out is None:
-        return
-    from pyharness.cli.output import check_apart
-    from pyharness.model.output_files import check_writable
-
     if picture is not None:
         from pyharness.views.pictures import check_picture, numbers_beside
 
@@ -308,8 +360,15 @@ def check_outputs(options: argparse.Namespace) -> None:
             check_writable(path, "--plot")
     if options.out is not None:
         check_writable(options.out, "--out")
-    if picture is not None and options.out is not None:
-        check_apart(picture, options.out)
+        if picture is not None:
+            from pyharness.cli.output import check_apart
+
+            check_apart(picture, options.out)
+
+
+def without_out(options: argparse.Namespace) -> argparse.Namespace:
+    """Return the options of a verb whose --out names a folder, so that its report is printed."""
+    return argparse.Namespace(**{**vars(options), "out": None})
 
 
 def show(
@@ -327,26 +386,19 @@ def show(
     form = options.format or FORMATS[0]
     content = own[form]() if own and form in own else render(report, form)
     if getattr(options, "plot", None) is not None:
-        from pyharness.model.output_files import write_files
         from pyharness.views.pictures import saved
 
         assert report.pictures is not None
         (draw,) = report.pictures.values()
         write_files(saved(draw(), options.plot), "--plot")
-    more = also_files(options)
-    if more:
-        from pyharness.model.output_files import write_files
-
-        texts = {path: shown(render(report, kind)) for path, kind in more.items()}
-        write_files({path: text.encode() for path, text in texts.items()}, "--also")
+    texts = {path: shown(render(report, kind)) for path, kind in also_files(options).items()}
+    write_files({path: text.encode() for path, text in texts.items()}, "--also")
     emit(content, options.out)
 
 
 def emit(content: str | bytes, out: str | None) -> None:
     """Write `content` to the file `out`, or to stdout."""
     if out is not None:
-        from pyharness.model.output_files import write_files
-
         data = content if isinstance(content, bytes) else shown(content).encode()
         write_files({out: data}, "--out")
     elif isinstance(content, bytes):

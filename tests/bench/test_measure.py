@@ -361,7 +361,7 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
 
 
 def test_a_package_stands_for_its_contenders() -> None:
-    names = [each.name for each in chosen(peers(), "numba,odeint", "peer", "--peers")]
+    names = [each.name for each in chosen(peers(), "numba,odeint", "peer")]
     assert names == ["numba-rk4", "numba-dop8", "odeint"]
 
 

@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from pyharness import InputError
-from pyharness.cli import forecast, shown
+from pyharness.cli import options, progress, shown
 from pyharness.cli.main import main
 from pyharness.cli.options import warn
-from pyharness.cli.progress import progress
 from pyharness.edition.report import MARK
 from pyharness.model import pipes
 from pyharness.model.errors import printable
@@ -105,9 +104,9 @@ def test_record_and_list_of_an_edition_are_read_with_a_limit(capsys: Capture) ->
 
 
 def test_draws_that_take_long_are_forecast(capsys: Capture) -> None:
-    forecast.check_count("--draws", 1000, 0, forecast.CHECKS)
+    options.chosen_count("1000", "--draws", 0, 0, options.CHECKS)
     assert capsys.readouterr().err == ""
-    forecast.check_count("--draws", 100_000, 0, forecast.CHECKS)
+    options.chosen_count("100000", "--draws", 0, 0, options.CHECKS)
     told = capsys.readouterr().err
     assert told == "pyharness: 100000 random draws take about 58 min and 200 MB of memory\n"
 

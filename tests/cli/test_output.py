@@ -17,11 +17,10 @@ from unittest.mock import Mock
 import pytest
 
 from pyharness import InputError
-from pyharness.cli import output
+from pyharness.cli import end_progress, output, progress
 from pyharness.cli.main import main
 from pyharness.cli.options import warn
 from pyharness.cli.output import write_folder
-from pyharness.cli.progress import end_progress, progress
 from pyharness.model import output_files
 from pyharness.model.output_files import write_files
 

@@ -13,10 +13,9 @@ from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
 from pyharness.checks.scenes.random_scenes import weekly_seed
 from pyharness.cli import options as shared
-from pyharness.cli.forecast import SCENES, check_count
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.scene_file import case_numbers
+from pyharness.model.scene_file import case_scene
 
 _Named = TypeVar("_Named", bound=Contender)
 # Longest horizon, s; beyond it the reference solution, in decimal arithmetic, takes too long.
@@ -61,22 +60,16 @@ def run(options: argparse.Namespace) -> int:
     if options.bodies is not None:
         raise InputError("--bodies has no meaning without --ensemble or --terms")
     if options.plan or options.growth:
-        meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
-        meaningless += ["plot", "growth"] if options.plan else []
-        shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
-        shared.check_outputs(options)
-        return _plan(options) if options.plan else _growth(options)
+        return _plan_or_growth(options)
     count = _count(options)
-    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+    case = shared.chosen_case(options)
     horizon = None
     if options.horizon is not None:
         horizon = shared.positive(options.horizon, "--horizon", 0.0)
         if horizon > _LONGEST:
             raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
-    methods = chosen(
-        list_own_contenders(), options.methods, "method", "--methods", options.attitude
-    )
-    others = chosen(peers(), options.peers, "peer", "--peers", options.attitude)
+    methods = chosen(list_own_contenders(), options.methods, "method", options.attitude)
+    others = chosen(peers(), options.peers, "peer", options.attitude)
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
     if count:
@@ -85,7 +78,6 @@ def run(options: argparse.Namespace) -> int:
             shared.progress(number - 1, count, "drawing scenes")
             loads.append(random_load(options.seed, number, options.attitude))
     else:
-        case = None if options.case is None else int(options.case)
         loads = workloads(case, horizon, options.attitude)
     found = measure(loads, contenders, shared.progress)
     shared.end_progress()
@@ -95,8 +87,7 @@ def run(options: argparse.Namespace) -> int:
     found.refused.extend(
         Refusal(load, each.name, None, _absent()) for each in missing for load in loads
     )
-    those = chosen(peers(), None, "peer", "--peers", options.attitude)
-    packages = sorted({each.package for each in those} - {"", "scipy"})
+    packages = sorted({each.package for each in peers()} - {"", "scipy"})
     shared.show(reports.bench_report(found, packages, _again(options)), options)
     return 0
 
@@ -133,30 +124,24 @@ def _count(options: argparse.Namespace) -> int:
             raise InputError("--seed has no meaning without --random, --ensemble or --terms")
         return 0
     shared.refuse(options, "--random", ["case", "horizon", "plot"])
-    count = shared.whole(options.random, "--random")
-    check_count("--random", count, 1, SCENES)
+    count = shared.chosen_count(options.random, "--random", 0, 1, shared.SCENES)
     seed = shared.chosen_seed(options)
     options.seed = weekly_seed() if seed is None else seed
     return count
 
 
 def chosen(
-    contenders: Sequence[SceneContender],
-    text: str | None,
-    what: str,
-    where: str,
-    attitude: bool = False,
+    contenders: Sequence[SceneContender], text: str | None, what: str, attitude: bool = False
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that the option `where` selects, by default all.
+    """Return the solvers for single scenes that an option selects, by default all.
 
     Raise InputError if `attitude` is true and a listed solver can't compute it.
     """
-    if text is None:
-        return list(contenders)
-    found = named(contenders, text, what, where)
-    if attitude and (lacking := [each.name for each in found if not each.attitude]):
+    found = named(contenders, text, what)
+    lacking = [each.name for each in found if not each.attitude]
+    if attitude and lacking and text is not None:
         able = ", ".join(each.name for each in contenders if each.attitude)
-        raise InputError(f"{where}: {lacking[0]} does not compute attitudes; allowed: {able}")
+        raise InputError(f"--{what}s: {lacking[0]} does not compute attitudes; allowed: {able}")
     return found
 
 
@@ -170,19 +155,19 @@ def _again(options: argparse.Namespace) -> str:
     return command + " --format markdown"
 
 
-def _plan(options: argparse.Namespace) -> int:
+def _plan_or_growth(options: argparse.Namespace) -> int:
+    from pyharness.bench.growth import growth
     from pyharness.bench.savings import savings
 
-    shared.show(reports.savings_report(savings()), options)
-    return 0
-
-
-def _growth(options: argparse.Namespace) -> int:
-    from pyharness.bench.growth import growth
-    from pyharness.model.scene_file import case_scene
-
-    found = {case: growth(case_scene(case)) for case in (3, 4)}
-    shared.show(reports.growth_report(found), options)
+    meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
+    meaningless += ["plot", "growth"] if options.plan else []
+    shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
+    shared.check_outputs(options)
+    if options.plan:
+        report = reports.savings_report(savings())
+    else:
+        report = reports.growth_report({case: growth(case_scene(case)) for case in (3, 4)})
+    shared.show(report, options)
     return 0
 
 
@@ -197,8 +182,8 @@ def _ensemble(options: argparse.Namespace) -> int:
     )
     n = _choose_bodies(options, _BODIES)
     those = ensemble_peers()
-    methods = named(own_ensembles(), options.methods, "method", "--methods")
-    others = named(those, options.peers, "peer", "--peers")
+    methods = named(own_ensembles(), options.methods, "method")
+    others = named(those, options.peers, "peer")
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
     loads = draw(options.seed, n)
@@ -224,7 +209,7 @@ def _terms(options: argparse.Namespace) -> int:
     n = _choose_bodies(options, _TERM_BODIES)
     scenes = term_loads.term_scenes()
     those = term_loads.term_peers(scenes)
-    others = named(those, options.peers, "peer", "--peers")
+    others = named(those, options.peers, "peer")
     contenders, missing = _present(term_loads.term_methods(), others, bool(options.peers))
     shared.check_outputs(options)
     shared.progress(0, 1, "references")
@@ -251,24 +236,22 @@ def _terms(options: argparse.Namespace) -> int:
 
 
 def _choose_bodies(options: argparse.Namespace, default: int) -> int:
-    n = default if options.bodies is None else shared.whole(options.bodies, "--bodies")
-    if not 1 <= n <= _MOST_BODIES:
-        raise InputError(f"--bodies: {n}; allowed: 1 to {_MOST_BODIES}")
+    n = shared.whole_up_to(_MOST_BODIES, options.bodies, "--bodies", default)
     options.bodies, options.seed = str(n), shared.chosen_seed(options) or weekly_seed()
     return n
 
 
-def named(contenders: Sequence[_Named], text: str | None, what: str, where: str) -> list[_Named]:
-    """Return the solvers that an option lists, by name or package.
+def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
+    """Return the solvers that an option, such as --methods for "method", lists by name or package.
 
     None selects all, "none" no solver.
     """
     names: list[str] = shared.names(text)
     if names == ["none"]:
         return []
-    allowed: list[str] = [each.name for each in contenders]
-    packages: list[str] = sorted({each.package for each in contenders} - {""})
+    packages = sorted({each.package for each in contenders} - {""})
+    allowed = [*(each.name for each in contenders), *packages]
     for name in names:
-        if name not in allowed and name not in packages:
-            raise unknown(what, name, [*allowed, *packages, "none"], where)
+        if name not in allowed:
+            raise unknown(what, name, [*allowed, "none"], f"--{what}s")
     return [each for each in contenders if not names or {each.name, each.package} & {*names}]

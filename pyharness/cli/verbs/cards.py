@@ -2,6 +2,7 @@
 
 import argparse
 from hashlib import sha256
+from typing import Any
 
 from pyharness.cli import options as shared
 from pyharness.history.cards_report import cards_report, classes_report, scan_report
@@ -16,6 +17,8 @@ from pyharness.thesis.collation import expected_lines, undeclared, unexplained
 from pyharness.thesis.deck_collation import faults, rows
 
 _LARGEST_SCAN = 1 << 24  # bytes
+# What is shown instead of cards. The whole edition alone has the header and apparatus of TEI.
+_KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards (lines of the programs), by program, number or range, as in "
@@ -43,55 +46,48 @@ def run(options: argparse.Namespace) -> int:
     Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or
     --origins a mistake in its table.
     """
-    if options.format == "tei":
-        from pyharness.history.tei import tei_document
-
-        # Only the whole edition has the header and apparatus of a TEI document.
-        shared.refuse(
-            options, "--format tei", ("classes", "collate", "origins", "second_reading", "scan")
-        )
-        _no_card(options, "--format tei")
-        shared.check_outputs(options)
-        shared.emit(tei_document(), options.out)
-        return 0
-    if options.classes:
-        shared.refuse(options, "--classes", ("collate", "origins", "second_reading", "scan"))
-        _no_card(options, "--classes")
-        shared.check_outputs(options)
-        shared.show(classes_report(), options)
-        return 0
-    if options.collate:
-        shared.refuse(options, "--collate", ("origins", "second_reading", "scan"))
-        _no_card(options, "--collate")
-        shared.check_outputs(options)
-        found = rows()
-        shared.show(collation_report(found), options)
-        return 1 if faults(found) else 0
-    if options.origins:
-        shared.refuse(options, "--origins", ("second_reading", "scan"))
-        _no_card(options, "--origins")
-        shared.check_outputs(options)
-        told = mistakes()
-        shared.show(origins_report(disagreements(), told), options)
-        return 1 if told else 0
-    if options.second_reading:
-        shared.refuse(options, "--second-reading", ("scan",))
-        _no_card(options, "--second-reading")
-        shared.check_outputs(options)
-        shared.show(second_reading_report(), options)
-        return 0
-    if options.scan is None:
+    given = [
+        *(options.format == "tei", options.classes, options.collate, options.origins),
+        *(options.second_reading, options.scan is not None),
+    ]
+    if not any(given):
         cards = chosen(shared.names(options.cards))
         shared.check_outputs(options)
         shared.show(cards_report(cards), options)
         return 0
-    _no_card(options, "--scan")
-    text = _text(options.scan)
-    lines, undeclared_ = unexplained(text), undeclared()
-    digest = sha256(text.encode()).hexdigest()
+    kind, *others = _KINDS[given.index(True) :]
+    shared.refuse(options, kind, others)
+    if options.cards is not None:
+        raise InputError(f"cards {options.cards!r} has no meaning with {kind}; give one of them")
+    text, lines = "", []
+    if kind == "--scan":
+        text = _text(options.scan)
+        lines = unexplained(text)
     shared.check_outputs(options)
-    shared.show(scan_report(lines, undeclared_, len(expected_lines()), digest), options)
-    return 1 if lines or undeclared_ else 0
+    failures: Any = None
+    match kind:
+        case "--format tei":
+            from pyharness.history.tei import tei_document
+
+            shared.emit(tei_document(), options.out)
+            return 0
+        case "--classes":
+            report = classes_report()
+        case "--collate":
+            found = rows()
+            report, failures = collation_report(found), faults(found)
+        case "--origins":
+            failures = mistakes()
+            report = origins_report(disagreements(), failures)
+        case "--second-reading":
+            report = second_reading_report()
+        case _:
+            undeclared_ = undeclared()
+            digest = sha256(text.encode()).hexdigest()
+            report = scan_report(lines, undeclared_, len(expected_lines()), digest)
+            failures = lines or undeclared_
+    shared.show(report, options)
+    return 1 if failures else 0
 
 
 def _text(path: str) -> str:
@@ -101,8 +97,3 @@ def _text(path: str) -> str:
         return content.decode()
     except ValueError:
         raise InputError(f"{where}: is not text; give the text of a scan") from None
-
-
-def _no_card(options: argparse.Namespace, chosen: str) -> None:
-    if options.cards is not None:
-        raise InputError(f"cards {options.cards!r} has no meaning with {chosen}; give one of them")

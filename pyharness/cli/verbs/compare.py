@@ -83,11 +83,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _methods(options: argparse.Namespace) -> int:
-    meaningless = (
-        "program", "listing", "fix", "keep", "reading", "conjecture", "lipschitz", "no_stop",
-        "word", "ablate",
-    )  # fmt: skip
-    shared.refuse(options, "--method", meaningless)
+    shared.refuse(options, "--method", ("program", *shared.LISTING, "word", "ablate"))
     scene = shared.chosen_scene(options, any_state=True)
     shared.check_outputs(options)
     found = compare_methods(
@@ -102,20 +98,9 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:
-    meaningless = (
-        "listing",
-        "fix",
-        "keep",
-        "conjecture",
-        "lipschitz",
-        "no_stop",
-        "tolerance",
-        "word",
-        "attitude",
-        "plot",
-        "strict",
-    )
-    shared.refuse(options, "--ablate", meaningless)
+    others = [option for option in shared.LISTING if not option.startswith("--reading")]
+    others += ["tolerance", "word", "attitude", "plot", "strict"]
+    shared.refuse(options, "--ablate", others)
     readings = shared.names(options.reading)
     for name in readings:
         allowed = [known for program in programs for known in names_of("reading", program)]

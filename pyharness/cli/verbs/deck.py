@@ -7,7 +7,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.records import listing_record
 from pyharness.model.report import Line, Report
-from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_file import case_scene
 from pyharness.thesis.decks import DIALECTS, SYSTEMS, deck_text, job_text
 
 FORMATS = ("table", "json")
@@ -33,12 +33,10 @@ def run(options: argparse.Namespace) -> int:
     if options.program is None:
         raise InputError("give --program two-term, four-term or runge-kutta")
     listing = shared.chosen_listing(options)
-    scene = None
-    if options.case is not None:
-        shared.check_known("case", options.case, [str(each) for each in case_numbers()])
-        scene = case_scene(int(options.case))
+    case = shared.chosen_case(options)
+    scene = None if case is None else case_scene(case)
     dialect = options.dialect or DIALECTS[0]
-    if dialect == "1982" and (options.case == "7" or listing.has("do-variable")):
+    if dialect == "1982" and (case == 7 or listing.has("do-variable")):
         shared.warn(
             "the torque of Case 7 and what becomes of a DO variable are on no card; --dialect "
             "gfortran has both, ftn the torque"
@@ -52,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     lines = text.splitlines()
     shared.check_outputs(options)
     record = {
-        "program": listing.program, "case": scene and scene.case, "dialect": dialect,
+        "program": listing.program, "case": case, "dialect": dialect,
         "terms": terms, "listing": listing_record(listing), "lines": lines,
     }  # fmt: skip
     report = Report("deck", [[Line(each) for each in lines]], record=lambda: {"deck": record})

@@ -20,41 +20,34 @@ EXAMPLE = "edition --out pages"
 
 def run(options: argparse.Namespace) -> int:
     """Write the web site or the data package, and print a list of files."""
-    if options.data is not None:
-        shared.refuse(options, "--data", ("out", "docs"))
-        return _write_package(options)
     from pyharness.cli.output import check_tree, write_tree
-    from pyharness.edition.libraries import check_libraries
-    from pyharness.edition.report import MARK, edition_report
-    from pyharness.views.render import render
+    from pyharness.edition.report import MARK, edition_report, package_report
 
-    if options.out is None:
+    if options.data is not None:
+        from pyharness.edition.crate import PACKAGE_MARK
+        from pyharness.edition.data_package import data_package
+
+        shared.refuse(options, "--data", ("out", "docs"))
+        folder, option = options.data, "--data"
+        check_tree(folder, PACKAGE_MARK, option, "data package")
+        content = data_package(shared.progress)
+        report = package_report(folder, content)
+    elif options.out is not None:
+        from pyharness.edition.libraries import check_libraries
+
+        folder, option = options.out, "--out"
+        check_tree(folder, MARK, option)
+        check_libraries()
+        from pyharness.edition.documents import documents_folder
+        from pyharness.edition.site import build_site
+
+        content = build_site(shared.progress, documents_folder(options.docs))
+        report = edition_report(folder, content)
+    else:
         raise InputError(
             "edition: give --out DIR, a folder for the pages, or --data DIR, a folder for the data"
         )
-    check_tree(options.out, MARK, "--out")
-    check_libraries()
-    from pyharness.edition.documents import documents_folder
-    from pyharness.edition.site import build_site
-
-    docs = documents_folder(options.docs)
-    content = build_site(shared.progress, docs)
     shared.end_progress()
-    write_tree(options.out, content, "--out")
-    shared.emit(render(edition_report(options.out, content), options.format or "table"), None)
-    return 0
-
-
-def _write_package(options: argparse.Namespace) -> int:
-    from pyharness.cli.output import check_tree, write_tree
-    from pyharness.edition.crate import PACKAGE_MARK
-    from pyharness.edition.data_package import data_package
-    from pyharness.edition.report import package_report
-    from pyharness.views.render import render
-
-    check_tree(options.data, PACKAGE_MARK, "--data", "data package")
-    content = data_package(shared.progress)
-    shared.end_progress()
-    write_tree(options.data, content, "--data")
-    shared.emit(render(package_report(options.data, content), options.format or "table"), None)
+    write_tree(folder, content, option)
+    shared.show(report, shared.without_out(options))
     return 0

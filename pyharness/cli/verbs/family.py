@@ -68,8 +68,7 @@ def _member(options: argparse.Namespace) -> Member:
 def _lost(options: argparse.Namespace) -> int:
     from pyharness.history.lost import lost_report, ranked
 
-    others = ("case", "scene", "omega0", "step_size", "steps", *_OF_A_MEMBER)
-    shared.refuse(options, "--lost", others)
+    shared.refuse(options, "--lost", (*shared.SCENE, *_OF_A_MEMBER))
     shared.check_known("word", options.word, WORD_NAMES)
     shared.check_outputs(options)
     word = options.word or BINARY64

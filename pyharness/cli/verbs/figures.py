@@ -19,7 +19,6 @@ def run(options: argparse.Namespace) -> int:
     """Draw Figures 6 to 12, write the files, and print a list."""
     from pyharness.cli.output import check_folder, write_folder
     from pyharness.views.pictures import check_matplotlib, saved
-    from pyharness.views.render import render
 
     if options.out is None:
         raise InputError("figures: give --out DIR, a folder for the files")
@@ -36,6 +35,5 @@ def run(options: argparse.Namespace) -> int:
         drawn.append(finding)
     shared.end_progress()
     write_folder(options.out, content, "--out")
-    # --out names the folder of the files, so that the list is printed to standard output.
-    shared.emit(render(room.figures_report(drawn), options.format or "table"), None)
+    shared.show(room.figures_report(drawn), shared.without_out(options))
     return 0

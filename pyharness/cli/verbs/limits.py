@@ -4,7 +4,6 @@ import argparse
 
 from pyharness.cli import options as shared
 from pyharness.history.limits import invisible, limit, limits_report
-from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 
 OPTIONS = {
@@ -21,9 +20,7 @@ def run(options: argparse.Namespace) -> int:
     """Print each original program's distance from its limit and from the true solution."""
     scene = shared.chosen_scene(options)
     programs = shared.chosen_programs(options)
-    halvings = 6 if options.halvings is None else shared.whole(options.halvings, "--halvings")
-    if not 1 <= halvings <= 12:
-        raise InputError(f"--halvings: {halvings}; allowed: 1 to 12")
+    halvings = shared.whole_up_to(12, options.halvings, "--halvings", 6)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = [limit(program, scene, halvings, effort) for program in programs]

@@ -4,7 +4,6 @@ import argparse
 import json
 
 from pyharness.cli import options as shared
-from pyharness.model.errors import InputError
 from pyharness.truth.certificate import prove
 from pyharness.truth.certificate_checker import check_file
 from pyharness.truth.enclosed import with_energy
@@ -42,9 +41,7 @@ def run(options: argparse.Namespace) -> int:
     times = [scene.times()[-1]]
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
-    digits = _DIGITS if options.digits is None else shared.whole(options.digits, "--digits")
-    if not 1 <= digits <= MOST_DIGITS:
-        raise InputError(f"--digits: {digits}; allowed: 1 to {MOST_DIGITS}")
+    digits = shared.whole_up_to(MOST_DIGITS, options.digits, "--digits", _DIGITS)
     effort = shared.chosen_effort(options)
     shared.check_outputs(options)
     if options.certificate is None:
@@ -71,8 +68,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    others = ("case", "scene", "omega0", "step_size", "steps", "times", "digits", "velocity")
-    shared.refuse(options, "--check", (*others, "transition", "certificate", "effort"))
+    others = ("times", "digits", "velocity", "transition", "certificate", "effort")
+    shared.refuse(options, "--check", (*shared.SCENE, *others))
     shared.check_outputs(options)
     found, names = [], shared.names(options.check)
     for number, name in enumerate(names):

@@ -159,17 +159,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     from pyharness.engine.registry import METHODS
     from pyharness.engine.solve import solve
 
-    listing_options = (
-        "implementation",
-        "word",
-        "listing",
-        "fix",
-        "keep",
-        "reading",
-        "conjecture",
-        "lipschitz",
-    )
-    shared.refuse(options, "--method", (*listing_options, "no_stop"))
+    shared.refuse(options, "--method", ("implementation", "word", *shared.LISTING))
     name = options.method
     shared.check_known("method", name, tuple(METHODS))
     tolerance = shared.chosen_tolerance(options)

@@ -9,7 +9,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts_folder
 from pyharness.model.records import scene_record
 from pyharness.model.report import Report
-from pyharness.model.scene_file import case_numbers, case_scene, scene_text
+from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.scene_report import heading
 
 FORMATS = ("table", "json")
@@ -67,20 +67,14 @@ def run(options: argparse.Namespace) -> int:
     if action == "new" and options.out is not None and os.path.isfile(options.out):
         raise InputError(f"scene new: '{options.out}' exists; give another name, or delete it")
     if action == "check":
-        _check(options)
+        scene = read_scene(options.file)
+        shared.warn_of_attitude(scene)
+        record = scene_record(scene)
+        shared.show(Report("scene", [heading(scene)], record=lambda: {"scene": record}), options)
     elif action == "schema":
         shared.emit((facts_folder() / "scene.schema.json").read_bytes(), options.out)
-    elif options.case is None:
+    elif (case := shared.chosen_case(options)) is None:
         shared.emit(_NEW, options.out)
     else:
-        shared.check_known("case", options.case, [str(each) for each in case_numbers()])
-        scene = case_scene(int(options.case))
-        shared.emit(scene_text(scene, [f"Case {scene.case} of Table 1"]), options.out)
+        shared.emit(scene_text(case_scene(case), [f"Case {case} of Table 1"]), options.out)
     return 0
-
-
-def _check(options: argparse.Namespace) -> None:
-    scene = read_scene(options.file)
-    shared.warn_of_attitude(scene)
-    record = scene_record(scene)
-    shared.show(Report("scene", [heading(scene)], record=lambda: {"scene": record}), options)

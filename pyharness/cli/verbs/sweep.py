@@ -56,8 +56,7 @@ def run(options: argparse.Namespace) -> int:
     workers = _workers(options, executor)
     sweep = read_sweep(options.file, CLAIMS)
     quantity = None
-    # --out names the store, so that the report is printed to standard output.
-    shown = argparse.Namespace(**{**vars(options), "out": None})
+    shown = shared.without_out(options)
     if options.plot is not None:
         from pyharness.sweep.picture import chosen_quantity
 
@@ -93,7 +92,4 @@ def _workers(options: argparse.Namespace, executor: str) -> int | None:
     if executor == "here" or options.scheduler is not None:
         chosen = "--executor here" if executor == "here" else "--scheduler"
         raise InputError(f"--workers has no meaning with {chosen}")
-    count = shared.whole(options.workers, "--workers")
-    if not 1 <= count <= _MOST_WORKERS:
-        raise InputError(f"--workers: {count}; allowed: 1 to {_MOST_WORKERS}")
-    return count
+    return shared.whole_up_to(_MOST_WORKERS, options.workers, "--workers", 1)

@@ -10,9 +10,7 @@ from pyharness.checks.random_methods import ROUNDING
 from pyharness.checks.report import checks_report, references, samples, summary
 from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli import options as shared
-from pyharness.cli.forecast import CHECKS, check_count
 from pyharness.model.errors import InputError
-from pyharness.model.scene_file import case_numbers
 from pyharness.thesis.decks import compiler
 
 FORMATS = ("table", "json", "junit", "markdown")
@@ -118,19 +116,18 @@ def _listing_output(options: argparse.Namespace) -> int:
 
 
 def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], list[int]]:
-    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
-    cases = list(case_numbers()) if options.case is None else [int(options.case)]
+    cases = shared.chosen_cases(options)
     return shared.chosen_programs(options), cases
 
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
     from pyharness.checks.plants.plants import PLANTS
     from pyharness.checks.plants.program_self_test import self_test
-    from pyharness.cli.command_checks import collect, show_outcomes
+    from pyharness.cli.command_checks import show_self_test
 
-    found = collect(self_test(chosen.seed, chosen.record), len(PLANTS))
+    outcomes = self_test(chosen.seed, chosen.record)
     again = "python -m pyharness verify --self-test"
-    return show_outcomes(options, found, _title(chosen), again, seed=chosen.seed)
+    return show_self_test(options, outcomes, len(PLANTS), _title(chosen), again, seed=chosen.seed)
 
 
 def _selection(options: argparse.Namespace) -> Selection:
@@ -150,9 +147,7 @@ def _selection(options: argparse.Namespace) -> Selection:
     for kind, names in _OF_ONE_KIND.items():
         if only and not any(each.partition("/")[0] == kind for each in only):
             shared.refuse(options, f"--only {options.only}", names)
-    draws = DRAWS if options.draws is None else shared.whole(options.draws, "--draws")
-    if options.draws is not None:
-        check_count("--draws", draws, 0, CHECKS)
+    draws = shared.chosen_count(options.draws, "--draws", DRAWS, 0, shared.CHECKS)
     seed = shared.chosen_seed(options)
     changes: dict[str, Any] = {} if seed is None else {"seed": seed}
     record = RECORD if options.record is None else Path(options.record)

@@ -12,7 +12,6 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table
 from pyharness.model.report import words as columns
-from pyharness.model.scene_file import case_numbers
 from pyharness.thesis.vectors import Answer, answers
 
 FORMATS = ("table", "json", "csv", "markdown")
@@ -33,10 +32,9 @@ def run(options: argparse.Namespace) -> int:
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
         return _vectors(options)
-    shared.check_known("case", options.case, [str(each) for each in case_numbers()])
+    cases = shared.chosen_cases(options)
     if options.plot is not None and options.case is None:
         raise InputError("words: --plot draws one case; give --case N (1 to 7)")
-    cases = case_numbers() if options.case is None else [int(options.case)]
     programs = shared.chosen_programs(options)
     shared.check_outputs(options)
     lengths = range(LENGTHS[0], LENGTHS[-1] + 1) if options.all else LENGTHS

@@ -106,15 +106,14 @@ def angles(attitude: Array, sequence: str) -> Array:
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
         tilt = 2.0 * np.arctan2(np.hypot(q1, q2), np.hypot(q0, q3))
-        total, rest = np.arctan2(q3, q0), np.arctan2(q2, q1)
-        first, last = total + rest, total - rest
-        no_total, no_rest = np.hypot(q0, q3) == 0.0, np.hypot(q1, q2) == 0.0
+        pairs = (q0, q3), (q1, q2)
     else:
-        a, b, c, d = q0 - q2, q1 + q3, q2 + q0, q3 - q1
-        tilt = 2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - np.pi / 2.0
-        total, rest = np.arctan2(b, a), np.arctan2(d, c)
-        first, last = total + rest, total - rest
-        no_total, no_rest = np.hypot(a, b) == 0.0, np.hypot(c, d) == 0.0
+        pairs = (q0 - q2, q1 + q3), (q2 + q0, q3 - q1)
+        tilt = 2.0 * np.arctan2(np.hypot(*pairs[1]), np.hypot(*pairs[0])) - np.pi / 2.0
+    (a, b), (c, d) = pairs
+    total, rest = np.arctan2(b, a), np.arctan2(d, c)
+    first, last = total + rest, total - rest
+    no_total, no_rest = np.hypot(a, b) == 0.0, np.hypot(c, d) == 0.0
     first = np.where(no_rest, 2.0 * total, np.where(no_total, 2.0 * rest, first))
     last = np.where(no_rest | no_total, 0.0, last)
     found: Array = np.degrees(np.column_stack([first, tilt, last]))

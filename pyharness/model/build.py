@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from pyharness.model.distribution import DISTRIBUTION
 from pyharness.model.report import Line, Report
@@ -30,7 +31,7 @@ INFLUENCES = (
 """Environment variables that may change results, output, imports or builds."""
 
 AS_WRITTEN = "as written"
-"""The value of `Installation.arithmetic` unless an option or a library changes the arithmetic."""
+"""The value of "arithmetic" of `installation` unless an option or a library changes it."""
 
 _LEVELS = ("plain", "avx2", "avx512")
 
@@ -72,41 +73,23 @@ def build() -> Build:
     )
 
 
-@dataclass(frozen=True)
-class Installation:
-    """The installation and the machine, for a bug report; None if unknown or missing.
+def installation() -> dict[str, Any]:
+    """Return the installation, the machine and versions, for a bug report; None if unknown.
 
-    `arithmetic` says which option or library changes the kernels' arithmetic; if none does, ``as
-    written``. `environment` has the variables of `INFLUENCES` that are set.
+    "arithmetic" says which option or library changes the kernels' arithmetic; if none does, ``as
+    written``. "environment" has the variables of `INFLUENCES` that are set.
     """
-
-    folder: str
-    installer: str
-    processor: str
-    cores: int
-    instructions: str | None
-    arithmetic: str | None
-    packages: dict[str, str | None]
-    environment: dict[str, str]
-
-
-def installation() -> Installation:
-    """Return the installation, the machine, and versions of packages."""
-    folder = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    return Installation(
-        folder=folder,
-        installer=_installer(),
-        processor=_processor(),
-        cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else _cores(),
-        instructions=_instructions(),
-        arithmetic=_arithmetic(),
-        packages={name: _version(name) for name in (*REQUIRED, *OPTIONAL)},
-        environment={name: os.environ[name] for name in INFLUENCES if name in os.environ},
-    )
-
-
-def _cores() -> int:
-    return os.cpu_count() or 1
+    has_affinity = hasattr(os, "sched_getaffinity")
+    return {
+        "folder": os.path.dirname(os.path.dirname(os.path.abspath(__file__))),
+        "installer": _installer(),
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1,
+        "instructions": _instructions(),
+        "arithmetic": _arithmetic(),
+        "packages": {name: _version(name) for name in (*REQUIRED, *OPTIONAL)},
+        "environment": {name: os.environ[name] for name in INFLUENCES if name in os.environ},
+    }
 
 
 def _installer() -> str:
@@ -174,12 +157,12 @@ def _version(package: str) -> str | None:
         return None
 
 
-def doctor_report(build: Build, here: Installation) -> Report:
+def doctor_report(build: Build, here: dict[str, Any]) -> Report:
     """Return the report of the subcommand `doctor`."""
     rows = {
         "pyharness": build.version,
-        "installed by": here.installer,
-        "folder": here.folder,
+        "installed by": here["installer"],
+        "folder": here["folder"],
         "extension": build.extension or "not built: 'make compare', or 'pip install .'",
         "Fortran compiler": build.compiler or "unknown, for nothing is built",
         "Fortran flags": build.flags or "unknown, for nothing is built",
@@ -187,20 +170,20 @@ def doctor_report(build: Build, here: Installation) -> Report:
         "NumPy": build.numpy or "missing",
         "SciPy": build.scipy or "missing",
         "platform": build.platform,
-        "processor": f"{here.processor}, {here.cores} cores",
-        "instructions": here.instructions or "unknown, for nothing is built",
-        "arithmetic": here.arithmetic or "unknown, for nothing is built",
+        "processor": f"{here['processor']}, {here['cores']} cores",
+        "instructions": here["instructions"] or "unknown, for nothing is built",
+        "arithmetic": here["arithmetic"] or "unknown, for nothing is built",
     }
     for name in REQUIRED:
-        rows[name] = here.packages[name] or f"missing: 'pip install {name}'"
-    missing = [name for name in OPTIONAL if here.packages[name] is None]
+        rows[name] = here["packages"][name] or f"missing: 'pip install {name}'"
+    missing = [name for name in OPTIONAL if here["packages"][name] is None]
     for name, purpose in OPTIONAL.items():
-        state = here.packages[name] or f"missing: 'pip install {name}'"
+        state = here["packages"][name] or f"missing: 'pip install {name}'"
         rows[name] = f"{state} ({purpose})"
-    variables = (f"{name}={value}" for name, value in here.environment.items())
+    variables = (f"{name}={value}" for name, value in here["environment"].items())
     rows["environment"] = " ".join(variables) or "no variable that may change results"
     return Report(
         "doctor",
         text=[[Line(f"{name:18s}{value}") for name, value in rows.items()]],
-        record=lambda: {"missing": missing, "build": asdict(build), "installation": asdict(here)},
+        record=lambda: {"missing": missing, "build": asdict(build), "installation": here},
     )

@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, repeat
+from operator import mul
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -51,7 +53,8 @@ class Changing:
         return self._values([[_derivative(each) for each in row] for row in self.elements], time)
 
     def _values(self, elements: Sequence[Sequence[Polynomial]], time: Any) -> list[list[Any]]:
-        known = _powers(time, max(len(each) for row in elements for each in row))
+        degree = max(len(each) for row in elements for each in row) - 1
+        known = list(accumulate(repeat(time, degree), mul, initial=1.0))
         return [[_value(each, known) for each in row] for row in elements]
 
     def momentum(
@@ -239,14 +242,6 @@ def _polynomial(where: str, values: object) -> Polynomial:
     if not 1 <= len(given) <= _MOST:
         raise InputError(f"{where}: {_count(given, _MOST)} numbers; {_POLYNOMIALS}")
     return tuple(finite(where, each) for each in given)
-
-
-def _powers(time: Any, count: int) -> list[Any]:
-    """Return the powers 0 to `count` - 1 of a time, which may be a symbol."""
-    found: list[Any] = [1.0]
-    while len(found) < count:
-        found.append(found[-1] * time)
-    return found
 
 
 def _value(polynomial: Polynomial, time_powers: Sequence[Any]) -> Any:

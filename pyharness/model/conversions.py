@@ -1,8 +1,6 @@
-"""Trajectories as objects of pandas, xarray and matplotlib, under SciPy's names, and as files."""
+"""Trajectories as objects of pandas, xarray and matplotlib, and as files."""
 
-import math
 import os
-from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -12,7 +10,6 @@ from pyharness.model.array_type import Array
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.mechanics import Mechanics
-from pyharness.model.report import counted, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,11 +17,9 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from pyharness.model.dense_output import DenseOutput
-    from pyharness.model.trajectory import Stop, Trajectory
+    from pyharness.model.trajectory import Trajectory
 
 _SMOOTH = 1000  # points of a line through dense output
-# Number of first, and of last, rows in HTML.
-_SHOWN = 3
 
 
 class _Quantity(NamedTuple):
@@ -36,87 +31,12 @@ class _Quantity(NamedTuple):
 
 
 class Conversions(Mechanics):
-    """A base class of trajectories with conversions, and the names of SciPy's `solve_ivp`."""
+    """A base class of trajectories with conversions."""
 
     recorded_time: Array
     velocity: Array | None
-    steps: int
-    evaluations: int
-    ended: str
-    stop: "Stop | None"
     ier: NDArray[np.int32] | None
-    error: float | None
-    growth: float | None
-    reason: str | None
-    tolerance: float | None
     sol: "DenseOutput | None"
-
-    if TYPE_CHECKING:
-
-        @property
-        def digits(self) -> float | None:
-            """The number of correct decimal digits of omega."""
-
-        @property
-        def has_all_rows(self) -> bool:
-            """Whether all requested rows are present."""
-
-    @property
-    def t(self) -> Array:
-        """The attribute `time` (s), shape (n,)."""
-        return self.time
-
-    @property
-    def y(self) -> Array:
-        """The state at each time in columns: omega (rad/s), (3, n), or with quaternion, (7, n)."""
-        if self.attitude is None:
-            return self.omega.T
-        return np.concatenate([self.omega.T, self.attitude.T])
-
-    @property
-    def success(self) -> bool:
-        """Whether the integration reached all requested times, or a terminal event."""
-        return self.status >= 0
-
-    @property
-    def status(self) -> int:
-        """The ending as in SciPy: 0 if all times were reached, 1 for a terminal event, else -1."""
-        if self.ended == "event":
-            return 1
-        return 0 if self.has_all_rows else -1
-
-    @property
-    def message(self) -> str:
-        """A sentence that says how the integration ended."""
-        if self.stop is not None:
-            return (
-                f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "
-                f"quotient of {self.stop.variable} was {short(self.stop.quotient)} 1/s."
-            )
-        if self.ended == "event":
-            return "A terminal event ended the integration; the rows end before it or at it."
-        if self.ended in ("overflow", "singular"):
-            last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
-            reason = self.reason or "omega or the torque became infinite or NaN"
-            return f"{reason[0].upper()}{reason[1:]}; {last}."
-        if self.ended == "unchecked":
-            return (
-                "The integration reached all requested times, but may have passed a short change "
-                "of the torque, whose series ends before."
-            )
-        if self.ended != "sensitive":
-            return "The integration reached all requested times."
-        by = "" if self.growth is None else f", amplified by {short(self.growth)},"
-        left = counted(math.floor(self.digits or 0.0), "correct digit")
-        return (
-            f"The integration reached all requested times, but rounding errors{by} exceed the "
-            f"tolerance; omega has {left}."
-        )
-
-    @property
-    def nfev(self) -> int:
-        """The attribute `evaluations`."""
-        return self.evaluations
 
     def to_pandas(self) -> "DataFrame":
         """Return the rows as a DataFrame of pandas.
@@ -277,48 +197,6 @@ class Conversions(Mechanics):
         from pyharness.model.trajectory_file import save
 
         save(cast("Trajectory", self), path)
-
-    def _repr_html_(self) -> str:
-        facts = {
-            "ended": self.message,
-            "rows": str(len(self.time)),
-            "work": f"{counted(self.steps, 'step')}, "
-            f"{counted(self.evaluations, 'evaluation')} of the right-hand side",
-        }
-        if self.error is not None and self.digits is not None:
-            facts["estimated error"] = f"{short(self.error)} of the largest |omega|"
-            facts["correct digits"] = f"{self.digits:.1f}"
-        if self.growth is not None:
-            facts["error amplification"] = short(self.growth)
-        title = "Trajectory" if self.scene is None else f"Trajectory of {self.scene.name}"
-        lines = [f"<table><caption>{escape(title)}</caption><tbody>"]
-        lines += [
-            f'<tr><th scope="row" style="text-align: left">{escape(name)}</th>'
-            f'<td style="text-align: left">{escape(text)}</td></tr>'
-            for name, text in facts.items()
-        ]
-        return "\n".join([*lines, "</tbody></table>", *self._html_rows()])
-
-    def _html_rows(self) -> list[str]:
-        count = len(self.time)
-        if not count:
-            return []
-        quantities = [each for each in self._quantities() if each.name != "ier"]
-        heads = ["time (s)"]
-        for each in quantities:
-            unit = "" if each.unit == "1" else f" ({each.unit})"
-            heads += [f"{name}{unit}" for name in each.columns]
-        parts = [self.time, *(each.values for each in quantities)]
-        cells = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
-        lines = [f"<table><thead><tr>{cells}</tr></thead><tbody>"]
-        kept = list(range(count))
-        if count > 2 * _SHOWN + 1:
-            kept = [*range(_SHOWN), -1, *range(count - _SHOWN, count)]
-        for row in kept:
-            values = np.concatenate([np.atleast_1d(part[row]) for part in parts]).tolist()
-            texts = ["..."] * len(heads) if row < 0 else [f"{value:.6g}" for value in values]
-            lines.append(f"<tr>{''.join(f'<td>{text}</td>' for text in texts)}</tr>")
-        return [*lines, "</tbody></table>"]
 
     def _quantities(self) -> list[_Quantity]:
         about = "angular velocity about the body axes"

@@ -1,7 +1,7 @@
 """Forward differentiation: dual numbers, and tapes that compute the derivatives of a tape."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -102,35 +102,20 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     return recorder.tape([*(slope for x in found for slope in x.slopes), *(x.value for x in found)])
 
 
-def _sqrt(x: Any) -> Any:
-    if not isinstance(x, Dual):
-        return math.sqrt(x)
-    root = np.sqrt(x.value)
-    return x.chained(root, 0.5 / root)
+def _of_duals(
+    function: Callable[[float], float],
+    symbolic: Callable[[Any], Any],
+    slope: Callable[[Any, Any], Any],
+) -> Callable[[Any], Any]:
+    """Return a function of floats and dual numbers; `slope` is of the argument and the value."""
 
+    def called(x: Any) -> Any:
+        if not isinstance(x, Dual):
+            return function(x)
+        value = symbolic(x.value)
+        return x.chained(value, slope(x.value, value))
 
-def _exp(x: Any) -> Any:
-    if not isinstance(x, Dual):
-        return math.exp(x)
-    value = np.exp(x.value)
-    return x.chained(value, value)
-
-
-def _tanh(x: Any) -> Any:
-    if not isinstance(x, Dual):
-        return math.tanh(x)
-    value = np.tanh(x.value)
-    return x.chained(value, 1.0 + -1.0 * (value * value))
-
-
-def _sine(x: Any) -> Any:
-    return x.chained(np.sin(x.value), np.cos(x.value)) if isinstance(x, Dual) else math.sin(x)
-
-
-def _cosine(x: Any) -> Any:
-    if not isinstance(x, Dual):
-        return math.cos(x)
-    return x.chained(np.cos(x.value), -1.0 * np.sin(x.value))
+    return called
 
 
 def _of_table(table: Table, time: Dual) -> Dual:
@@ -140,4 +125,12 @@ def _of_table(table: Table, time: Dual) -> Dual:
     )
 
 
-_DUALS: Functions[Any] = Functions(float, _sqrt, _exp, _tanh, _sine, _cosine, _of_table)
+_DUALS: Functions[Any] = Functions(
+    float,
+    _of_duals(math.sqrt, np.sqrt, lambda _, root: 0.5 / root),
+    _of_duals(math.exp, np.exp, lambda _, value: value),
+    _of_duals(math.tanh, np.tanh, lambda _, value: 1.0 + -1.0 * (value * value)),
+    _of_duals(math.sin, np.sin, lambda x, _: np.cos(x)),
+    _of_duals(math.cos, np.cos, lambda x, _: -1.0 * np.sin(x)),
+    _of_table,
+)

@@ -78,12 +78,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
         raise unknown("implementation", implementation, _LIMITS)
     most, a_wave = _LIMITS[implementation]
     needed = scene.steps * (1.0 + a_wave * waves(scene)) / most
-    if needed <= checked_effort(effort) * _ROUNDING:
-        return
-    raise InputError(
-        f"{program} ({implementation}): {_load(scene)} would take too long; "
-        + advice("use fewer steps", effort, needed / _SLACK)
-    )
+    _check_work(scene, f"{program} ({implementation})", "", "use fewer steps", needed, effort)
 
 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
@@ -93,16 +88,16 @@ def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> Non
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL
+    _check_work(scene, program, f" of {bodies} bodies", "use fewer", needed, effort)
+
+
+def _check_work(
+    scene: Scene, what: str, of: str, instead: str, needed: float, effort: Number
+) -> None:
     factor = checked_effort(effort)
     if needed > factor * _ROUNDING:
+        count = waves(scene)
+        load = f"{scene.steps} steps" + (f" with {count} waves of torque" if count else "")
         raise InputError(
-            f"{program}: {_load(scene)} of {bodies} bodies would take too long; "
-            + advice("use fewer", factor, needed / _SLACK)
+            f"{what}: {load}{of} would take too long; {advice(instead, factor, needed / _SLACK)}"
         )
-
-
-def _load(scene: Scene) -> str:
-    load = f"{scene.steps} steps"
-    if waves(scene):
-        load += f" with {waves(scene)} waves of torque"
-    return load

@@ -116,12 +116,6 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
     return PrincipalFrame(rounded, low, columns, exact, (axes[0], axes[1], axes[2]))
 
 
-def principal_axes(inertia: Matrix) -> tuple[Triple, Array]:
-    """Return the principal moments (kg m2), and the axes as columns of a (3, 3) array."""
-    found = principal_frame(inertia)
-    return found.moments, found.axes.copy()
-
-
 def _reverse(axis: Exact) -> Exact:
     return -axis[0], -axis[1], -axis[2]
 

@@ -8,7 +8,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import body_of
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 
 
@@ -61,14 +61,11 @@ def _law(law: TorqueLaw) -> dict[str, Any]:
     return {
         "constant": list(law.constant),
         "rate": list(law.rate),
-        "sines": [_wave(wave) for wave in law.sines],
-        "cosines": [_wave(wave) for wave in law.cosines],
+        **{
+            name: [{"amplitude": list(amplitude), "frequency": f} for amplitude, f in waves]
+            for name, waves in (("sines", law.sines), ("cosines", law.cosines))
+        },
     }
-
-
-def _wave(wave: Wave) -> dict[str, Any]:
-    amplitude, frequency = wave
-    return {"amplitude": list(amplitude), "frequency": frequency}
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:

@@ -134,8 +134,8 @@ class Scene:
     torque: TorqueLaw | StateTorque = field(default_factory=TorqueLaw)
     step_size: float = 0.01
     steps: int = 100
-    masses: Triple = field(default_factory=lambda: _deck("masses"))
-    forces: Triple = field(default_factory=lambda: _deck("forces"))
+    masses: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["masses"]))
+    forces: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["forces"]))
     case: int | None = None
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
@@ -325,21 +325,14 @@ class Scene:
     def right_hand_side(self) -> Callable[[float, Sequence[float]], list[float]]:
         """Return f(t, omega) (rad/s2) of Euler's equations (16-18 of the thesis)."""
         a, b, c = self.euler_coefficients
-        if self.body_torque.varies:
+        varies, constant = self.body_torque.varies, self.normalized_torque(0.0)
 
-            def varying(time: float, omega: Sequence[float]) -> list[float]:
-                x, y, z = omega
-                m1, m2, m3 = self.normalized_torque(time)
-                return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
-
-            return varying
-        m1, m2, m3 = self.normalized_torque(0.0)
-
-        def constant(time: float, omega: Sequence[float]) -> list[float]:
+        def rates(time: float, omega: Sequence[float]) -> list[float]:
             x, y, z = omega
+            m1, m2, m3 = self.normalized_torque(time) if varies else constant
             return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
 
-        return constant
+        return rates
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:
@@ -395,11 +388,6 @@ def checked_scene(
             raise InputError(FULL_INERTIA)
         return scene
     raise InputError(f"scene is {kind_of(scene)}; it must be a Scene, as case_scene makes one")
-
-
-def _deck(name: str) -> Triple:
-    first, second, third = facts("cases")["deck"][name]
-    return first, second, third
 
 
 def _above_zero(where: str, symbol: str, values: object) -> Triple:

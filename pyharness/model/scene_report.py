@@ -121,17 +121,14 @@ def ending(trajectory: Trajectory) -> str:
             f"stopped at step {stop.step} by {stop.variable}: "
             f"Lipschitz quotient {short(stop.quotient)} ({counts})"
         )
-    if trajectory.ended == "overflow":
-        return f"overflow: the rows end before the first omega that is not finite ({counts})"
-    if trajectory.ended == "singular":
-        return f"singular: {trajectory.reason} ({counts})"
-    if trajectory.ended == "unchecked":
-        return f"unchecked: a short change of the torque may have been passed ({counts})"
-    if trajectory.ended == "event":
-        return f"ended by a terminal event ({counts})"
-    if trajectory.ended == "sensitive":
-        return f"{sensitive(trajectory.growth, trajectory.digits)} ({counts})"
-    return f"complete ({counts})"
+    endings = {
+        "overflow": "overflow: the rows end before the first omega that is not finite",
+        "singular": f"singular: {trajectory.reason}",
+        "unchecked": "unchecked: a short change of the torque may have been passed",
+        "event": "ended by a terminal event",
+        "sensitive": sensitive(trajectory.growth, trajectory.digits),
+    }
+    return f"{endings.get(trajectory.ended, 'complete')} ({counts})"
 
 
 def sensitive(growth: float | None, digits: float | None) -> str:

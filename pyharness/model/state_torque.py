@@ -274,15 +274,11 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
     """Return a torque with the recordable numeric keywords of its function as parameters."""
-    pairs = {
-        each.name: converted(each.default)
+    values = {
+        each.name: value
         for each in signature(function).parameters.values()
         if each.kind is Parameter.KEYWORD_ONLY and type(each.default) is not bool
-    }
-    values = {
-        name: value
-        for name, value in pairs.items()
-        if isinstance(value, float) and math.isfinite(value)
+        if isinstance(value := converted(each.default), float) and math.isfinite(value)
     }
 
     def is_recordable(names: Sequence[str]) -> bool:

@@ -20,6 +20,7 @@ from pyharness.model.tape import (
     Operation,
     Table,
     Tape,
+    exponential,
     slots_of,
 )
 from pyharness.model.values import converted
@@ -264,7 +265,7 @@ class Symbol:
 
     def exp(self) -> "Symbol":
         """Return the exponential."""
-        return self._apply("exp", _exp)
+        return self._apply("exp", exponential)
 
     def sin(self) -> "Symbol":
         """Return the sine."""
@@ -375,21 +376,8 @@ def called_once(
 
 # Functions that evaluate a tape in symbols of a recorder. A constant remains a float.
 SYMBOLS: Functions[Any] = Functions(
-    float,
-    lambda x: np.sqrt(x),
-    lambda x: np.exp(x),
-    lambda x: np.tanh(x),
-    lambda x: np.sin(x),
-    lambda x: np.cos(x),
-    lambda table, time: time.of_table(table),
+    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table)
 )
-
-
-def _exp(x: float) -> float:
-    try:
-        return math.exp(x)
-    except OverflowError:
-        return math.inf  # which the symbol refuses
 
 
 def _without_unused(

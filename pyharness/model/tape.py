@@ -139,7 +139,8 @@ def _sqrt(x: float) -> float:
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
-def _exp(x: float) -> float:
+def exponential(x: float) -> float:
+    """Return exp(x), or infinity if it overflows."""
     try:
         return math.exp(x)
     except OverflowError:
@@ -154,7 +155,7 @@ def _value(table: Table, time: float) -> float:
 
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.
-FLOATS: Functions[float] = Functions(float, _sqrt, _exp, math.tanh, sine, cosine, _value)
+FLOATS: Functions[float] = Functions(float, _sqrt, exponential, math.tanh, sine, cosine, _value)
 # Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
 _LARGE_ARGUMENT = 210.0
 # Replacements for small arguments, by kind.
@@ -190,7 +191,7 @@ def _saturated(kind: str, x: float) -> float:
     if x < -_LARGE_ARGUMENT and kind in _SMALL:
         return _SMALL[kind]
     if not x > _LARGE_ARGUMENT:
-        return _exp(x)
+        return exponential(x)
     if kind == "large":
         return 2.0**1000
     # Numbers differ between arguments, so that a quotient of two exponentials affects the outputs.

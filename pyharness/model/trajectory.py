@@ -3,6 +3,7 @@
 import math
 import textwrap
 from dataclasses import dataclass, field, fields, is_dataclass
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.conversions import Conversions
 from pyharness.model.extension import ENDS
 from pyharness.model.mechanics import turned_to_space as turned_to_space
+from pyharness.model.report import counted, short
 
 if TYPE_CHECKING:
     from pyharness.model.dense_output import DenseOutput
@@ -27,6 +29,7 @@ _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 _WIDTH, _LINES = 100, 10
 _LONGEST = 60  # most characters of one value
+_SHOWN_ROWS = 3  # number of first, and of last, rows in HTML
 
 
 def short_repr(result: Any) -> str:
@@ -184,6 +187,105 @@ class Trajectory(Conversions):
     def has_all_rows(self) -> bool:
         """Whether all requested rows are present."""
         return self.ended in WITH_ALL_ROWS
+
+    @property
+    def t(self) -> Array:
+        """The attribute `time` (s), shape (n,)."""
+        return self.time
+
+    @property
+    def y(self) -> Array:
+        """The state at each time in columns: omega (rad/s), (3, n), or with quaternion, (7, n)."""
+        if self.attitude is None:
+            return self.omega.T
+        return np.concatenate([self.omega.T, self.attitude.T])
+
+    @property
+    def success(self) -> bool:
+        """Whether the integration reached all requested times, or a terminal event."""
+        return self.status >= 0
+
+    @property
+    def status(self) -> int:
+        """The ending as in SciPy: 0 if all times were reached, 1 for a terminal event, else -1."""
+        if self.ended == "event":
+            return 1
+        return 0 if self.has_all_rows else -1
+
+    @property
+    def message(self) -> str:
+        """A sentence that says how the integration ended."""
+        if self.stop is not None:
+            return (
+                f"The Lipschitz test ended the run at step {self.stop.step}, because the Lipschitz "
+                f"quotient of {self.stop.variable} was {short(self.stop.quotient)} 1/s."
+            )
+        if self.ended == "event":
+            return "A terminal event ended the integration; the rows end before it or at it."
+        if self.ended in ("overflow", "singular"):
+            last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
+            reason = self.reason or "omega or the torque became infinite or NaN"
+            return f"{reason[0].upper()}{reason[1:]}; {last}."
+        if self.ended == "unchecked":
+            return (
+                "The integration reached all requested times, but may have passed a short change "
+                "of the torque, whose series ends before."
+            )
+        if self.ended != "sensitive":
+            return "The integration reached all requested times."
+        by = "" if self.growth is None else f", amplified by {short(self.growth)},"
+        left = counted(math.floor(self.digits or 0.0), "correct digit")
+        return (
+            f"The integration reached all requested times, but rounding errors{by} exceed the "
+            f"tolerance; omega has {left}."
+        )
+
+    @property
+    def nfev(self) -> int:
+        """The attribute `evaluations`."""
+        return self.evaluations
+
+    def _repr_html_(self) -> str:
+        facts = {
+            "ended": self.message,
+            "rows": str(len(self.time)),
+            "work": f"{counted(self.steps, 'step')}, "
+            f"{counted(self.evaluations, 'evaluation')} of the right-hand side",
+        }
+        if self.error is not None and self.digits is not None:
+            facts["estimated error"] = f"{short(self.error)} of the largest |omega|"
+            facts["correct digits"] = f"{self.digits:.1f}"
+        if self.growth is not None:
+            facts["error amplification"] = short(self.growth)
+        title = "Trajectory" if self.scene is None else f"Trajectory of {self.scene.name}"
+        lines = [f"<table><caption>{escape(title)}</caption><tbody>"]
+        lines += [
+            f'<tr><th scope="row" style="text-align: left">{escape(name)}</th>'
+            f'<td style="text-align: left">{escape(text)}</td></tr>'
+            for name, text in facts.items()
+        ]
+        return "\n".join([*lines, "</tbody></table>", *self._html_rows()])
+
+    def _html_rows(self) -> list[str]:
+        count = len(self.time)
+        if not count:
+            return []
+        quantities = [each for each in self._quantities() if each.name != "ier"]
+        heads = ["time (s)"]
+        for each in quantities:
+            unit = "" if each.unit == "1" else f" ({each.unit})"
+            heads += [f"{name}{unit}" for name in each.columns]
+        parts = [self.time, *(each.values for each in quantities)]
+        cells = "".join(f'<th scope="col">{escape(head)}</th>' for head in heads)
+        lines = [f"<table><thead><tr>{cells}</tr></thead><tbody>"]
+        kept = list(range(count))
+        if count > 2 * _SHOWN_ROWS + 1:
+            kept = [*range(_SHOWN_ROWS), -1, *range(count - _SHOWN_ROWS, count)]
+        for row in kept:
+            values = np.concatenate([np.atleast_1d(part[row]) for part in parts]).tolist()
+            texts = ["..."] * len(heads) if row < 0 else [f"{value:.6g}" for value in values]
+            lines.append(f"<tr>{''.join(f'<td>{text}</td>' for text in texts)}</tr>")
+        return [*lines, "</tbody></table>"]
 
 
 def digits_left(error: float | None) -> float | None:

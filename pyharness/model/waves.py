@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,27 +39,19 @@ class ExactLaw:
 
     def rotate(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
         """Return the law with its vectors rotated by `turn`."""
-
-        def waves(each: tuple[ExactWave, ...]) -> tuple[ExactWave, ...]:
-            return tuple((turn(amplitude), frequency) for amplitude, frequency in each)
-
-        return ExactLaw(
-            turn(self.constant), turn(self.rate), waves(self.sines), waves(self.cosines), self.frame
-        )
+        return ExactLaw(*self._vectors(turn), self.frame)
 
     def rounded(self) -> TorqueLaw:
         """Return the law in floats; raise InputError if an amplitude overflows."""
+        return TorqueLaw(*self._vectors(_rounded), self.frame)
 
-        def waves(each: tuple[ExactWave, ...]) -> tuple[Wave, ...]:
-            return tuple((_rounded(amplitude), frequency) for amplitude, frequency in each)
-
-        return TorqueLaw(
-            _rounded(self.constant),
-            _rounded(self.rate),
-            waves(self.sines),
-            waves(self.cosines),
-            self.frame,
+    def _vectors(self, function: Callable[[Exact], Any]) -> tuple[Any, Any, Any, Any]:
+        """Return a function of the constant and the rate, and the waves with it of amplitudes."""
+        sines, cosines = (
+            tuple((function(amplitude), frequency) for amplitude, frequency in waves)
+            for waves in (self.sines, self.cosines)
         )
+        return function(self.constant), function(self.rate), sines, cosines
 
 
 def merged(law: TorqueLaw) -> TorqueLaw:
@@ -143,10 +136,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
     if not concerned.any():
         return constant, sines, cosines
     rows = max(map(len, (constant, sines, cosines)))
-    if not sines.size:
-        sines = np.empty((1, 0, 4))
-    if not cosines.size:
-        cosines = np.empty((1, 0, 4))
+    sines, cosines = (each if each.size else np.empty((1, 0, 4)) for each in (sines, cosines))
     constant, sines, cosines = (
         np.array(np.broadcast_to(each, (rows, *each.shape[1:])))
         for each in (constant, sines, cosines)
@@ -154,7 +144,10 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
     for n in np.flatnonzero(np.broadcast_to(concerned, (rows,))):
         if not all(np.isfinite(each[n]).all() for each in (constant, sines, cosines)):
             continue
-        law = _law_of(constant[n], sines[n], cosines[n])
+        of_sines, of_cosines = (
+            [(x[:3], x[3]) for x in each[n].tolist()] for each in (sines, cosines)
+        )
+        law = TorqueLaw(constant[n].tolist(), sines=of_sines, cosines=of_cosines)
         try:
             law = merged(law)
         except InputError:
@@ -181,15 +174,6 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
             sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
             found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
     return found
-
-
-def _law_of(constant: Array, sines: Array, cosines: Array) -> TorqueLaw:
-    first, second, third = constant.tolist()
-    return TorqueLaw((first, second, third), sines=_waves_of(sines), cosines=_waves_of(cosines))
-
-
-def _waves_of(rows: Array) -> list[Wave]:
-    return [((a, b, c), frequency) for a, b, c, frequency in rows.tolist()]
 
 
 def _without_empty(waves: Array) -> Array:

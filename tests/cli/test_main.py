@@ -300,18 +300,18 @@ def test_doctor_fails_if_the_arithmetic_is_not_as_written(
 )
 def test_doctor_sees_that_subnormal_numbers_become_0() -> None:
     """As in a process that has loaded a library linked with -ffast-math."""
-    assert build.installation().arithmetic == build.AS_WRITTEN
+    assert build.installation()["arithmetic"] == build.AS_WRITTEN
     library, kept = ctypes.CDLL("libm.so.6"), ctypes.create_string_buffer(32)
     library.fegetenv(kept)
     changed = ctypes.create_string_buffer(kept.raw, 32)
     changed[29] = bytes([kept.raw[29] | 0x80])  # flush to zero, in the control register of SSE
     library.fesetenv(changed)
     try:
-        found = build.installation().arithmetic
+        found = build.installation()["arithmetic"]
     finally:
         library.fesetenv(kept)
     assert found == "subnormal numbers become 0: a library was linked with -ffast-math"
-    assert build.installation().arithmetic == build.AS_WRITTEN
+    assert build.installation()["arithmetic"] == build.AS_WRITTEN
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -20,4 +20,4 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     found, here = build(), installation()
     shared.show(doctor_report(found, here), options)
-    return int(here.arithmetic != AS_WRITTEN) if found.extension else 3
+    return int(here["arithmetic"] != AS_WRITTEN) if found.extension else 3

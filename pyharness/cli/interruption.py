@@ -13,8 +13,9 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable
+from functools import partial
 from types import FrameType
-from typing import Any, TextIO
+from typing import Any
 
 from pyharness.cli import end_progress, say
 
@@ -87,7 +88,7 @@ def run_interruptible(main: Callable[[], int]) -> int:
     """Run a command; return its exit status, 130 if interrupted."""
     hook, escaped, code = sys.unraisablehook, False, CODE
     try:
-        sys.unraisablehook = _quiet_of(hook)
+        sys.unraisablehook = partial(_report_unraisable, hook)
         warnings.showwarning = _show_warning
         if callable(signal.getsignal(signal.SIGINT)):
             signal.signal(signal.SIGINT, _STATE.interrupt)
@@ -150,24 +151,13 @@ def _is_pending() -> bool:
     return False
 
 
-def _show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
-) -> None:
+def _show_warning(*arguments: Any, **more: Any) -> None:
     # After an interrupt, warnings come from other threads and unfinished work.
     if not came():
-        _SHOW_WARNING(message, category, filename, lineno, file, line)
+        _SHOW_WARNING(*arguments, **more)
 
 
-def _quiet_of(hook: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a hook for unraisable exceptions that ignores KeyboardInterrupt after Ctrl-C."""
-
-    def report_unraisable(unraisable: Any) -> None:
-        if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
-            hook(unraisable)
-
-    return report_unraisable
+def _report_unraisable(hook: Callable[[Any], Any], unraisable: Any) -> None:
+    """Call the hook for unraisable exceptions, except for KeyboardInterrupt after Ctrl-C."""
+    if not (came() and issubclass(unraisable.exc_type, KeyboardInterrupt)):
+        hook(unraisable)

@@ -116,9 +116,7 @@ def chosen_cases(options: argparse.Namespace) -> list[int]:
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
     """Return --tolerance; None for the method's default."""
-    if options.tolerance is None:
-        return None
-    return positive(options.tolerance, "--tolerance", 1.0)
+    return None if options.tolerance is None else positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
@@ -149,18 +147,12 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
     return only
 
 
-def chosen_scene(
-    options: argparse.Namespace,
-    any_axes: bool = False,
-    any_torque: bool = False,
-    any_state: bool = False,
-    changing: bool = False,
-) -> Scene:
+def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     """Return the scene of --case or --scene, with --omega0, --step-size and --steps.
 
-    Warn of impossible moments and of a normalised attitude. Unless allowed by an argument, raise
-    InputError for a full inertia matrix, a torque about the axes of space or dependent on the
-    state, or a changing inertia.
+    Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
+    matrix, a torque about the axes of space or dependent on the state, or a changing inertia,
+    unless `allowed` has the argument of `checked_scene` that accepts it.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -177,7 +169,7 @@ def chosen_scene(
     if getattr(options, "steps", None) is not None:
         changes["steps"] = whole(options.steps, "--steps")
     warn_of_attitude(scene)
-    scene = checked_scene(replace(scene, **changes), any_axes, any_torque, any_state, changing)
+    scene = checked_scene(replace(scene, **changes), **allowed)
     if scene.is_impossible:
         warn("no rigid body has these moments, one exceeds the sum of the others; run all the same")
     return scene
@@ -375,10 +367,12 @@ def show(
     report: Report,
     options: argparse.Namespace,
     own: Mapping[str, Callable[[], str | bytes]] | None = None,
-) -> None:
+    failed: object = False,
+) -> int:
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
     `own` maps formats of this report alone, such as "tape5", to functions that return the content.
+    Return the exit status, 1 if `failed` is true, else 0.
     """
     from pyharness.views.render import render
 
@@ -394,6 +388,7 @@ def show(
     texts = {path: shown(render(report, kind)) for path, kind in also_files(options).items()}
     write_files({path: text.encode() for path, text in texts.items()}, "--also")
     emit(content, options.out)
+    return 1 if failed else 0
 
 
 def emit(content: str | bytes, out: str | None) -> None:

@@ -20,6 +20,18 @@ if TYPE_CHECKING:
     from pyharness.model.trajectory import Trajectory
 
 _SMOOTH = 1000  # points of a line through dense output
+# By attribute: a description, the unit, and the names of the components.
+_QUANTITIES = {
+    "omega": ("angular velocity about the body axes", "rad/s", "omega1 omega2 omega3"),
+    "velocity": (
+        "translational velocity along the body axes",
+        "m/s",
+        "velocity1 velocity2 velocity3",
+    ),
+    "attitude": ("quaternion from body to space", "1", "q0 q1 q2 q3"),
+    "recorded_time": ("time in the output file of the program", "s", "recorded_time"),
+    "ier": ("error code of the linear solver", "1", "ier"),
+}
 
 
 class _Quantity(NamedTuple):
@@ -199,21 +211,9 @@ class Conversions(Mechanics):
         save(cast("Trajectory", self), path)
 
     def _quantities(self) -> list[_Quantity]:
-        about = "angular velocity about the body axes"
-        names = tuple(f"omega{axis}" for axis in (1, 2, 3))
-        found = [_Quantity("omega", about, "rad/s", names, self.omega)]
-        if self.velocity is not None:
-            about = "translational velocity along the body axes"
-            names = tuple(f"velocity{axis}" for axis in (1, 2, 3))
-            found.append(_Quantity("velocity", about, "m/s", names, self.velocity))
-        if self.attitude is not None:
-            about = "quaternion from body to space"
-            names = tuple(f"q{component}" for component in range(4))
-            found.append(_Quantity("attitude", about, "1", names, self.attitude))
-        if not np.array_equal(self.recorded_time, self.time, equal_nan=True):
-            name, about = "recorded_time", "time in the output file of the program"
-            found.append(_Quantity(name, about, "s", (name,), self.recorded_time))
-        if self.ier is not None:
-            about = "error code of the linear solver"
-            found.append(_Quantity("ier", about, "1", ("ier",), self.ier))
-        return found
+        is_late = not np.array_equal(self.recorded_time, self.time, equal_nan=True)
+        return [
+            _Quantity(name, about, unit, tuple(columns.split()), values)
+            for name, (about, unit, columns) in _QUANTITIES.items()
+            if (values := getattr(self, name)) is not None and (is_late or name != "recorded_time")
+        ]

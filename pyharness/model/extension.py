@@ -51,8 +51,5 @@ def _why_missing() -> str:
 
 def columns(waves: tuple[Wave, ...], kind: type = float) -> NDArray[Any]:
     """Return n waves, three amplitudes and a frequency (rad/s), in Fortran order, shape (4, n)."""
-    columns: NDArray[Any] = np.empty((4, len(waves)), dtype=kind, order="F")
-    for index, (amplitude, frequency) in enumerate(waves):
-        columns[:3, index] = amplitude
-        columns[3, index] = frequency
-    return columns
+    rows = [(*amplitude, frequency) for amplitude, frequency in waves]
+    return np.array(rows, dtype=kind).reshape(-1, 4).T

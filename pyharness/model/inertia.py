@@ -106,14 +106,10 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
     first, second, third = (found.values[k] for k in order)
     exact = first, second, third
     rounded = nearest_float(first), nearest_float(second), nearest_float(third)
-    low = (
-        _round_off(first, rounded[0]),
-        _round_off(second, rounded[1]),
-        _round_off(third, rounded[2]),
-    )
+    a, b, c = map(_round_off, exact, rounded)
     columns = np.array([[float(x) for x in axis] for axis in axes]).T
     columns.flags.writeable = False
-    return PrincipalFrame(rounded, low, columns, exact, (axes[0], axes[1], axes[2]))
+    return PrincipalFrame(rounded, (a, b, c), columns, exact, (axes[0], axes[1], axes[2]))
 
 
 def _reverse(axis: Exact) -> Exact:
@@ -154,7 +150,7 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
     For a diagonal matrix they are in the order of its elements.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
-    whole = [[_in_unit(x, exponent) for x in row] for row in matrix]
+    whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]
     size = max(abs(x) for row in whole for x in row).bit_length()
     # The determinant is at least 1 in this unit, and the other eigenvalues are below 3 * 2**size.
     fraction = 2 * size + 4 + _BITS
@@ -202,9 +198,3 @@ def _last_bit(x: float) -> int:
     if denominator > 1:
         return 1 - denominator.bit_length()
     return (numerator & -numerator).bit_length() - 1
-
-
-def _in_unit(x: float, exponent: int) -> int:
-    numerator, denominator = x.as_integer_ratio()
-    shift = exponent + denominator.bit_length() - 1
-    return numerator >> shift if shift >= 0 else numerator << -shift

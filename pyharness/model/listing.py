@@ -86,9 +86,8 @@ class Listing:
         """The kind: `corrected` (none active), `original` (`switches` active), or `custom`."""
         if not self.active:
             return "corrected"
-        return (
-            "original" if self.active - self.readings == set(switches(self.program)) else "custom"
-        )
+        is_original = self.active - self.readings == set(switches(self.program))
+        return "original" if is_original else "custom"
 
     @property
     def active(self) -> frozenset[str]:

@@ -113,19 +113,18 @@ class Mechanics:
         array([-2.      , -0.270671])
         """
         self._checked_moments()
-        torque = self._scene_of_solve().torque
+        torque, omega = self._scene_of_solve().torque, self.omega
         if isinstance(torque, TorqueLaw):
-            values = np.array([torque.at(time) for time in self.time.tolist()]).reshape(-1, 3)
-            along = torque.in_space
-            omega = turned_to_space(self._attitudes(), self.omega) if along else self.omega
+            values = [torque.at(time) for time in self.time.tolist()]
+            if torque.in_space:
+                omega = turned_to_space(self._attitudes(), omega)
         else:
             # A torque that does not depend on the attitude gets any.
             needed = torque.needs_attitude
             attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
             rows = zip(self.time.tolist(), self.omega.tolist(), attitudes.tolist(), strict=True)
-            values = np.array([torque.at(*row) for row in rows]).reshape(-1, 3)
-            omega = self.omega
-        power: Array = (values * omega).sum(axis=1)
+            values = [torque.at(*row) for row in rows]
+        power: Array = (np.array(values).reshape(-1, 3) * omega).sum(axis=1)
         return power
 
     def work(self) -> Array:

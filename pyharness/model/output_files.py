@@ -70,7 +70,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
                     file.keep()
                 for file in files:
                     path = file.path
-                    file.put_in_place()
+                    os.replace(file.new, file.target)
             except BaseException:
                 for file in files:
                     file.undo()
@@ -136,9 +136,6 @@ class _File:
                 import shutil
 
                 shutil.copy2(self.target, self.old)
-
-    def put_in_place(self) -> None:
-        os.replace(self.new, self.target)
 
     def undo(self) -> None:
         if not self.written or os.path.lexists(self.new):

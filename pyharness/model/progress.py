@@ -1,7 +1,7 @@
 """Reports of the progress of a long computation."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
@@ -21,13 +21,12 @@ def no_progress(done: int, total: int, what: str) -> None:
     """Ignore a report of progress."""
 
 
-def bar_of_bodies(is_shown: bool) -> AbstractContextManager[None]:
-    """Show tqdm's progress bar of bodies in this context, if `is_shown`."""
-    return _shown_bar() if is_shown else nullcontext()
-
-
 @contextmanager
-def _shown_bar() -> Iterator[None]:
+def bar_of_bodies(is_shown: bool) -> Iterator[None]:
+    """Show tqdm's progress bar of bodies in this context, if `is_shown`."""
+    if not is_shown:
+        yield
+        return
     from tqdm.auto import tqdm
 
     with tqdm(unit=" bodies", unit_scale=True) as bar:

@@ -14,15 +14,7 @@ from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import (
-    Matrix,
-    Number,
-    Numbers,
-    integer,
-    number,
-    three,
-    three_floats,
-)
+from pyharness.model.values import Matrix, Number, Numbers, integer, number, three, three_floats
 from pyharness.model.values import Triple as Triple
 
 if TYPE_CHECKING:

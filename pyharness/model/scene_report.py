@@ -28,7 +28,10 @@ def heading(scene: Scene) -> list[str]:
     else:
         body = f"A, B, C = {_tuple(scene.euler_coefficients)}"
     unit = "N m" if scene.coefficients is None else "1/s2"
-    torque = _torque(scene, unit)
+    if isinstance(scene.torque, StateTorque):
+        torque = _state_torque(scene.torque, unit)
+    else:
+        torque = "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"
     lines = [
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "
@@ -54,12 +57,6 @@ def _polynomial(coefficients: Sequence[float]) -> str:
             factor = ("", " t", f" t^{power}")[min(power, 2)]
             text += f"{minus if coefficient < 0.0 else plus}{abs(coefficient):g}{factor}"
     return text or "0"
-
-
-def _torque(scene: Scene, unit: str) -> str:
-    if isinstance(scene.torque, StateTorque):
-        return _state_torque(scene.torque, unit)
-    return "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"
 
 
 def _law_phrase(law: TorqueLaw, unit: str) -> str:

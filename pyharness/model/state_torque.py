@@ -87,7 +87,9 @@ class StateTorque:
         Raise InputError if an opaque function does not return three numbers.
         """
         if self.tape is None:
-            return _called(self.function, self.needs_attitude, time, omega, attitude)
+            assert self.function is not None
+            given = [time, np.array(omega)] + ([np.array(attitude)] if self.needs_attitude else [])
+            return three_floats("[torque]", self.function(*given))
         try:
             first, second, third = float_outputs(self.tape, [time, *omega, *attitude])
         except ZeroDivisionError:
@@ -119,7 +121,13 @@ class StateTorque:
                 "can be recorded, or a body with moments"
             )
         old = self.tape
-        return replayed(lambda t, omega, q: axes.T @ torque_of(old, t, axes @ omega, _old(q, axes)))
+        w, x, y, z = quaternion_of_axes(axes)
+
+        def turned(time: Any, omega: Any, attitude: Any) -> Any:
+            own = product(attitude, (w, -x, -y, -z))  # the attitude of the body's old axes
+            return axes.T @ torque_of(old, time, axes @ omega, own)
+
+        return replayed(turned)
 
 
 def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
@@ -358,21 +366,3 @@ def _takes_attitude(function: object) -> bool:
 
 
 _POSITIONAL = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)
-
-
-def _called(
-    function: Function | None,
-    needs_attitude: bool,
-    time: float,
-    omega: Sequence[float],
-    attitude: Sequence[float],
-) -> Triple:
-    assert function is not None
-    given = [time, np.array(omega)] + ([np.array(attitude)] if needs_attitude else [])
-    return three_floats("[torque]", function(*given))
-
-
-def _old(attitude: Any, axes: Array) -> list[Any]:
-    """Return the attitude of the body's old axes, in symbols."""
-    w, x, y, z = quaternion_of_axes(axes)
-    return list(product(tuple(attitude), (w, -x, -y, -z)))

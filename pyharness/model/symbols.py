@@ -7,6 +7,7 @@ change its coefficients. Any other operation has a slot for its result, only one
 import math
 import re
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -65,10 +66,6 @@ class Recorder:
             "controller with memory, set held_torque of a Stepper"
         )
 
-    def number(self, value: float) -> "Symbol":
-        """Return a constant as a symbol."""
-        return Symbol(self, value, {})
-
     def slot(self, operation: Operation) -> int:
         """Return the slot of `operation`, which is recorded if new."""
         if operation not in self._slots:
@@ -101,6 +98,19 @@ class Recorder:
                 f"{self.place}: component {axis} is {number:g}; allowed: a finite number"
             )
         return Linear(number, ())
+
+
+def _of_symbols(
+    operator: Callable[["Symbol", "Symbol"], "Symbol"],
+) -> Callable[["Symbol", Any], "Symbol"]:
+    """Return an operator of a symbol and any real number; NotImplemented for no number."""
+
+    @wraps(operator)
+    def called(self: "Symbol", value: Any) -> "Symbol":
+        other = self._other(value)
+        return NotImplemented if other is None else operator(self, other)
+
+    return called
 
 
 class Symbol:
@@ -148,11 +158,9 @@ class Symbol:
         terms = {slot: factor * each for slot, each in self._terms.items()}
         return Symbol(self.recorder, factor * self._constant, terms)
 
-    def __add__(self, value: Any) -> "Symbol":
+    @_of_symbols
+    def __add__(self, other: "Symbol") -> "Symbol":
         """Return the sum with any real number."""
-        other = self._other(value)
-        if other is None:
-            return NotImplemented
         terms = dict(self._terms)
         for slot, coefficient in other._terms.items():
             total = terms.pop(slot, 0.0) + coefficient
@@ -170,23 +178,18 @@ class Symbol:
         """Return the symbol itself."""
         return self
 
-    def __sub__(self, value: Any) -> "Symbol":
+    @_of_symbols
+    def __sub__(self, other: "Symbol") -> "Symbol":
         """Return the difference from any real number."""
-        other = self._other(value)
-        if other is None:
-            return NotImplemented
-        difference: Symbol = self + -other
-        return difference
+        return self + -other
 
     def __rsub__(self, value: Any) -> "Symbol":
         """Return a real number minus the symbol."""
         return (-self).__add__(value)
 
-    def __mul__(self, value: Any) -> "Symbol":
+    @_of_symbols
+    def __mul__(self, other: "Symbol") -> "Symbol":
         """Record and return the product with any real number."""
-        other = self._other(value)
-        if other is None:
-            return NotImplemented
         if not other._terms:
             return self._scaled(other._constant)
         if not self._terms:
@@ -197,11 +200,9 @@ class Symbol:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, value: Any) -> "Symbol":
+    @_of_symbols
+    def __truediv__(self, other: "Symbol") -> "Symbol":
         """Record and return the quotient; raise InputError for the constant 0."""
-        other = self._other(value)
-        if other is None:
-            return NotImplemented
         if not other._terms:
             if other._constant == 0.0:
                 raise InputError(f"{self.recorder.place}: division by the constant 0")
@@ -218,11 +219,9 @@ class Symbol:
         slot = self.recorder.slot(Operation("quotient", (a, b)))
         return Symbol(self.recorder, 0.0, {slot: factor / divisor})
 
-    def __rtruediv__(self, value: Any) -> "Symbol":
+    @_of_symbols
+    def __rtruediv__(self, other: "Symbol") -> "Symbol":
         """Record and return a number divided by the symbol."""
-        other = self._other(value)
-        if other is None:
-            return NotImplemented
         return other / self
 
     def __pow__(self, power: Any) -> "Symbol":
@@ -234,7 +233,7 @@ class Symbol:
             return self.sqrt()
         if exponent != int(exponent) or abs(exponent) > _MOST_POWER:
             raise self.recorder.refusal(f"the power {exponent:g}")
-        result, square, left = self.recorder.number(1.0), self, abs(int(exponent))
+        result, square, left = Symbol(self.recorder, 1.0, {}), self, abs(int(exponent))
         while left:
             if left % 2:
                 result = result * square
@@ -304,15 +303,11 @@ class Symbol:
         """Return the symbol itself, because it is real."""
         return self
 
-    def __eq__(self, other: object) -> bool:
-        """Refuse a comparison."""
-        raise self.recorder.refusal("a comparison of the state")
-
     def __lt__(self, other: object) -> bool:
         """Refuse a comparison."""
         raise self.recorder.refusal("a comparison of the state")
 
-    __le__ = __gt__ = __ge__ = __lt__
+    __eq__ = __le__ = __gt__ = __ge__ = __lt__
 
     def __bool__(self) -> bool:
         """Refuse the use as a condition."""

@@ -174,28 +174,15 @@ def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
     except InputError:
         if not isinstance(torque, StateTorque) or torque.tape is None:
             raise
-        record["torque"] = tape_record(torque.tape)
+        record["torque"] = _tape_record(torque.tape)
         return record, scene_text(replace(scene, torque=TorqueLaw()), [_TAPED])
 
 
-def tape_record(tape: Tape) -> dict[str, Any]:
-    """Return a tape as a dictionary for JSON."""
-    return {
-        "operations": [_operation_record(each) for each in tape.operations],
-        "outputs": [_linear_record(each) for each in tape.outputs],
-    }
-
-
-def _operation_record(operation: Operation) -> list[Any]:
-    if operation.linear is not None:
-        return [operation.kind, _linear_record(operation.linear)]
-    if operation.table is not None:
-        return [operation.kind, *operation.table]
-    return [operation.kind, operation.operands]
-
-
-def _linear_record(linear: Linear) -> list[Any]:
-    return [linear.constant, linear.terms]
+def _tape_record(tape: Tape) -> dict[str, Any]:
+    operations = []
+    for kind, operands, linear, table in tape.operations:
+        operations.append([kind, *table] if table is not None else [kind, linear or operands])
+    return {"operations": operations, "outputs": tape.outputs}
 
 
 def tape_of(record: Any) -> Tape:

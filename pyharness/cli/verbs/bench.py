@@ -88,8 +88,7 @@ def run(options: argparse.Namespace) -> int:
         Refusal(load, each.name, None, _absent()) for each in missing for load in loads
     )
     packages = sorted({each.package for each in peers()} - {"", "scipy"})
-    shared.show(reports.bench_report(found, packages, _again(options)), options)
-    return 0
+    return shared.show(reports.bench_report(found, packages, _again(options)), options)
 
 
 def _present(
@@ -167,8 +166,7 @@ def _plan_or_growth(options: argparse.Namespace) -> int:
         report = reports.savings_report(savings())
     else:
         report = reports.growth_report({case: growth(case_scene(case)) for case in (3, 4)})
-    shared.show(report, options)
-    return 0
+    return shared.show(report, options)
 
 
 def _ensemble(options: argparse.Namespace) -> int:
@@ -196,8 +194,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.end_progress()
     packages = sorted({each.package for each in those} - {"", "numpy"})
-    shared.show(ensembles.ensemble_report(found, packages, _again(options)), options)
-    return 0
+    return shared.show(ensembles.ensemble_report(found, packages, _again(options)), options)
 
 
 def _terms(options: argparse.Namespace) -> int:
@@ -231,8 +228,7 @@ def _terms(options: argparse.Namespace) -> int:
         Refusal(load, each.name, None, _absent()) for each in missing for load in loads
     )
     found = term_report.Terms(single, many)
-    shared.show(term_report.term_report(found, ["heyoka"], _again(options)), options)
-    return 0
+    return shared.show(term_report.term_report(found, ["heyoka"], _again(options)), options)
 
 
 def _choose_bodies(options: argparse.Namespace, default: int) -> int:

@@ -53,8 +53,7 @@ def run(options: argparse.Namespace) -> int:
     if not any(given):
         cards = chosen(shared.names(options.cards))
         shared.check_outputs(options)
-        shared.show(cards_report(cards), options)
-        return 0
+        return shared.show(cards_report(cards), options)
     kind, *others = _KINDS[given.index(True) :]
     shared.refuse(options, kind, others)
     if options.cards is not None:
@@ -86,8 +85,7 @@ def run(options: argparse.Namespace) -> int:
             digest = sha256(text.encode()).hexdigest()
             report = scan_report(lines, undeclared_, len(expected_lines()), digest)
             failures = lines or undeclared_
-    shared.show(report, options)
-    return 1 if failures else 0
+    return shared.show(report, options, failed=failures)
 
 
 def _text(path: str) -> str:

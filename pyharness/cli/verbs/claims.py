@@ -44,16 +44,14 @@ def run(options: argparse.Namespace) -> int:
     chosen = claims() if options.explain is None else [claim(options.explain)]
     shared.check_outputs(options)
     if options.assignments:
-        shared.show(assignments_report(assignments()), options)
-        return 0
+        return shared.show(assignments_report(assignments()), options)
 
     judgements = []
     for number, entry in enumerate(chosen, 1):
         shared.progress(number - 1, len(chosen), entry["id"])
         judgements.append(judgement(entry["id"], options.word or BINARY64))
     one = options.explain is not None
-    shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
-    return 0
+    return shared.show(explanation(judgements[0]) if one else claims_report(judgements), options)
 
 
 def _evidence(options: argparse.Namespace) -> int:
@@ -66,8 +64,7 @@ def _evidence(options: argparse.Namespace) -> int:
     for combination in evidence():
         found.append(combination)
         shared.progress(len(found), every, "combinations")
-    shared.show(evidence_report(found), options)
-    return 0
+    return shared.show(evidence_report(found), options)
 
 
 def _atlas(options: argparse.Namespace) -> int:

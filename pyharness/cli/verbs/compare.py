@@ -116,5 +116,4 @@ def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) 
     for program in programs:
         own = tuple(name for name in readings if name in names_of("reading", program))
         found[program] = lattice(scene, program, own, effort)
-    shared.show(lattice_report(scene, found), options)
-    return 0
+    return shared.show(lattice_report(scene, found), options)

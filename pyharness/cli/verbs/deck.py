@@ -54,5 +54,4 @@ def run(options: argparse.Namespace) -> int:
         "terms": terms, "listing": listing_record(listing), "lines": lines,
     }  # fmt: skip
     report = Report("deck", [[Line(each) for each in lines]], record=lambda: {"deck": record})
-    shared.show(report, options)
-    return 0
+    return shared.show(report, options)

@@ -5,6 +5,7 @@ import argparse
 from pyharness.cli import options as shared
 from pyharness.history.ablation import effects_of, entries, entry
 from pyharness.history.apparatus_report import apparatus_report, entry_report
+from pyharness.model.report import Report
 
 FORMATS = ("table", "json")
 OPTIONS = {
@@ -23,16 +24,13 @@ def run(options: argparse.Namespace) -> int:
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)
-        shared.show(apparatus_report(listed), options)
-        return 0
+        return shared.show(apparatus_report(listed), options)
     shared.refuse(options, "a name", ("kind",))
     if options.name.rpartition(":")[2].isdigit():
         return _card(options)
-    chosen = entry(options.name)
+    entry(options.name)  # refuses an unknown name
     shared.check_outputs(options)
-    effects = list(effects_of(options.name)) if "flag" in chosen else []
-    shared.show(entry_report(chosen, effects), options)
-    return 0
+    return shared.show(_report(options.name), options)
 
 
 def _card(options: argparse.Namespace) -> int:
@@ -42,15 +40,15 @@ def _card(options: argparse.Namespace) -> int:
     cards = chosen([options.name])
     shared.check_outputs(options)
     names = list(dict.fromkeys(name for card in cards for name in card.entries))
-    reports = [cards_report(cards, "defects")]
-    for name in names:
-        known = entry(name)
-        effects = list(effects_of(name)) if "flag" in known else []
-        reports.append(entry_report(known, effects))
+    reports = [cards_report(cards, "defects"), *map(_report, names)]
     records = [each.record() for each in reports[1:]]
     whole = reports[0]._replace(
         text=[section for each in reports for section in each.text],
         record=lambda: {**reports[0].record(), "entries": records},
     )
-    shared.show(whole, options)
-    return 0
+    return shared.show(whole, options)
+
+
+def _report(name: str) -> Report:
+    known = entry(name)
+    return entry_report(known, list(effects_of(name)) if "flag" in known else [])

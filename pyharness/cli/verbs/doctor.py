@@ -6,9 +6,7 @@ from pyharness.cli import options as shared
 from pyharness.model.build import AS_WRITTEN, build, doctor_report, installation
 
 FORMATS = ("table", "json")
-OPTIONS = {
-    **shared.outputs(FORMATS, plot=""),
-}
+OPTIONS = shared.outputs(FORMATS, plot="")
 EXAMPLE = "doctor"
 
 

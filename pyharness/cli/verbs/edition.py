@@ -49,5 +49,4 @@ def run(options: argparse.Namespace) -> int:
         )
     shared.end_progress()
     write_tree(folder, content, option)
-    shared.show(report, shared.without_out(options))
-    return 0
+    return shared.show(report, shared.without_out(options))

@@ -72,5 +72,4 @@ def _lost(options: argparse.Namespace) -> int:
     shared.check_known("word", options.word, WORD_NAMES)
     shared.check_outputs(options)
     word = options.word or BINARY64
-    shared.show(lost_report(ranked(word), word), options)
-    return 0
+    return shared.show(lost_report(ranked(word), word), options)

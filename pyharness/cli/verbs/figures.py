@@ -35,5 +35,4 @@ def run(options: argparse.Namespace) -> int:
         drawn.append(finding)
     shared.end_progress()
     write_folder(options.out, content, "--out")
-    shared.show(room.figures_report(drawn), shared.without_out(options))
-    return 0
+    return shared.show(room.figures_report(drawn), shared.without_out(options))

@@ -24,5 +24,4 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     found = [limit(program, scene, halvings, effort) for program in programs]
-    shared.show(limits_report(scene, found, invisible(scene)), options)
-    return 0
+    return shared.show(limits_report(scene, found, invisible(scene)), options)

@@ -28,5 +28,4 @@ def run(options: argparse.Namespace) -> int:
     tolerance = shared.chosen_tolerance(options)
     shared.check_outputs(options)
     found = plan(scene, method, tolerance, options.velocity, options.rows)
-    shared.show(plan_report(scene, found), options)
-    return 0
+    return shared.show(plan_report(scene, found), options)

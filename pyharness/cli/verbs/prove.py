@@ -63,8 +63,7 @@ def run(options: argparse.Namespace) -> int:
         text = json.dumps(proof.certificate, separators=(",", ":")) + "\n"
         write_files({options.certificate: text.encode()}, "--certificate")
         found = with_energy(scene, proof.enclosure)
-    shared.show(enclosure_report(scene, digits, found), options)
-    return 0
+    return shared.show(enclosure_report(scene, digits, found), options)
 
 
 def _check(options: argparse.Namespace) -> int:

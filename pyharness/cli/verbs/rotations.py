@@ -28,5 +28,4 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None and scene.moments is None:
         raise InputError("--plot draws the momentum of a body; give a scene with moments")
     shared.check_outputs(options)
-    shared.show(rotations_report(scene, steady_rotations(scene, disturbance)), options)
-    return 0
+    return shared.show(rotations_report(scene, steady_rotations(scene, disturbance)), options)

@@ -53,8 +53,7 @@ def run(options: argparse.Namespace) -> int:
         except InputError as error:
             shared.warn(f"the inputs of what failed are not saved: {error}")
     shown = list(trials.values()) if trials else [trial(name) for name in _chosen(only)]
-    shared.show(stress_report(shown, checks), options)
-    return 1 if failed else 0
+    return shared.show(stress_report(shown, checks), options, failed=failed)
 
 
 def _of_scene(options: argparse.Namespace) -> dict[str, Trial]:

@@ -82,8 +82,7 @@ def run(options: argparse.Namespace) -> int:
             from pyharness.sweep.picture import sweep_picture
 
             report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
-        shared.show(report, shown)
-    return 0
+        return shared.show(report, shown)
 
 
 def _workers(options: argparse.Namespace, executor: str) -> int | None:

@@ -93,10 +93,8 @@ def run(options: argparse.Namespace) -> int:
             raise InputError("there is no golden record here; give --record DIR, or a checkout")
         asked = f"--only {options.only}" if options.only else "--draws 0"
         raise InputError(f"{asked}: there is no such check; allowed: {', '.join(KINDS)}")
-    more = [
-        *(samples(checks, ROUNDING) if options.draws is not None else []),
-        *references(checks),
-    ]
+    drawn = samples(checks, ROUNDING) if options.draws is not None else []
+    more = [*drawn, *references(checks)]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
     shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
     return 0 if all(check.passed for check in checks) else 1

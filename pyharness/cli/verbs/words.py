@@ -12,7 +12,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table
 from pyharness.model.report import words as columns
-from pyharness.thesis.vectors import Answer, answers
+from pyharness.thesis.vectors import answers
 
 FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
@@ -39,20 +39,14 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     lengths = range(LENGTHS[0], LENGTHS[-1] + 1) if options.all else LENGTHS
     found = list(cells(cases, programs, lengths, shared.progress))
-    shared.show(words_report(found), options)
-    return 0
+    return shared.show(words_report(found), options)
 
 
 def _vectors(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     found = answers(options.vectors)
-    first = next((each for each in found if not each.agrees), None)
-    shared.show(_vectors_report(found, first), options)
-    return 0 if first is None else 1
-
-
-def _vectors_report(found: list[Answer], first: Answer | None) -> Report:
     told = [f"{sum(each.agrees for each in found)} of {len(found)} vectors agree"]
+    first = next((each for each in found if not each.agrees), None)
     if first is not None:
         vector = first.vector
         told += [
@@ -65,9 +59,10 @@ def _vectors_report(found: list[Answer], first: Answer | None) -> Report:
     rows = [[*each.vector, each.found, each.agrees] for each in found]
     heads = [*columns("name op x y result found"), Column("agrees")]
     record = [{**each.vector._asdict(), "found": each.found} for each in found]
-    return Report(
+    report = Report(
         "words",
         text=[told],
         record=lambda: {"vectors": record, "passed": first is None},
         data=Table(heads, rows),
     )
+    return shared.show(report, options, failed=first is not None)

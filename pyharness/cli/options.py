@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -353,9 +354,12 @@ def check_outputs(options: argparse.Namespace) -> None:
     if options.out is not None:
         check_writable(options.out, "--out")
         if picture is not None:
-            from pyharness.cli.output import check_apart
-
-            check_apart(picture, options.out)
+            for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
+                if os.path.realpath(path) == os.path.realpath(options.out):
+                    raise InputError(
+                        f"--out '{options.out}': --plot '{picture}' writes {what} to this file; "
+                        "give another name"
+                    )
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:

@@ -13,18 +13,8 @@ from pyharness.model.errors import InputError
 from pyharness.model.output_files import DeferredInterrupt, check_writable, write_files
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
-from pyharness.views.pictures import numbers_beside
 
 _LARGEST_MARK = 1 << 24  # bytes of the file that lists the files written by a verb
-
-
-def check_apart(picture: str, out: str) -> None:
-    """Raise InputError if --out is the picture of --plot or its CSV file."""
-    for path, what in ((picture, "the picture"), (numbers_beside(picture), "its numbers")):
-        if os.path.realpath(path) == os.path.realpath(out):
-            raise InputError(
-                f"--out '{out}': --plot '{picture}' writes {what} to this file; give another name"
-            )
 
 
 def check_folder(path: str, names: Iterable[str], option: str) -> None:

@@ -39,8 +39,7 @@ from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import extension
-from pyharness.model.pieces import for_each_piece
-from pyharness.model.progress import bar_of_bodies, expect_bodies
+from pyharness.model.progress import bar_of_bodies, expect_bodies, for_each_piece
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, boolean, finite

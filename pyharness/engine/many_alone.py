@@ -19,7 +19,7 @@ from pyharness.model.arrays import count_bodies, rows_of
 from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
-from pyharness.model.pieces import for_each_piece
+from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError
-from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list
+from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list, triple
 
 Polynomial = tuple[float, ...]  # coefficients in ascending powers of time
 # Largest number of coefficients. Higher powers of time have no physical use, and lose digits.
@@ -224,8 +224,7 @@ class ChangingInertia(Changing):
 
     def at(self, time: float) -> Matrix:
         """Return the inertia matrix (kg m2) at `time` (s)."""
-        first, second, third = ((x, y, z) for x, y, z in self.matrix(float(time)))
-        return first, second, third
+        return triple(triple(row) for row in self.matrix(float(time)))
 
 
 def _items(where: str, values: object, most: int, allowed: str) -> list[Any]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pyharness.model.errors import InputError
 from pyharness.model.values import Matrix as Matrix
-from pyharness.model.values import Triple, converted, number_list, three
+from pyharness.model.values import Triple, converted, number_list, three, triple
 
 Exact = tuple[Fraction, Fraction, Fraction]
 Array = NDArray[np.float64]
@@ -48,11 +48,10 @@ class PrincipalFrame:
 
     def into(self, vector: Exact) -> Exact:
         """Return the exact components of a vector about the principal axes."""
-        first, second, third = (
+        return triple(
             sum((x * v for x, v in zip(axis, vector, strict=True)), Fraction(0))
             for axis in self.exact_axes
         )
-        return first, second, third
 
 
 def checked_inertia(where: str, values: object) -> Matrix:
@@ -85,35 +84,33 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
                     f"row {j + 1} column {i + 1} is {given[j][i]:g}; allowed: equal numbers"
                 )
     half = [[0.5 * given[i][j] + 0.5 * given[j][i] for j in range(3)] for i in range(3)]
-    (a, b, c), (d, e, f), (g, h, k) = half
-    return (a, b, c), (d, e, f), (g, h, k)
+    return triple(triple(row) for row in half)
 
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
     """Return the principal frame; moments are unsorted, each accurate to its last digit."""
-    found = diagonalised(inertia)
+    values, vectors = diagonalised(inertia)
     order: list[int] = []
     # Each body axis gets the nearest remaining eigenvector.
     for row in range(3):
         left = [k for k in range(3) if k not in order]
-        order.append(max(left, key=lambda k: abs(found.vectors[k][row])))
-    axes = [found.vectors[k] for k in order]
+        order.append(max(left, key=lambda k: abs(vectors[k][row])))
+    axes = [vectors[k] for k in order]
     axes = [_reverse(axis) if axis[n] < 0 else axis for n, axis in enumerate(axes)]
     if _determinant(axes) < 0:
         least = min(range(3), key=lambda n: abs(axes[n][n]))
         axes[least] = _reverse(axes[least])
-    first, second, third = (found.values[k] for k in order)
-    exact = first, second, third
-    rounded = nearest_float(first), nearest_float(second), nearest_float(third)
-    a, b, c = map(_round_off, exact, rounded)
+    exact = triple(values[k] for k in order)
+    rounded = triple(map(nearest_float, exact))
+    low = triple(map(_round_off, exact, rounded))
     columns = np.array([[float(x) for x in axis] for axis in axes]).T
     columns.flags.writeable = False
-    return PrincipalFrame(rounded, (a, b, c), columns, exact, (axes[0], axes[1], axes[2]))
+    return PrincipalFrame(rounded, low, columns, exact, triple(axes))
 
 
 def _reverse(axis: Exact) -> Exact:
-    return -axis[0], -axis[1], -axis[2]
+    return triple(-x for x in axis)
 
 
 def _determinant(axes: list[Exact]) -> float:
@@ -133,21 +130,13 @@ def _round_off(value: Fraction, rounded: float) -> float:
     return float(value - Fraction(rounded)) if math.isfinite(rounded) else 0.0
 
 
-@dataclass(frozen=True)
-class Diagonal:
-    """The eigenvalues of a symmetric matrix, and orthonormal eigenvectors `vectors[k]`.
+def diagonalised(
+    matrix: tuple[tuple[float, float, float], ...],
+) -> tuple[Exact, tuple[Exact, Exact, Exact]]:
+    """Return the eigenvalues and orthonormal eigenvectors by Jacobi's method in integers.
 
-    They are fractions with relative errors of at most 2**-100; a zero eigenvalue is exactly 0.
-    """
-
-    values: Exact
-    vectors: tuple[Exact, Exact, Exact]
-
-
-def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
-    """Return the eigenvalues and eigenvectors by Jacobi's method in integers.
-
-    For a diagonal matrix they are in the order of its elements.
+    They are fractions with relative errors of at most 2**-100; a zero eigenvalue is exactly 0. For
+    a diagonal matrix they are in the order of its elements.
     """
     exponent = min((_last_bit(x) for row in matrix for x in row if x), default=0)
     whole = [[int(Fraction(x) / Fraction(2) ** exponent) for x in row] for row in matrix]
@@ -163,12 +152,11 @@ def diagonalised(matrix: tuple[tuple[float, float, float], ...]) -> Diagonal:
             break
         _rotate(a, vectors, p, q, bits)
     unit = Fraction(2) ** (exponent - fraction)
-    first, second, third = (
+    values = triple(
         a[k][k] * unit if abs(a[k][k]) >> (_BITS // 2) else Fraction(0) for k in range(3)
     )
     one = Fraction(1, 1 << bits)
-    x, y, z = ((v[0] * one, v[1] * one, v[2] * one) for v in vectors)
-    return Diagonal((first, second, third), (x, y, z))
+    return values, triple(triple(x * one for x in vector) for vector in vectors)
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:

@@ -11,6 +11,7 @@ from pyharness.model.inertia import Exact, PrincipalFrame, nearest_float, princi
 from pyharness.model.scene import Scene, Triple, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.values import triple
 from pyharness.model.waves import exact_law
 
 
@@ -28,16 +29,13 @@ class PrincipalScene(Scene):
     def exact_moments(self) -> Exact:
         """The sums of `moments` and `moments_low` (kg m2) as exact fractions."""
         pairs = zip(self.moments or (), self.moments_low, strict=True)
-        first, second, third = (Fraction(high) + Fraction(low) for high, low in pairs)
-        return first, second, third
+        return triple(Fraction(high) + Fraction(low) for high, low in pairs)
 
     @cached_property
     def euler_coefficients(self) -> Triple:
         """The coefficients A, B, C from `exact_moments`, each rounded once."""
         i1, i2, i3 = self.exact_moments
-        exact = (i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3
-        a, b, c = map(nearest_float, exact)
-        return a, b, c
+        return triple(map(nearest_float, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)))
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
@@ -127,9 +125,7 @@ def _attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:
 
 
 def _rotate(frame: PrincipalFrame, vector: Triple) -> Triple:
-    first, second, third = map(Fraction, vector)
-    x, y, z = map(float, frame.into((first, second, third)))
-    return x, y, z
+    return triple(map(float, frame.into(triple(map(Fraction, vector)))))
 
 
 def axes_and_turn(scene: Scene) -> tuple[Array, Quaternion]:

@@ -1,9 +1,13 @@
-"""Reports of the progress of a long computation."""
+"""Reports of the progress of long computations, and the division of many bodies among threads."""
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.values import boolean
 
@@ -13,6 +17,12 @@ Progress = Callable[[int, int, str], None]
 Its arguments are the numbers of completed parts and of all, and the name of the next part.
 """
 
+# Most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
+_PIECE = 1 << 18
+# Fewest bodies per thread. With fewer, a further thread costs more time than it saves.
+_SMALL = 256
+# Fewest pieces with a progress bar.
+_REPORTS = 100
 # None if no bar was requested.
 _bar: ContextVar[Any] = ContextVar("bar", default=None)
 
@@ -35,11 +45,6 @@ def bar_of_bodies(is_shown: bool) -> Iterator[None]:
             yield
         finally:
             _bar.reset(token)
-
-
-def has_bar() -> bool:
-    """Return whether a progress bar of bodies is shown."""
-    return _bar.get() is not None
 
 
 def expect_bodies(n: int) -> None:
@@ -73,3 +78,48 @@ def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
                 bar.update(done - bar.n)
 
             yield show
+
+
+def share(
+    work: Callable[[slice], None],
+    pieces: Sequence[slice],
+    threads: int,
+    given_up: NDArray[np.int32],
+) -> None:
+    """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
+
+    After an exception, as by Ctrl-C, `given_up[0]` is 1; kernels poll it and return.
+    """
+    if threads == 1 or len(pieces) < 2:
+        # Only the main thread receives signals; this is usually the calling one.
+        for piece in pieces:
+            work(piece)
+            count_done(piece.stop - piece.start)
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(min(threads, len(pieces))) as pool:
+        jobs = [pool.submit(work, piece) for piece in pieces]
+        try:
+            for job, piece in zip(jobs, pieces, strict=True):
+                job.result()
+                count_done(piece.stop - piece.start)
+        except BaseException:
+            # Only the main thread receives signals; the others poll this number.
+            given_up[0] = 1
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
+    """Call `work` in threads for pieces of nearly equal size, with `given_up` of `share`."""
+    if not n:
+        return
+    given_up = np.zeros(1, dtype=np.int32)
+    count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
+    if _bar.get() is not None:
+        expect_bodies(n)
+        count = max(count, min(_REPORTS, n))
+    ends = [n * piece // count for piece in range(count + 1)]
+    pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
+    share(lambda piece: work(piece, given_up), pieces, threads, given_up)

@@ -14,7 +14,16 @@ from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
-from pyharness.model.values import Matrix, Number, Numbers, integer, number, three, three_floats
+from pyharness.model.values import (
+    Matrix,
+    Number,
+    Numbers,
+    integer,
+    number,
+    three,
+    three_floats,
+    triple,
+)
 from pyharness.model.values import Triple as Triple
 
 if TYPE_CHECKING:
@@ -258,8 +267,7 @@ class Scene:
         # Imported only here, because the programs need no exact numbers.
         from fractions import Fraction
 
-        first, second, third = map(Fraction, self.moments)
-        return first, second, third
+        return triple(map(Fraction, self.moments))
 
     @property
     def moments_low(self) -> Triple:

@@ -15,7 +15,7 @@ from pyharness.model.errors import InputError, kind_of
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
 from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
-from pyharness.model.values import Triple, converted, three_floats
+from pyharness.model.values import Triple, converted, three_floats, triple
 
 Function = Callable[..., Any]
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
@@ -91,10 +91,9 @@ class StateTorque:
             given = [time, np.array(omega)] + ([np.array(attitude)] if self.needs_attitude else [])
             return three_floats("[torque]", self.function(*given))
         try:
-            first, second, third = float_outputs(self.tape, [time, *omega, *attitude])
+            return triple(float_outputs(self.tape, [time, *omega, *attitude]))
         except ZeroDivisionError:
             return math.nan, math.nan, math.nan
-        return first, second, third
 
     def __add__(self, other: "StateTorque | TorqueLaw | Function | int") -> "StateTorque":
         """Return the sum with a torque, law, function, or 0 (for ``sum``); none may be opaque."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pyharness.model.array_type import Array as Array
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.conversions import Conversions
+from pyharness.model.conversions import turned_to_space as turned_to_space
 from pyharness.model.extension import ENDS
-from pyharness.model.mechanics import turned_to_space as turned_to_space
 from pyharness.model.report import counted, short
 
 if TYPE_CHECKING:

@@ -91,8 +91,7 @@ def file_content(found: "Trajectory") -> bytes:
     header |= {name: int(getattr(found, name)) for name in ("steps", "evaluations")}
     header["stop"] = None if found.stop is None else asdict(found.stop)
     header["moments"] = _moments_record(found.moments)
-    header[SENSITIVITIES] = None
-    header["scene"] = None
+    header |= {SENSITIVITIES: None, "scene": None}
     arrays: dict[str, Any] = {}
     if found.scene is not None:
         header["scene"], arrays["scene"] = _scene_record(found.scene)

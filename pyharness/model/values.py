@@ -7,10 +7,11 @@ import itertools
 import math
 import operator
 from collections.abc import Iterable, Mapping, Set
-from typing import SupportsFloat, SupportsIndex
+from typing import SupportsFloat, SupportsIndex, TypeVar
 
 from pyharness.model.errors import InputError, kind_of
 
+T = TypeVar("T")
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
 # A number that float() converts: int, Fraction, Decimal, a NumPy scalar; text is excluded.
@@ -22,6 +23,12 @@ _TOO_LARGE = "a number too large for binary64"
 # The kinds of NumPy data that are real numbers.
 _REAL = "iuf"
 _THREE_FLOATS = [float, float, float]
+
+
+def triple(values: Iterable[T]) -> tuple[T, T, T]:
+    """Return three values as a tuple."""
+    first, second, third = values
+    return first, second, third
 
 
 def number(where: str, value: object) -> float:
@@ -92,8 +99,7 @@ def three_floats(where: str, values: object) -> Triple:
     if len(found) != 3:
         count = "more than 3" if len(found) > 3 else str(len(found))
         raise InputError(f"{where}: {count} number{'s' * (count != '1')}; {allowed}")
-    first, second, third = (number(where, each) for each in found)
-    return first, second, third
+    return triple(number(where, each) for each in found)
 
 
 def finite(where: str, value: object) -> float:

@@ -20,7 +20,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.inertia import Exact
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw, Wave
-from pyharness.model.values import Triple
+from pyharness.model.values import Triple, triple
 
 ExactWave = tuple[Exact, float]
 
@@ -71,7 +71,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 def exact_law(law: TorqueLaw) -> ExactLaw:
     """Return a merged torque law in exact fractions."""
-    constant = _exact(law.constant)
+    constant = triple(map(Fraction, law.constant))
     cosines = _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
     for amplitude, frequency in cosines:
@@ -79,7 +79,7 @@ def exact_law(law: TorqueLaw) -> ExactLaw:
             constant = _sum(constant, amplitude)
     return ExactLaw(
         constant,
-        _exact(law.rate),
+        triple(map(Fraction, law.rate)),
         tuple(wave for wave in _summed(law.sines, even=False) if wave[1] != 0.0),
         tuple(wave for wave in cosines if wave[1] != 0.0),
         law.frame,
@@ -90,17 +90,12 @@ def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
     """Return the nonzero sums of waves (cosines if `even`) of the same absolute frequency."""
     found: dict[float, tuple[float, Exact]] = {}
     for amplitude, frequency in waves:
-        exact = _exact(amplitude)
+        exact = triple(map(Fraction, amplitude))
         first, total = found.get(abs(frequency), (frequency, _ZERO))
         if not even and first != frequency:
-            exact = -exact[0], -exact[1], -exact[2]
+            exact = triple(-x for x in exact)
         found[abs(frequency)] = first, _sum(total, exact)
     return [(total, frequency) for frequency, total in found.values() if any(total)]
-
-
-def _exact(values: Triple) -> Exact:
-    first, second, third = map(Fraction, values)
-    return first, second, third
 
 
 def _sum(x: Exact, y: Exact) -> Exact:
@@ -109,13 +104,12 @@ def _sum(x: Exact, y: Exact) -> Exact:
 
 def _rounded(values: Exact) -> Triple:
     try:
-        first, second, third = map(float, values)
+        return triple(map(float, values))
     except OverflowError:
         raise InputError(
             "[torque]: the sum of waves of one frequency overflows; allowed: "
             f"amplitudes up to {math.ldexp(1.0, 1023):.2g} N m together"
         ) from None
-    return first, second, third
 
 
 def with_merged_waves(scene: Scene) -> Scene:

@@ -22,8 +22,7 @@ from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
 from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
-from pyharness.model.pieces import share
-from pyharness.model.progress import bar_of_bodies, expect_bodies
+from pyharness.model.progress import bar_of_bodies, expect_bodies, share
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Array, BatchResult
 from pyharness.model.values import Number, boolean, integer, number_list

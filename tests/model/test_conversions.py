@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import InputError, Scene, case_scene, run_program, solve, subset
-from pyharness.model import conversions, mechanics, trajectory
+from pyharness.model import conversions, trajectory
 from pyharness.model.trajectory import Trajectory
 
 TIMES = [0.5, 1.0, 2.0]
@@ -218,7 +218,7 @@ def test_notebook_shows_few_rows_in_full(count: int, shown: int) -> None:
 
 
 def test_examples_in_the_docstrings_run() -> None:
-    for each in (conversions, mechanics, trajectory):
+    for each in (conversions, trajectory):
         result = doctest.testmod(each)
         assert (result.attempted >= 2, result.failed) == (True, 0)
 

@@ -44,24 +44,24 @@ def _drawn(source: random.Random) -> Matrix:
     ],
 )
 def test_each_eigenvalue_is_good_to_its_own_size(matrix: Matrix) -> None:
-    found = diagonalised(matrix)
+    values, vectors = diagonalised(matrix)
     exact = [[Fraction(x) for x in row] for row in matrix]
-    least = min(map(abs, found.values))
-    for value, vector in zip(found.values, found.vectors, strict=True):
+    least = min(map(abs, values))
+    for value, vector in zip(values, vectors, strict=True):
         for row, x in zip(exact, vector, strict=True):
             rest = sum((a * v for a, v in zip(row, vector, strict=True)), -value * x)
             # For a symmetric matrix, `value` is at most this far from an eigenvalue.
             assert abs(rest) <= _ACCURATE * least
     for i, j in itertools.product(range(3), repeat=2):
-        pairs = zip(found.vectors[i], found.vectors[j], strict=True)
+        pairs = zip(vectors[i], vectors[j], strict=True)
         product = sum((x * y for x, y in pairs), Fraction(0))
         assert abs(product - (i == j)) <= _ACCURATE
 
 
 def test_a_diagonal_matrix_is_returned_as_it_is() -> None:
-    found = diagonalised(_symmetric(3.0, 0.0, 0.0, 1e-300, 0.0, 2e300))
-    assert found.values == (Fraction(3), Fraction(1e-300), Fraction(2e300))
-    assert [list(map(float, each)) for each in found.vectors] == np.eye(3).tolist()
+    values, vectors = diagonalised(_symmetric(3.0, 0.0, 0.0, 1e-300, 0.0, 2e300))
+    assert values == (Fraction(3), Fraction(1e-300), Fraction(2e300))
+    assert [list(map(float, each)) for each in vectors] == np.eye(3).tolist()
 
 
 def test_the_moments_are_rounded_to_nearest_and_the_axes_are_a_frame() -> None:

@@ -85,8 +85,7 @@ def installation() -> dict[str, Any]:
         "installer": _installer(),
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1,
-        "instructions": _instructions(),
-        "arithmetic": _arithmetic(),
+        **_ask_kernels(),
         "packages": {name: _version(name) for name in (*REQUIRED, *OPTIONAL)},
         "environment": {name: os.environ[name] for name in INFLUENCES if name in os.environ},
     }
@@ -105,28 +104,21 @@ def _installer() -> str:
     return f"{name}, editable" if origin.get("dir_info", {}).get("editable") else name
 
 
-def _instructions() -> str | None:
-    """Return the best instruction set that both the build and the processor support."""
+def _ask_kernels() -> dict[str, str | None]:
+    """Return the best instruction set of both build and processor, and the faults of arithmetic."""
     try:
-        from pyharness._kernels import choose_instructions
+        from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:
-        return None
+        return {"instructions": None, "arithmetic": None}
     # Loading the extension chooses the best set; this call repeats the choice.
-    return _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
-
-
-def _arithmetic() -> str | None:
-    try:
-        from pyharness._kernels import arithmetic_faults
-    except ImportError:
-        return None
+    instructions = _LEVELS[int(choose_instructions(len(_LEVELS) - 1))]
     is_changed, is_flushed = arithmetic_faults((5.0, 0.0, float("nan"), sys.float_info.min))
     faults = []
     if is_changed:
         faults.append("results may be wrong: built with an option such as -Ofast; build without")
     if is_flushed:
         faults.append("subnormal numbers become 0: a library was linked with -ffast-math")
-    return "; ".join(faults) or AS_WRITTEN
+    return {"instructions": instructions, "arithmetic": "; ".join(faults) or AS_WRITTEN}
 
 
 def machine(packages: Iterable[str]) -> dict[str, str]:

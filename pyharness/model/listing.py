@@ -77,9 +77,7 @@ class Listing:
         for kind, field in _FIELDS.items():
             names = given[field]
             object.__setattr__(self, field, names)
-            for name in sorted(names):
-                if name not in names_of(kind, self.program):
-                    raise _foreign(kind, name, self.program)
+            _check_names(kind, names, self.program)
 
     @property
     def label(self) -> str:
@@ -208,9 +206,7 @@ def subset(
         ("--reading", "reading", chosen),
         ("--conjecture", "conjecture", assumed or frozenset()),
     ):
-        allowed = switchable(program) if kind == "defect" else names_of(kind, program)
-        for name in sorted(names - set(allowed)):
-            raise _foreign(kind, name, program, option)
+        _check_names(kind, names, program, option)
     if base is None:
         base = "corrected" if kept and not fixed else "original"
     if not isinstance(base, str) or base not in ("original", "corrected"):
@@ -243,13 +239,12 @@ def _names(where: str, names: object) -> frozenset[str]:
     return frozenset(found)
 
 
-def _foreign(kind: str, name: str, program: str, where: str = "") -> InputError:
+def _check_names(kind: str, names: frozenset[str], program: str, where: str = "") -> None:
     every, own = names_of(kind), names_of(kind, program)
     if where in ("--fix", "--keep"):
         every, own = switchable(), switchable(program)
-    if name in every:
-        place = f"{where}: " if where else ""
-        return InputError(
-            f"{place}program {program} has no {kind} '{name}'; allowed: {', '.join(own) or 'none'}"
-        )
-    return unknown(kind, name, own, where)
+    for name in sorted(names - {*own}):
+        if name not in every:
+            raise unknown(kind, name, own, where)
+        place, allowed = f"{where}: " if where else "", ", ".join(own) or "none"
+        raise InputError(f"{place}program {program} has no {kind} '{name}'; allowed: {allowed}")

@@ -4,6 +4,7 @@ import argparse
 import json
 
 from pyharness.cli import options as shared
+from pyharness.model.output_files import check_writable, write_files
 from pyharness.truth.certificate import prove
 from pyharness.truth.certificate_checker import check_file
 from pyharness.truth.enclosed import with_energy
@@ -55,8 +56,6 @@ def run(options: argparse.Namespace) -> int:
             progress=shared.progress,
         )
     else:
-        from pyharness.model.output_files import check_writable, write_files
-
         shared.refuse(options, "--certificate", ("velocity", "transition"))
         check_writable(options.certificate, "--certificate")
         proof = prove(scene, times, digits, effort, shared.progress)

@@ -9,6 +9,7 @@ from pyharness.engine.report import trajectory_report
 from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import (
@@ -168,28 +169,22 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
     if options.animate is not None:
-        _check_animation(options, scene)
+        from pyharness.engine.attitude_picture import animation, check_animation
+        from pyharness.views.pictures import check_matplotlib
+
+        if options.attitude is None:
+            raise InputError(
+                "--animate needs an attitude; request one, as in --attitude quaternion"
+            )
+        check_animation(options.animate, scene)
+        check_matplotlib("--animate")
+        check_writable(options.animate, "--animate")
     effort, attitude = shared.chosen_effort(options), options.attitude is not None
     trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
     if options.animate is not None:
-        from pyharness.engine.attitude_picture import animation
-        from pyharness.model.output_files import write_files
-
         moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
         write_files({options.animate: moving}, "--animate")
     title = f"method {name}: {METHODS[name].title}"
     if trajectory.tolerance is not None:
         title += f", tolerance {trajectory.tolerance:g}"
     return name, title, trajectory
-
-
-def _check_animation(options: argparse.Namespace, scene: Scene) -> None:
-    from pyharness.engine.attitude_picture import check_animation
-    from pyharness.model.output_files import check_writable
-    from pyharness.views.pictures import check_matplotlib
-
-    if options.attitude is None:
-        raise InputError("--animate needs an attitude; request one, as in --attitude quaternion")
-    check_animation(options.animate, scene)
-    check_matplotlib("--animate")
-    check_writable(options.animate, "--animate")

@@ -23,7 +23,7 @@ _SUBMODULES = {
     "model.trajectory": ("Stop", "Trajectory"),
     "thesis.many": ("ProgramEnsemble", "run_many"),
     "thesis.programs": ("run_program",),
-    "model.batch_result": ("Ensemble",),
+    "model.ensemble": ("Ensemble",),
     "engine.many": ("solve_many",),
     "engine.prepared": ("prepare",),
     "engine.compiled_call": ("get_include",),

@@ -15,10 +15,10 @@ from pyharness.engine.solver import Solver as Solver
 from pyharness.engine.stepper import Stepper as Stepper
 from pyharness.engine.taylor_ivp import Taylor as Taylor
 from pyharness.engine.trajectory_reader import load as load
-from pyharness.model.batch_result import Ensemble as Ensemble
 from pyharness.model.changing import ChangingInertia as ChangingInertia
 from pyharness.model.changing import ChangingMoments as ChangingMoments
 from pyharness.model.dense_output import DenseOutput as DenseOutput
+from pyharness.model.ensemble import Ensemble as Ensemble
 from pyharness.model.errors import InputError as InputError
 from pyharness.model.errors import NotBuiltError as NotBuiltError
 from pyharness.model.listing import Listing as Listing

@@ -34,9 +34,9 @@ from pyharness.model.arrays import (
     threads_of,
 )
 from pyharness.model.attitude import scalar_first
-from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
+from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.extension import extension
 from pyharness.model.progress import bar_of_bodies, expect_bodies, for_each_piece

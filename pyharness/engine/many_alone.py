@@ -16,8 +16,8 @@ from pyharness.engine.many_scenes import rows_of_bodies, scene_of_row
 from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import check_prepared, check_torque
 from pyharness.model.arrays import count_bodies, rows_of
-from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Statuses
+from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene, Triple

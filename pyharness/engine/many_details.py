@@ -12,7 +12,7 @@ from pyharness.engine.parameter_sensitivity import checked_names
 from pyharness.engine.registry import requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.model.arrays import only_one, row_of, rows_of, unit_quaternions
-from pyharness.model.batch_result import Ensemble
+from pyharness.model.ensemble import Ensemble
 from pyharness.model.errors import InputError
 from pyharness.model.progress import count_done, expect_bodies
 from pyharness.model.scene import Scene

@@ -16,12 +16,12 @@ from pyharness.model.arrays import (
     unit_quaternions,
 )
 from pyharness.model.attitude import IDENTITY, product, scalar_first
-from pyharness.model.batch_result import Ensemble, place_for
 from pyharness.model.codes import Methods, Places, Statuses
+from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, extension
-from pyharness.model.progress import for_each_piece
 from pyharness.model.principal import axes_and_turn
+from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 

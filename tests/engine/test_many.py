@@ -15,8 +15,8 @@ from pyharness.engine import many_scenes
 from pyharness.engine.problem import normalized
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.engine.solver import CODES, PREPARED
-from pyharness.model.batch_result import Ensemble
 from pyharness.model.codes import Methods, Statuses
+from pyharness.model.ensemble import Ensemble
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing
 from pyharness.model.trajectory import Array

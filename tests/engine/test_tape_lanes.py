@@ -12,7 +12,7 @@ from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.many_prepared import solve_side_by_side
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
-from pyharness.model.batch_result import Ensemble
+from pyharness.model.ensemble import Ensemble
 
 MOMENTS = (1.0, 2.0, 2.5)
 

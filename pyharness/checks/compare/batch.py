@@ -14,8 +14,8 @@ from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, req
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, product
-from pyharness.model.batch_result import Ensemble
 from pyharness.model.codes import Statuses
+from pyharness.model.ensemble import Ensemble
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS
 from pyharness.model.listing import Listing

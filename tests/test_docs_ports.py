@@ -77,5 +77,6 @@ def test_the_guide_names_every_input_and_option() -> None:
     inputs = re.findall(r"^  (\w+):\n    description", action, re.MULTILINE)
     assert len(inputs) == 5
     assert all(f"| `{name}` | " in GUIDE for name in inputs)
-    readme = (TEMPLATE / "README.md").read_text()
-    assert all(f"| `{name}` | " in readme for name in ("port.c", "Makefile"))
+    for name in ("port.c", "Makefile", ".github/workflows/verify.yml"):
+        assert (TEMPLATE / name).is_file()
+        assert f"| `{name}` | " in GUIDE

@@ -168,8 +168,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q about each middle axis, divided by the spin.
 
-    Q is the fastest rate of equation 32. `first` and `third` are Smelt's numbers K1 = A and K3 =
-    -C, from -1 to 1.
+    Q is the fastest rate of equation 32. `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
     """
     a, c = first, -third
     # Coefficients of a body satisfy A + B + C + ABC = 0. At two corners of the square of K1 and K3,

@@ -51,8 +51,7 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
 
 
 def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
-    from pyharness.checks.plants.port_plants import PLANTS
-    from pyharness.checks.plants.port_self_test import self_test
+    from pyharness.checks.plants.port_plants import PLANTS, self_test
 
     command = options.port
     title = [f"{command}: faults planted in its answers"]

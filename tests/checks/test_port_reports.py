@@ -11,8 +11,7 @@ from jsonschema import Draft202012Validator
 
 from pyharness import run_program
 from pyharness.checks.plants.outcome import CONTROL
-from pyharness.checks.plants.port_plants import PLANTS
-from pyharness.checks.plants.port_self_test import self_test
+from pyharness.checks.plants.port_plants import PLANTS, self_test
 from pyharness.checks.port import Cell, compared, port_cells, random_cells
 from pyharness.checks.port_protocol import VARIABLES
 from pyharness.cli.main import main
@@ -142,7 +141,7 @@ def test_a_check_that_sees_nothing_would_fail_the_self_test(
         right = {**json.loads(line), "rows": rows}
         return compared(cell, twin, json.dumps(right).encode(), *rest)
 
-    monkeypatch.setattr("pyharness.checks.plants.port_self_test.compared", blind)
+    monkeypatch.setattr("pyharness.checks.plants.port_plants.compared", blind)
     cells = port_cells(["two-term"], [2], [CELL])
     missed = {each.name for each in self_test(documented_command(), cells) if not each.passed}
     assert {"bit-U1", "bit-V3", "dropped-row", "nan"} <= missed

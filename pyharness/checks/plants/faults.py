@@ -5,8 +5,8 @@ A fault is planted in the running process, and removed when its context ends.
 
 import itertools
 import pkgutil
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -74,15 +74,17 @@ def change_result(target: str, change: Change, call: int | None = None) -> Fault
     return planted
 
 
-def beside(around: Callable[[], AbstractContextManager[Any]], planted: Fault) -> Fault:
-    """Return a fault that is planted within the context `around`."""
+def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
+    """Return a change in place of the value at `path`, as in ``scene.run``, unless it is empty."""
+    *outer, last = path.split(".")
 
-    @contextmanager
-    def both(size: float) -> Iterator[None]:
-        with around(), planted(size):
-            yield
+    def changed(record: dict[str, Any]) -> None:
+        for name in outer:
+            record = record.get(name) or {}
+        if record.get(last):
+            record[last] = change(record[last])
 
-    return both
+    return changed
 
 
 def change_attribute(name: str, change: Change) -> Change:

@@ -1,226 +1,121 @@
-"""Faults planted in the requests to a port and in its answers."""
+"""Faults planted in the requests to a port and in its answers, and the self-test that uses them."""
 
+import copy
+import json
 import math
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from pyharness.checks.port_protocol import VARIABLES
-from pyharness.model.listing import Listing
+import numpy as np
 
-Rows = list[list[float]]
-# A change of the parsed answer; None if the fault can't occur in it.
-AnswerFault = Callable[[dict[str, Any]], dict[str, Any] | None]
-# A change of the request, as if the port ignored a field of it.
-RequestFault = Callable[[dict[str, Any]], None]
+from pyharness.checks.plants.faults import change_at
+from pyharness.checks.plants.outcome import Outcome, control
+from pyharness.checks.port import Cell, compared
+from pyharness.checks.port_process import PortError, PortProcess
+from pyharness.checks.port_protocol import VARIABLES, read_number
+from pyharness.model.listing import Listing
+from pyharness.model.records import listing_record
+from pyharness.model.report import counted
+
+_MOST_CELLS = 24  # cells in which the faults are planted
+
+Row = list[float]
+# A change of a parsed request or answer in place; it changes nothing where a fault can't occur.
+Change = Callable[[dict[str, Any]], object]
 
 
 @dataclass(frozen=True)
 class PortPlant:
-    """A fault planted in a port's answer, or in the request to it."""
+    """A fault planted in a port's answer or, if `in_request`, in the request to it."""
 
     name: str
     fault: str
-    answer: AnswerFault | None = None
-    request: RequestFault | None = None
+    change: Change
+    in_request: bool = False
 
 
-def _middle(rows: Rows) -> int:
+def _middle(rows: list[Row]) -> int:
     return len(rows) // 2
 
 
-def _in_row(change: Callable[[list[float]], None], last: bool = False) -> AnswerFault:
-    def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
-        rows: Rows = answer["rows"]
-        if not rows:
-            return None
-        change(rows[-1 if last else _middle(rows)])
-        return answer
+def _in_row(change: Callable[[Row], Row], last: bool = False) -> Change:
+    def changed(rows: list[Row]) -> list[Row]:
+        n = -1 if last else _middle(rows)
+        rows[n] = change(rows[n])
+        return rows
 
-    return plant
+    return change_at("rows", changed)
 
 
-def _in_rows(change: Callable[[Rows], Rows], least: int = 2) -> AnswerFault:
-    def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
-        if len(answer["rows"]) < least:
-            return None
-        answer["rows"] = change(answer["rows"])
-        return answer
-
-    return plant
+def _in_rows(change: Callable[[list[Row]], list[Row]]) -> Change:
+    return change_at("rows", lambda rows: change(rows) if len(rows) > 1 else rows)
 
 
-def _bit(column: int) -> Callable[[list[float]], None]:
-    def change(row: list[float]) -> None:
-        row[column] = math.nextafter(row[column], math.inf)
-
-    return change
-
-
-def _set(column: int, value: float) -> Callable[[list[float]], None]:
-    def change(row: list[float]) -> None:
-        row[column] = value
-
-    return change
-
-
-def _negate(row: list[float]) -> None:
-    row[1:4] = [-x for x in row[1:4]]
-
-
-def _shorten(row: list[float]) -> None:
-    row.pop()
-
-
-def _swap(row: list[float]) -> None:
-    row[1:4], row[4:7] = row[4:7], row[1:4]
-
-
-def _single(row: list[float]) -> None:
-    import numpy as np
-
-    with np.errstate(over="ignore"):
-        row[:] = np.array(row).astype(np.float32).tolist()
-
-
-def _decimal(row: list[float]) -> None:
-    row[:] = [float(f"{x:.14e}") for x in row]
-
-
-def _swapped_columns(rows: Rows) -> Rows:
-    return [[row[0], row[2], row[1], *row[3:]] for row in rows]
-
-
-def _time_by_product(rows: Rows) -> Rows:
-    return [[(n + 1) * rows[0][0], *row[1:]] for n, row in enumerate(rows)]
-
-
-def _time_from_zero(rows: Rows) -> Rows:
-    return [[row[0] - rows[0][0], *row[1:]] for row in rows]
-
-
-def _shifted(rows: Rows) -> Rows:
-    return [[row[0], *before[1:]] for row, before in zip(rows, [rows[0], *rows], strict=False)]
-
-
-def _stale_first(rows: Rows) -> Rows:
-    return [[rows[0][0], *rows[1][1:]], *rows[1:]]
-
-
-def _with_ier(change: Callable[[list[int]], list[int] | None]) -> AnswerFault:
-    def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
-        if not answer["ier"]:
-            return None
-        answer["ier"] = change(answer["ier"])
-        return answer
-
-    return plant
-
-
-def _ier_of_none(answer: dict[str, Any]) -> dict[str, Any] | None:
-    if answer["ier"] is not None:
-        return None
-    answer["ier"] = [0] * len(answer["rows"])
-    return answer
-
-
-def _at_stop(**values: Callable[[Any], Any]) -> AnswerFault:
-    def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
-        if answer["stop"] is None:
-            return None
-        for name, change in values.items():
-            answer["stop"][name] = change(answer["stop"][name])
-        return answer
-
-    return plant
-
-
-def _no_stop(answer: dict[str, Any]) -> dict[str, Any] | None:
-    if answer["stop"] is None:
-        return None
-    return {**answer, "stop": None, "ended": "overflow"}
-
-
-def _ended(answer: dict[str, Any]) -> dict[str, Any] | None:
-    if answer["ended"] == "stopped":
-        return None
-    return {**answer, "ended": "overflow" if answer["ended"] == "complete" else "complete"}
-
-
-def _without(name: str) -> AnswerFault:
-    def plant(answer: dict[str, Any]) -> dict[str, Any] | None:
-        del answer[name]
-        return answer
-
-    return plant
-
-
-def _without_test_row(answer: dict[str, Any]) -> dict[str, Any] | None:
-    return {**answer, "rows": answer["rows"][:-1]} if answer["stop"] else None
-
-
-def _all_corrected(asked: dict[str, Any]) -> None:
-    asked["listing"] = {
-        "label": "corrected", **{k: [] for k in ("defects", "readings", "conjectures")},
-    }  # fmt: skip
-
-
-def _all_original(asked: dict[str, Any]) -> None:
-    listing = Listing.original(asked["program"])
-    asked["listing"] = {
-        "label": "original", "readings": [], "defects": sorted(listing.defects),
-        "conjectures": sorted(listing.conjectures),
-    }  # fmt: skip
-
-
-def _without_kind(kind: str) -> RequestFault:
-    def change(asked: dict[str, Any]) -> None:
-        asked["listing"][kind] = []
-
-    return change
-
-
-def _in_scene(*path: str, change: Callable[[Any], Any]) -> RequestFault:
-    def plant(asked: dict[str, Any]) -> None:
-        place = asked["scene"]
-        for name in path[:-1]:
-            place = place[name]
-        if path[-1] in place:
-            place[path[-1]] = change(place[path[-1]])
-
-    return plant
-
-
-def _one_mass(masses: list[float]) -> list[float]:
-    return [masses[0]] * 3
+def _in_column(column: int, change: Callable[[float], float], last: bool = False) -> Change:
+    return _in_row(lambda row: [*row[:column], change(row[column]), *row[column + 1 :]], last)
 
 
 def _next_float(x: float) -> float:
     return math.nextafter(x, math.inf)
 
 
-def _first_up(values: list[float]) -> list[float]:
-    return [_next_float(values[0]), *values[1:]]
+def _single(row: Row) -> Row:
+    with np.errstate(over="ignore"):
+        rounded: Row = np.array(row).astype(np.float32).tolist()
+    return rounded
 
 
-def _exchanged(values: list[float]) -> list[float]:
-    return [values[1], values[0], values[2]]
+def _shifted(rows: list[Row]) -> list[Row]:
+    return [[row[0], *before[1:]] for row, before in zip(rows, [rows[0], *rows], strict=False)]
 
+
+def _give_ier(answer: dict[str, Any]) -> None:
+    if answer["ier"] is None:
+        answer["ier"] = [0] * len(answer["rows"])
+
+
+def _hide_stop(answer: dict[str, Any]) -> None:
+    if answer["stop"]:
+        answer |= {"stop": None, "ended": "overflow"}
+
+
+def _hide_test_row(answer: dict[str, Any]) -> None:
+    if answer["stop"]:
+        del answer["rows"][-1:]
+
+
+def _without(name: str) -> Change:
+    return lambda answer: answer.pop(name)
+
+
+def _with_listing(of_program: Callable[[str], Listing]) -> Change:
+    return lambda asked: asked.update(listing=listing_record(of_program(asked["program"])))
+
+
+_OTHER_ENDING = {"complete": "overflow", "overflow": "complete"}
+_requested = partial(PortPlant, in_request=True)
 
 PLANTS = (
     *(
-        PortPlant(f"bit-{name}", f"one bit of {name} in the middle row", _in_row(_bit(i)))
+        PortPlant(f"bit-{name}", f"one bit of {name} in the middle row", _in_column(i, _next_float))
         for i, name in enumerate(VARIABLES)
     ),
-    PortPlant("last-bit", "one bit of V3 in the last row", _in_row(_bit(6), last=True)),
-    PortPlant("nan", "NaN in place of U2 in the middle row", _in_row(_set(2, math.nan))),
+    PortPlant("last-bit", "one bit of V3 in the last row", _in_column(6, _next_float, last=True)),
+    PortPlant("nan", "NaN in place of U2 in the middle row", _in_column(2, lambda x: math.nan)),
     PortPlant("infinity", "infinity in place of V1 in the last row",
-              _in_row(_set(4, math.inf), last=True)),
-    PortPlant("sign", "omega has the opposite sign in the middle row", _in_row(_negate)),
-    PortPlant("swapped-vectors", "omega and velocity are exchanged in a row", _in_row(_swap)),
-    PortPlant("swapped-columns", "U1 and U2 are exchanged", _in_rows(_swapped_columns)),
+              _in_column(4, lambda x: math.inf, last=True)),
+    PortPlant("sign", "omega has the opposite sign in the middle row",
+              _in_row(lambda row: [row[0], *(-x for x in row[1:4]), *row[4:]])),
+    PortPlant("swapped-vectors", "omega and velocity are exchanged in a row",
+              _in_row(lambda row: [row[0], *row[4:7], *row[1:4]])),
+    PortPlant("swapped-columns", "U1 and U2 are exchanged",
+              _in_rows(lambda rows: [[row[0], row[2], row[1], *row[3:]] for row in rows])),
     PortPlant("single", "the middle row is rounded to binary32", _in_row(_single)),
-    PortPlant("decimal", "the last row is written with 15 digits", _in_row(_decimal, last=True)),
+    PortPlant("decimal", "the last row is written with 15 digits",
+              _in_row(lambda row: [float(f"{x:.14e}") for x in row], last=True)),
     PortPlant("dropped-row", "the middle row is missing",
               _in_rows(lambda rows: rows[: _middle(rows)] + rows[_middle(rows) + 1 :])),
     PortPlant("doubled-row", "the middle row occurs twice",
@@ -228,42 +123,131 @@ PLANTS = (
     PortPlant("no-rows", "no row", _in_rows(lambda rows: [])),
     PortPlant("reversed", "the rows are in reverse order", _in_rows(lambda rows: rows[::-1])),
     PortPlant("stale-first-row", "the first row has the results of the second one",
-              _in_rows(_stale_first)),
+              _in_rows(lambda rows: [[rows[0][0], *rows[1][1:]], *rows[1:]])),
     PortPlant("shifted", "each row has the results of the row before", _in_rows(_shifted)),
-    PortPlant("time-by-product", "TIME is n h, and not a sum", _in_rows(_time_by_product)),
-    PortPlant("time-from-zero", "TIME is that of the start of the step", _in_rows(_time_from_zero)),
-    PortPlant("short-row", "the middle row has six numbers", _in_row(_shorten)),
-    PortPlant("wrong-ending", "the run ended in another way", _ended),
-    PortPlant("missing-stop", "the stop is reported as an overflow", _no_stop),
+    PortPlant("time-by-product", "TIME is n h, and not a sum",
+              _in_rows(lambda rows: [[n * rows[0][0], *row[1:]] for n, row in enumerate(rows, 1)])),
+    PortPlant("time-from-zero", "TIME is that of the start of the step",
+              _in_rows(lambda rows: [[row[0] - rows[0][0], *row[1:]] for row in rows])),
+    PortPlant("short-row", "the middle row has six numbers", _in_row(lambda row: row[:-1])),
+    PortPlant("wrong-ending", "the run ended in another way",
+              change_at("ended", lambda end: _OTHER_ENDING.get(end, end))),
+    PortPlant("missing-stop", "the stop is reported as an overflow", _hide_stop),
     PortPlant("stop-step", "the step of the stop is counted from 0",
-              _at_stop(step=lambda step: step - 1)),
+              change_at("stop.step", lambda step: step - 1)),
     PortPlant("stop-variable", "the stop is by another variable",
-              _at_stop(variable=lambda name: "U2" if name != "U2" else "U1")),
-    PortPlant("stop-quotient", "one bit of the quotient", _at_stop(quotient=_next_float)),
-    PortPlant("stop-row", "the row of the step that stops is missing", _without_test_row),
-    PortPlant("ier-null", "IER is missing", _with_ier(lambda ier: None)),
+              change_at("stop.variable", lambda name: "U2" if name != "U2" else "U1")),
+    PortPlant("stop-quotient", "one bit of the quotient",
+              change_at("stop.quotient", _next_float)),
+    PortPlant("stop-row", "the row of the step that stops is missing", _hide_test_row),
+    PortPlant("ier-null", "IER is missing", change_at("ier", lambda ier: None)),
     PortPlant("ier-value", "the last IER is 129 in place of 0, or the reverse",
-              _with_ier(lambda ier: [*ier[:-1], 129 - ier[-1]])),
-    PortPlant("ier-given", "IER of a program that prints none", _ier_of_none),
+              change_at("ier", lambda ier: [*ier[:-1], 129 - ier[-1]])),
+    PortPlant("ier-given", "IER of a program that prints none", _give_ier),
     *(PortPlant(f"lacks-{name}", f"the field {name} is missing", _without(name))
       for name in ("rows", "ended", "stop", "ier")),
-    PortPlant("corrected", "the listing is ignored: no defect is active", request=_all_corrected),
-    PortPlant("original", "the listing is ignored: all defects are active", request=_all_original),
-    PortPlant("readings", "the readings are ignored", request=_without_kind("readings")),
-    PortPlant("conjectures", "the conjectures are ignored", request=_without_kind("conjectures")),
-    PortPlant("omega", "one bit of the initial omega",
-              request=_in_scene("initial", "omega", change=_first_up)),
-    PortPlant("step-size", "one bit of the step size",
-              request=_in_scene("run", "step_size", change=_next_float)),
-    PortPlant("moments", "the first two moments are exchanged",
-              request=_in_scene("body", "moments", change=_exchanged)),
-    PortPlant("one-mass", "the mass of the first axis is used for all",
-              request=_in_scene("masses", change=_one_mass)),
-    PortPlant("torque-rate", "the linear term of the torque is ignored",
-              request=_in_scene("torque", "rate", change=lambda rate: [0.0] * 3)),
-    PortPlant("cosines", "the cosines of the torque are ignored",
-              request=_in_scene("torque", "cosines", change=lambda waves: [])),
-    PortPlant("initial-torque", "the initial torque is ignored",
-              request=_in_scene("initial_torque", change=lambda torque: None)),
+    _requested("corrected", "the listing is ignored: no defect is active",
+               _with_listing(Listing.corrected)),
+    _requested("original", "the listing is ignored: all defects are active",
+               _with_listing(Listing.original)),
+    _requested("readings", "the readings are ignored",
+               change_at("listing.readings", lambda names: [])),
+    _requested("conjectures", "the conjectures are ignored",
+               change_at("listing.conjectures", lambda names: [])),
+    _requested("omega", "one bit of the initial omega",
+               change_at("scene.initial.omega", lambda w: [_next_float(w[0]), *w[1:]])),
+    _requested("step-size", "one bit of the step size",
+               change_at("scene.run.step_size", _next_float)),
+    _requested("moments", "the first two moments are exchanged",
+               change_at("scene.body.moments", lambda m: [m[1], m[0], m[2]])),
+    _requested("one-mass", "the mass of the first axis is used for all",
+               change_at("scene.masses", lambda masses: [masses[0]] * 3)),
+    _requested("torque-rate", "the linear term of the torque is ignored",
+               change_at("scene.torque.rate", lambda rate: [0.0] * 3)),
+    _requested("cosines", "the cosines of the torque are ignored",
+               change_at("scene.torque.cosines", lambda waves: [])),
+    _requested("initial-torque", "the initial torque is ignored",
+               change_at("scene.initial_torque", lambda torque: None)),
 )  # fmt: skip
 """The planted faults."""
+
+
+def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
+    """Yield the outcomes without a fault, then with each planted fault.
+
+    Without valid answers, only a failed control is yielded.
+    """
+    chosen = _chosen(cells)
+    try:
+        with PortProcess(command) as process:
+            yield from _planted(process, chosen)
+    except PortError as error:
+        yield control(1, str(error))
+
+
+def _chosen(cells: Sequence[Cell]) -> list[Cell]:
+    """Return at most `_MOST_CELLS` runs, a sample of all programs, listings and cases."""
+    order = random.Random("self-test").sample(range(len(cells)), len(cells))
+    found: dict[tuple[object, ...], int] = {}
+    for n in order:
+        cell = cells[n]
+        label = cell.listing.label if len(found) < _MOST_CELLS // 2 else "any"
+        has_more = bool(cell.listing.readings), bool(cell.listing.conjectures)
+        found.setdefault((cell.listing.program, label, cell.scene.case, *has_more), n)
+    return [cells[n] for n in sorted(list(found.values())[:_MOST_CELLS])]
+
+
+def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
+    lines = [process.ask(cell.request) for cell in cells]
+    twins = [cell.twin() for cell in cells]
+    checked = [compared(*each) for each in zip(cells, twins, lines, strict=True)]
+    failed = [check for check in checked if not check.passed]
+    example = f"{failed[0].id}: {failed[0].note}" if failed else ""
+    yield control(len(failed), example or f"nothing fails in {counted(len(cells), 'run')}")
+    answers = [_parsed(line) for line in lines]
+    for plant in PLANTS:
+        changed, notes = 0, []
+        for cell, twin, answer in zip(cells, twins, answers, strict=True):
+            faulty = _faulty(process, plant, cell, answer)
+            # Compared as text, because NaN differs from itself, and zeros have a sign.
+            if json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True):
+                continue
+            changed += 1
+            try:
+                check = compared(cell, twin, _written(faulty))
+            except PortError as error:
+                notes.append(f"{cell.of.id}: {error}")
+            else:
+                notes += [] if check.passed else [f"{check.id}: {check.note}"]
+        seen = f"noticed in {len(notes)} of {counted(changed, 'changed run')}"
+        note = " ".join([seen, *(f"({each})" for each in notes[:1])])
+        if not changed:
+            note = "changes no answer in these runs"
+        is_seen = len(notes) == changed
+        yield Outcome(plant.name, plant.fault, is_seen, len(notes), note, changed > 0)
+
+
+def _faulty(
+    process: PortProcess, plant: PortPlant, cell: Cell, answer: dict[str, Any]
+) -> dict[str, Any]:
+    right = json.loads(cell.request) if plant.in_request else answer
+    wrong = copy.deepcopy(right)
+    plant.change(wrong)
+    if not plant.in_request:
+        return wrong
+    return answer if wrong == right else _parsed(process.ask(json.dumps(wrong).encode()))
+
+
+def _parsed(line: bytes) -> dict[str, Any]:
+    """Return a valid answer as a dictionary, with numbers written as text converted to floats."""
+    answer: dict[str, Any] = json.loads(line)
+    answer["rows"] = [[read_number("rows", x) for x in row] for row in answer["rows"]]
+    change_at("stop.quotient", partial(read_number, "stop"))(answer)
+    return answer
+
+
+def _written(answer: dict[str, Any]) -> bytes:
+    written = copy.deepcopy(answer)
+    change_at("rows", lambda rows: [[x.hex() for x in row] for row in rows])(written)
+    change_at("stop.quotient", float.hex)(written)
+    return json.dumps(written).encode()

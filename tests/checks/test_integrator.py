@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from pyharness.checks.integrators.drift import growth_power
 from pyharness.checks.integrators.faults import FAULTS, motions, true_motion
 from pyharness.checks.integrators.plants import PLANTS, self_test
-from pyharness.checks.integrators.problem import LEVELS, convergence, problems
+from pyharness.checks.integrators.problem import LEVELS, convergence, growth_power, problems
 from pyharness.checks.integrators.protocol import read_motion, request
 from pyharness.checks.integrators.recognition import FIRST_ORDER
 from pyharness.checks.plants.outcome import CONTROL

@@ -13,7 +13,7 @@ import numpy as np
 
 from pyharness.engine.solve import solve
 from pyharness.model.attitude import product
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
@@ -32,16 +32,26 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of an integrator: its name, a sentence on it, and its motion.
+    """A fault of an integrator: its name, a sentence on it, and what it changes.
 
-    `motion` takes a scene, times (s) and a step size (s), and returns None if the fault has no
-    effect. If `of_step`, its states approach the true ones as the step decreases.
+    A faulty integrator computes the motion of another `scene` (None if the fault has no effect), at
+    other `times` (s; the second argument is the step size), and changes its states; `state` also
+    takes the right scene. If `of_step`, its states approach the true ones as the step decreases.
     """
 
     name: str
     says: str
-    motion: Callable[[Scene, Array, float], State | None]
+    scene: Callable[[Scene], Scene | None] = lambda scene: scene
+    times: Callable[[Array, float], Array] = lambda times, step: times
+    state: Callable[[State, Scene], State] = lambda state, scene: state
     of_step: bool = False
+
+    def motion(self, scene: Scene, times: Array, step: float) -> State | None:
+        """Return the states at `times` (s) with a step size (s); None if there is no effect."""
+        other = self.scene(scene)
+        if other is None:
+            return None
+        return self.state(true_motion(other, self.times(times, step)), scene)
 
 
 def true_motion(scene: Scene, times: Array) -> State:
@@ -52,12 +62,16 @@ def true_motion(scene: Scene, times: Array) -> State:
     return State(run.omega, run.attitude)
 
 
-def _cross(a: Any, b: Any) -> list[Any]:
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+def _moments(scene: Scene) -> Triple:
+    assert scene.moments is not None
+    return scene.moments
+
+
+def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
+    """Return omega x (I omega)."""
+    x, y, z = omega
+    a, b, c = (m * w for m, w in zip(_moments(scene), omega, strict=True))
+    return [y * c - z * b, z * a - x * c, x * b - y * a]
 
 
 def _law(scene: Scene, t: Any) -> list[Any]:
@@ -73,38 +87,34 @@ def _law(scene: Scene, t: Any) -> list[Any]:
     return found
 
 
-def _with_gyroscopic(x: float, y: float, z: float) -> Callable[[Scene, Array, float], State]:
-    """Return a motion whose gyroscopic term -omega x (I omega) is multiplied by x, y and z."""
+def _with_gyroscopic(*factors: float) -> Callable[[Scene], Scene]:
+    """Return a change of a scene that multiplies the gyroscopic term, -omega x (I omega)."""
 
-    def motion(scene: Scene, times: Array, step: float) -> State:
-        moments = scene.moments
-        assert moments is not None
-
+    def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
-            term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
-            each = zip(_law(scene, t), (x, y, z), term, strict=True)
+            each = zip(_law(scene, t), factors, _gyroscopic(scene, omega), strict=True)
             return [n + (1.0 - factor) * part for n, factor, part in each]
 
-        return true_motion(replace(scene, torque=checked_torque(torque)), times)
+        return replace(scene, torque=checked_torque(torque))
 
-    return motion
+    return changed
 
 
-def _with_law(change: Callable[[Scene], Any]) -> Callable[[Scene, Array, float], State | None]:
-    def motion(scene: Scene, times: Array, step: float) -> State | None:
+def _with_torque(change: Callable[[Scene], Any]) -> Callable[[Scene], Scene | None]:
+    def changed(scene: Scene) -> Scene | None:
         if scene.torque.is_zero:
             return None
-        return true_motion(replace(scene, torque=checked_torque(change(scene))), times)
+        return replace(scene, torque=checked_torque(change(scene)))
 
-    return motion
+    return changed
 
 
-def _without(**part: Any) -> Callable[[Scene, Array, float], State | None]:
-    def motion(scene: Scene, times: Array, step: float) -> State | None:
+def _without(**part: Any) -> Callable[[Scene], Scene | None]:
+    def changed(scene: Scene) -> Scene | None:
         law = replace(scene.law, **part)
-        return None if law == scene.law else true_motion(replace(scene, torque=law), times)
+        return None if law == scene.law else replace(scene, torque=law)
 
-    return motion
+    return changed
 
 
 def _frozen(scene: Scene) -> TorqueLaw:
@@ -114,103 +124,62 @@ def _frozen(scene: Scene) -> TorqueLaw:
 
 
 def _undivided(scene: Scene) -> Callable[[Any, Any], list[Any]]:
-    moments = scene.moments
-    assert moments is not None
+    moments = _moments(scene)
     return lambda t, omega: [m * n for m, n in zip(moments, _law(scene, t), strict=True)]
 
 
-def _in_order(order: tuple[int, int, int]) -> Callable[[Scene, Array, float], State]:
-    def motion(scene: Scene, times: Array, step: float) -> State:
-        assert scene.moments is not None
-        a, b, c = (scene.moments[axis] for axis in order)
-        return true_motion(replace(scene, moments=(a, b, c)), times)
+def _in_order(*order: int) -> Callable[[Scene], Scene]:
+    def changed(scene: Scene) -> Scene:
+        a, b, c = (_moments(scene)[axis] for axis in order)
+        return replace(scene, moments=(a, b, c))
 
-    return motion
-
-
-def _at_times(change: Callable[[Array, float], Array]) -> Callable[[Scene, Array, float], State]:
-    def motion(scene: Scene, times: Array, step: float) -> State:
-        return true_motion(scene, change(times, step))
-
-    return motion
+    return changed
 
 
-def _of_state(change: Callable[[State, Scene], State]) -> Callable[[Scene, Array, float], State]:
-    def motion(scene: Scene, times: Array, step: float) -> State:
-        return change(true_motion(scene, times), scene)
-
-    return motion
-
-
-def space_omega(state: State, scene: Scene) -> State:
-    """Return states with omega about the axes of space instead of the body."""
-    q = state.attitude.T
-    zeros = np.zeros(len(state.omega))
-    turned = product(product(q, (zeros, *state.omega.T)), _conjugate(q))
-    return State(np.array(turned[1:]).T, state.attitude)
+def in_space(attitude: Array, vectors: Array) -> Array:
+    """Return vectors about the body axes, shape (n, 3), along the axes of space."""
+    q = attitude.T
+    turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), _conjugate(q))
+    return np.array(turned[1:]).T
 
 
 def _conjugate(q: Any) -> Any:
     return q[0], -q[1], -q[2], -q[3]
 
 
-def _of_output(name: str) -> Callable[[Scene, Array, float], State]:
-    return _of_state(
-        lambda state, scene: State(state.omega, as_output(name, state.attitude, scene))
-    )
+def _from_identity(state: State, scene: Scene) -> State:
+    return State(state.omega, np.array(product(_conjugate(scene.attitude), state.attitude.T)).T)
 
 
-def as_output(name: str, attitude: Array, scene: Scene) -> Array:
-    """Return attitudes with the fault `name` of `OUTPUTS`."""
-    if name == "attitude-from-identity":
-        assert scene.attitude is not None
-        return np.array(product(_conjugate(scene.attitude), attitude.T)).T
-    return attitude * _CONJUGATE if name == "quaternion-transposed" else attitude[:, [1, 2, 3, 0]]
-
-
-def _space_rates(scene: Scene, times: Array, step: float) -> State:
-    """Return the motion with q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
+def _with_space_rates(scene: Scene) -> Scene:
+    """Return the scene of p and -omega, where q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
     The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
-    opposite gyroscopic term and torque; the motion is computed for p and -omega.
+    opposite gyroscopic term and torque.
     """
-    moments = scene.moments
-    assert moments is not None
-    assert scene.attitude is not None
 
     def torque(t: Any, omega: Any) -> list[Any]:
-        term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
-        return [2.0 * each - n for each, n in zip(term, _law(scene, t), strict=True)]
+        each = zip(_gyroscopic(scene, omega), _law(scene, t), strict=True)
+        return [2.0 * term - n for term, n in each]
 
     x, y, z = scene.omega
-    other = replace(
-        scene,
-        torque=checked_torque(torque),
-        omega=(-x, -y, -z),
-        attitude=_conjugate(scene.attitude),
-    )
-    found = true_motion(other, times)
-    return State(-found.omega, found.attitude * _CONJUGATE)
+    start = _conjugate(scene.attitude)
+    return replace(scene, torque=checked_torque(torque), omega=(-x, -y, -z), attitude=start)
 
 
-def _doubled_rates(scene: Scene, times: Array, step: float) -> State:
-    """Return the motion with q' = q (0, omega), from a body with twice the omega."""
-    moments = scene.moments
-    assert moments is not None
+def _with_doubled_rates(scene: Scene) -> Scene:
+    """Return the scene of a body with twice the omega, where q' = q (0, omega)."""
 
     def torque(t: Any, omega: Any) -> list[Any]:
-        term = _cross(omega, [m * w for m, w in zip(moments, omega, strict=True)])
-        return [2.0 * n + 0.5 * each for n, each in zip(_law(scene, t), term, strict=True)]
+        each = zip(_law(scene, t), _gyroscopic(scene, omega), strict=True)
+        return [2.0 * n + 0.5 * term for n, term in each]
 
     x, y, z = scene.omega
-    found = true_motion(
-        replace(scene, torque=checked_torque(torque), omega=(2.0 * x, 2.0 * y, 2.0 * z)), times
-    )
-    return State(0.5 * found.omega, found.attitude)
+    return replace(scene, torque=checked_torque(torque), omega=(2.0 * x, 2.0 * y, 2.0 * z))
 
 
-def _thesis_program(scene: Scene, times: Array, step: float) -> State:
-    """Return 2 y(t/2) - y(0), normalised; y is the motion if torques vary twice as fast."""
+def _with_fast_torque(scene: Scene) -> Scene:
+    """Return a scene in which torques vary twice as fast."""
     law = scene.law
     x, y, z = law.rate
     fast = replace(
@@ -219,16 +188,16 @@ def _thesis_program(scene: Scene, times: Array, step: float) -> State:
         sines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.sines),
         cosines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.cosines),
     )
-    half = true_motion(replace(scene, torque=fast), 0.5 * times)
+    return replace(scene, torque=fast)
+
+
+def _of_thesis(half: State, scene: Scene) -> State:
+    """Return 2 y(t/2) - y(0), normalised."""
     attitude = 2.0 * half.attitude - np.array(scene.attitude)
     return State(
         2.0 * half.omega - np.array(scene.omega),
         attitude / np.linalg.norm(attitude, axis=1, keepdims=True),
     )
-
-
-def _shift(steps: float) -> Callable[[Array, float], Array]:
-    return lambda times, step: times + steps * step
 
 
 _ORDERS = ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
@@ -247,56 +216,57 @@ FAULTS = (
     Fault("gyroscopic-half", "half of the gyroscopic term is missing",
           _with_gyroscopic(0.5, 0.5, 0.5)),
     Fault("omega-in-space", "omega is given about the axes of space, not of the body",
-          _of_state(space_omega)),
+          state=lambda state, scene: State(in_space(state.attitude, state.omega), state.attitude)),
     Fault("omega-in-degrees", "omega is given in degrees per second",
-          _of_state(lambda state, scene: State(_DEGREES * state.omega, state.attitude))),
-    Fault("torque-missing", "the torque is ignored", _with_law(lambda scene: TorqueLaw())),
-    Fault("torque-frozen", "the torque keeps its value at time 0", _with_law(_frozen)),
+          state=lambda state, scene: State(_DEGREES * state.omega, state.attitude)),
+    Fault("torque-missing", "the torque is ignored", _with_torque(lambda scene: TorqueLaw())),
+    Fault("torque-frozen", "the torque keeps its value at time 0", _with_torque(_frozen)),
     Fault("torque-rate-missing", "the linear part of the torque is ignored",
           _without(rate=(0.0, 0.0, 0.0))),
     Fault("torque-sines-missing", "the sines of the torque are ignored", _without(sines=())),
     Fault("torque-cosines-missing", "the cosines of the torque are ignored", _without(cosines=())),
     Fault("torque-in-space", "the torque acts about the axes of space, not of the body",
-          _with_law(lambda scene: replace(scene.law, frame="space"))),
-    Fault("torque-undivided", "the torque is not divided by the moments", _with_law(_undivided)),
+          _with_torque(lambda scene: replace(scene.law, frame="space"))),
+    Fault("torque-undivided", "the torque is not divided by the moments", _with_torque(_undivided)),
     Fault("torque-sign", "the torque has the opposite sign",
-          _with_law(lambda scene: lambda t, omega: [-n for n in _law(scene, t)])),
+          _with_torque(lambda scene: lambda t, omega: [-n for n in _law(scene, t)])),
     *(
         Fault(f"moments-{''.join(str(axis + 1) for axis in order)}",
               f"the moments are used in the order {', '.join(str(axis + 1) for axis in order)}",
-              _in_order(order))
+              _in_order(*order))
         for order in _ORDERS
     ),
     Fault("half-speed", "time passes at half speed: the state is that of half the time",
-          _at_times(lambda times, step: 0.5 * times)),
+          times=lambda times, step: 0.5 * times),
     Fault("double-speed", "time passes at double speed: the state is that of twice the time",
-          _at_times(lambda times, step: 2.0 * times)),
+          times=lambda times, step: 2.0 * times),
     Fault("thesis-runge-kutta", "the state is 2 y(t/2) - y(0), as in the Runge-Kutta program of "
           "the thesis: stages build on one another, and no step begins at the last result",
-          _thesis_program),
+          _with_fast_torque, times=lambda times, step: 0.5 * times, state=_of_thesis),
     Fault("step-late", "the state is that of one step before the requested time",
-          _at_times(_shift(-1.0)), of_step=True),
+          times=lambda times, step: times - step, of_step=True),
     Fault("step-early", "the state is that of one step after the requested time",
-          _at_times(_shift(1.0)), of_step=True),
+          times=lambda times, step: times + step, of_step=True),
     Fault("half-step-late", "the state is that of half a step before the requested time",
-          _at_times(_shift(-0.5)), of_step=True),
+          times=lambda times, step: times - 0.5 * step, of_step=True),
     Fault("half-step-early", "the state is that of half a step after the requested time",
-          _at_times(_shift(0.5)), of_step=True),
+          times=lambda times, step: times + 0.5 * step, of_step=True),
     Fault("quaternion-transposed", "the quaternion is the conjugate, from space to body",
-          _of_output("quaternion-transposed")),
+          state=lambda state, scene: State(state.omega, state.attitude * _CONJUGATE)),
     Fault("scalar-last", "the scalar of the quaternion is last, not first",
-          _of_output("scalar-last")),
-    Fault("attitude-from-identity", "the initial attitude is ignored",
-          _of_output("attitude-from-identity")),
+          state=lambda state, scene: State(state.omega, state.attitude[:, [1, 2, 3, 0]])),
+    Fault("attitude-from-identity", "the initial attitude is ignored", state=_from_identity),
     Fault("attitude-frame", "the quaternion advances as if omega were about the axes of space",
-          _space_rates),
+          _with_space_rates,
+          state=lambda state, scene: State(-state.omega, state.attitude * _CONJUGATE)),
     Fault("attitude-rate", "the quaternion rotates at twice the rate, without the factor 1/2",
-          _doubled_rates),
+          _with_doubled_rates,
+          state=lambda state, scene: State(0.5 * state.omega, state.attitude)),
 )  # fmt: skip
 """The known faults; faults of omega are first."""
 
 OUTPUTS = ("quaternion-transposed", "scalar-last", "attitude-from-identity")
-"""The faults of the attitude alone, which `as_output` applies to any states."""
+"""The faults of the attitude alone, whose `state` changes any states."""
 
 
 def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, State]]:

@@ -14,16 +14,20 @@ import numpy as np
 
 from pyharness.checks.check import Check, Name
 from pyharness.checks.compare.orders import ORDER_SLACK
-from pyharness.checks.integrators.drift import CHANGE, Drift, drift_of, growth_power, long_motion
 from pyharness.checks.integrators.problem import (
+    CHANGE,
     LEVELS,
     PARTS,
     Convergence,
+    Drift,
     Judged,
     Problem,
     convergence,
+    drift_of,
+    growth_power,
+    long_motion,
 )
-from pyharness.checks.integrators.protocol import Motion, read_motion, request
+from pyharness.checks.integrators.protocol import Ask, asking_of
 from pyharness.checks.integrators.recognition import FIRST_ORDER, UNKNOWN, Finding, recognised
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.model.attitude import angle_between
@@ -64,11 +68,20 @@ class Verdict:
     """The results of all checks of an integrator."""
 
     command: str
+    again: Callable[[str], str] = lambda name: ""  # the command that repeats the checks in a scene
     checks: list[Check] = field(default_factory=list)
     judged: list[Judged] = field(default_factory=list)
     drift: Drift | None = None
     findings: list[Finding] = field(default_factory=list)
-    control: str = ""
+
+    @property
+    def control(self) -> str:
+        """Return the field of the requests that sets the accuracy; empty without answers."""
+        return self.judged[-1].finest.control if self.judged else ""
+
+    def add(self, scene: str, *checks: Check) -> None:
+        """Append checks in the scene of this name, with the command that repeats them."""
+        self.checks += [replace(check, again=self.again(scene)) for check in checks]
 
 
 def judge_integrator(
@@ -86,34 +99,28 @@ def judge_integrator(
     the longest wait (s) for an answer. An invalid answer ends the checks. Raise InputError if the
     command is empty.
     """
-    found = Verdict(command)
+    found = Verdict(command, again)
     where = "start"
     try:
         with PortProcess(command, patience, "--integrator") as process:
-
-            def ask(line: bytes, rows: int) -> Motion:
-                return read_motion(process.ask(line), rows)
-
+            ask = asking_of(process)
             for done, problem in enumerate(chosen):
                 where = problem.name
                 told(done, where)
-                judge_problem(ask, problem, due, found, again)
+                judge_problem(ask, problem, due, found)
             where = "long"
             told(len(chosen), where)
-            _judge_long(ask, found, again)
+            _judge_long(ask, found)
     except PortError as error:
-        name = Name("integrator", where)
-        found.checks.append(replace(name.judged(False, str(error)), again=again("")))
+        found.add("", Name("integrator", where).judged(False, str(error)))
     if all(check.passed for check in found.checks) and not found.judged:
         name = Name("integrator", "judged")
-        check = name.judged(False, "the integrator refused every scene")
-        found.checks.append(replace(check, again=again("")))
+        found.add("", name.judged(False, "the integrator refused every scene"))
     found.findings = recognised(found.judged)
     for each in found.findings:
         name = Name("integrator", "fault", each.name)
         # A low order is a fault only if a higher one was requested; the checks of the order decide.
-        check = name.judged(each.name in FIRST_ORDER, each.says)
-        found.checks.append(replace(check, again=again("")))
+        found.add("", name.judged(each.name in FIRST_ORDER, each.text))
     if found.judged and (unexplained := _unexplained(found)):
         says = "no known fault explains the failed checks"
         found.findings.append(Finding(UNKNOWN, says, unexplained))
@@ -149,12 +156,7 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
     return tuple(dict.fromkeys(each for each in where if each not in explained))
 
 
-Ask = Callable[[bytes, int], Motion]
-
-
-def judge_problem(
-    ask: Ask, problem: Problem, due: float, found: Verdict, again: Callable[[str], str]
-) -> None:
+def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:
     """Append to `found` the checks in one problem; raise PortError for an invalid answer."""
     rows = len(problem.times)
     answers = []
@@ -162,45 +164,40 @@ def judge_problem(
         motion = ask(problem.request(level), rows)
         if motion.refusal:
             name = Name("integrator", problem.name)
-            check = name.described(None, f"refused: {motion.refusal}")
-            found.checks.append(replace(check, again=again(problem.name)))
+            found.add(problem.name, name.described(None, f"refused: {motion.refusal}"))
             return
         answers.append(motion)
     finest = answers[-1]
     if len({each.attitude is None for each in answers}) > 1:
         raise PortError("only some of the answers in a scene have an attitude")
-    found.control = finest.control
     by_tolerance = finest.control == "tolerance"
     settings = [
         problem.tolerance(level) if by_tolerance else problem.step_size(level)
         for level in range(LEVELS)
     ]
     floor = problem.floor(finest.rounding)
-    errors = [problem.errors(motion) for motion in answers]
-    judged = []
-    for k, part in enumerate(PARTS):
-        values = [each[k] for each in errors]
-        if any(value is None for value in values):
-            continue
-        known = [math.inf if value is None else value for value in values]
-        judged.append(convergence(part, settings, known, floor, by_tolerance))
-    found.judged.append(Judged(problem, tuple(answers), tuple(judged)))
+    parts = []
+    errors = zip(*(problem.errors(motion) for motion in answers), strict=True)
+    for part, values in zip(PARTS, errors, strict=True):
+        known = [value for value in values if value is not None]
+        if known:
+            parts.append(convergence(part, settings, known, floor, by_tolerance))
+    judged = Judged(problem, tuple(answers), tuple(parts))
+    found.judged.append(judged)
     wanted = 1.0 if by_tolerance else due
-    lost = Name("integrator", "finite", problem.name).bounded(found.judged[-1].lost, 0.0, _FINITE)
-    orders = [
+    checks = [Name("integrator", "finite", problem.name).bounded(judged.lost, 0.0, _FINITE)]
+    checks += [
         replace(_order_check(each, problem, wanted, floor), reference_bound=lambda: problem.bound)
-        for each in judged
+        for each in parts
     ]
-    checks = [lost, *orders]
     if finest.attitude is not None:
         name = Name("integrator", "norm", problem.name)
-        angle = errors[-1][1]
-        assert angle is not None
+        angle = parts[1].errors[-1]
         limit = max(_NORM, angle) if math.isfinite(angle) else _NORM
         checks.append(name.bounded(finest.norm, limit, _UNIT))
-    if problem is found.judged[0].problem:
-        checks += [_repeated(ask, found.judged[0]), *_returned(ask, found.judged[0])]
-    found.checks += [replace(check, again=again(problem.name)) for check in checks]
+    if judged is found.judged[0]:
+        checks += [_repeated(ask, judged), *_returned(ask, judged)]
+    found.add(problem.name, *checks)
 
 
 def _order_check(each: Convergence, problem: Problem, due: float, floor: float) -> Check:
@@ -242,9 +239,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
     x, y, z = (-forth.omega[-1]).tolist()
     a, b, c, d = forth.attitude[-1].tolist()
     scene = replace(problem.scene, omega=(x, y, z), attitude=(a, b, c, d))
-    times = problem.times.tolist()
-    asked = request(scene, times, problem.step_size(level), problem.tolerance(level))
-    back = ask(asked, len(times))
+    back = ask(problem.request(level, scene), len(problem.times))
     name = Name("integrator", "return", problem.name)
     if back.refusal or back.attitude is None:
         return [name.described(None, f"refused: {back.refusal or 'no attitude'}")]
@@ -261,20 +256,19 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
     return [name.described(error, kept)]
 
 
-def _judge_long(ask: Ask, found: Verdict, again: Callable[[str], str]) -> None:
+def _judge_long(ask: Ask, found: Verdict) -> None:
     """Append the checks of a long torque-free motion: finite numbers and conserved quantities."""
     free = next((each for each in found.judged if each.problem.scene.torque.is_zero), None)
     if free is None:
         return
-    scene, name = free.problem.scene, free.problem.name
+    problem = free.problem
     level, times, limit = long_motion(free)
-    settings = free.problem.step_size(level), free.problem.tolerance(level)
-    motion = ask(request(scene, times.tolist(), *settings), len(times))
+    motion = ask(problem.request(level, times=times), len(times))
     if motion.refusal:
-        check = Name("integrator", "long").described(None, f"refused: {motion.refusal}")
-        found.checks.append(replace(check, again=again(name)))
+        told = Name("integrator", "long").described(None, f"refused: {motion.refusal}")
+        found.add(problem.name, told)
         return
-    found.drift = drift_of(scene, times, motion)
+    found.drift = drift_of(problem.scene, times, motion)
     checks = [Name("integrator", "finite", "long").bounded(motion.lost, 0.0, _FINITE)]
     change = Name("integrator", "conserved", "long")
     if limit is None:
@@ -282,15 +276,12 @@ def _judge_long(ask: Ask, found: Verdict, again: Callable[[str], str]) -> None:
     else:
         checks.append(change.bounded(found.drift.change, limit, CHANGE))
     for quantity, values in found.drift.named().items():
+        name = Name("integrator", quantity, problem.name, quantity="drift")
         largest = float(np.abs(values).max())
         power = growth_power(found.drift.times, values)
         note = "" if power is None else f"grows with the power {power:.1f} of the time"
-        checks.append(
-            Name("integrator", quantity, name, quantity="drift").described(
-                largest if math.isfinite(largest) else None, note
-            )
-        )
-    found.checks += [replace(check, again=again(name)) for check in checks]
+        checks.append(name.described(largest if math.isfinite(largest) else None, note))
+    found.add(problem.name, *checks)
 
 
 def replay_command(command: str, seed: str, draws: int, name: str = "") -> str:

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.integrators.faults import FAULTS, State, as_output, space_omega
-from pyharness.checks.integrators.judging import Ask, Verdict, judge_problem
+from pyharness.checks.integrators.faults import FAULTS, State
+from pyharness.checks.integrators.judging import Verdict, judge_problem
 from pyharness.checks.integrators.problem import Problem
-from pyharness.checks.integrators.protocol import Motion, read_motion
-from pyharness.checks.integrators.recognition import FIRST_ORDER, recognised
+from pyharness.checks.integrators.protocol import Ask, Motion, asking_of
+from pyharness.checks.integrators.recognition import SAYS, recognised
+from pyharness.checks.plants.faults import change_at
 from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.model.attitude import product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-_SAYS = {each.name: each.says for each in FAULTS} | FIRST_ORDER
+_STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
@@ -29,10 +30,11 @@ class IntegratorPlant:
     """A fault planted in an integrator, and the name by which it must be recognised."""
 
     name: str
-    request: Callable[[dict[str, Any]], None] | None = None
-    motion: Callable[[Scene, Motion], Motion] | None = None
+    request: Callable[[dict[str, Any]], object] | None = None
+    state: Callable[[State, Scene], State] | None = None
     advance: Callable[[Any, Array, Array, float], Any] | None = None
-    needs_step: bool = False  # whether an integrator with a tolerance can't have the fault
+    # What an integrator with the fault has, of `_possible`.
+    needs: tuple[str, ...] = ()
 
 
 def _scaled(asked: dict[str, Any], factors: Sequence[float]) -> None:
@@ -82,14 +84,7 @@ def _turned_start(asked: dict[str, Any]) -> None:
     asked["omega"] = (turned / moments).tolist()
 
 
-def _set(field: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    def plant(asked: dict[str, Any]) -> None:
-        asked[field] = change(asked[field])
-
-    return plant
-
-
-def _times(change: Callable[[float, float], float]) -> Callable[[dict[str, Any]], None]:
+def _at_times(change: Callable[[float, float], float]) -> Callable[[dict[str, Any]], None]:
     def plant(asked: dict[str, Any]) -> None:
         asked["times"] = [change(t, asked["step_size"]) for t in asked["times"]]
 
@@ -97,22 +92,7 @@ def _times(change: Callable[[float, float], float]) -> Callable[[dict[str, Any]]
 
 
 def _ordered(order: str) -> Callable[[dict[str, Any]], None]:
-    return _set("moments", lambda moments: [moments[int(axis) - 1] for axis in order])
-
-
-def _output(name: str) -> Callable[[Scene, Motion], Motion]:
-    def plant(scene: Scene, motion: Motion) -> Motion:
-        if motion.attitude is None:
-            return motion
-        return replace(motion, attitude=as_output(name, motion.attitude, scene))
-
-    return plant
-
-
-def _in_space(scene: Scene, motion: Motion) -> Motion:
-    if motion.attitude is None:
-        return motion
-    return replace(motion, omega=space_omega(State(motion.omega, motion.attitude), scene).omega)
+    return change_at("moments", lambda moments: [moments[int(axis) - 1] for axis in order])
 
 
 def _turn(omega: Array, h: float) -> Any:
@@ -121,43 +101,40 @@ def _turn(omega: Array, h: float) -> Any:
     return math.cos(0.5 * spin * h), *(factor * omega).tolist()
 
 
-def _set_part_of_torque(field: str, value: Any) -> Callable[[dict[str, Any]], None]:
-    return _set("torque", lambda law: {**law, field: value})
-
-
 PLANTS = (
     IntegratorPlant("gyroscopic-missing", _no_gyroscopic_term),
     *(IntegratorPlant(f"moments-{order}", _ordered(order))
       for order in ("132", "213", "231", "312", "321")),
-    IntegratorPlant("torque-missing", lambda asked: _scaled(asked, (0.0, 0.0, 0.0))),
-    IntegratorPlant("torque-frozen", _frozen),
-    IntegratorPlant("torque-rate-missing", _set_part_of_torque("rate", [0.0] * 3)),
-    IntegratorPlant("torque-sines-missing", _set_part_of_torque("sines", [])),
-    IntegratorPlant("torque-cosines-missing", _set_part_of_torque("cosines", [])),
-    IntegratorPlant("torque-sign", lambda asked: _scaled(asked, (-1.0, -1.0, -1.0))),
-    IntegratorPlant("torque-undivided", lambda asked: _scaled(asked, asked["moments"])),
-    IntegratorPlant("torque-held", _held, needs_step=True),
-    IntegratorPlant("half-speed", _times(lambda t, h: 0.5 * t)),
-    IntegratorPlant("double-speed", _times(lambda t, h: 2.0 * t)),
-    IntegratorPlant("step-late", _times(lambda t, h: t - h)),
-    IntegratorPlant("step-early", _times(lambda t, h: t + h)),
-    IntegratorPlant("first-order", needs_step=True, motion=None,
-                    request=lambda asked: _set(
-                        "omega", lambda w: [(1.0 + asked["step_size"]) * x for x in w])(asked)),
-    IntegratorPlant("first-order-splitting", _turned_start, needs_step=True),
-    IntegratorPlant("omega-in-space", motion=_in_space),
-    IntegratorPlant("omega-in-degrees",
-                    motion=lambda scene, motion: replace(
-                        motion, omega=180.0 / math.pi * motion.omega)),
-    IntegratorPlant("quaternion-transposed", motion=_output("quaternion-transposed")),
-    IntegratorPlant("scalar-last", motion=_output("scalar-last")),
-    IntegratorPlant("attitude-from-identity",
-                    _set("attitude", lambda attitude: [1.0, 0.0, 0.0, 0.0])),
-    IntegratorPlant("attitude-frame",
+    IntegratorPlant("torque-missing", lambda asked: _scaled(asked, (0.0, 0.0, 0.0)),
+                    needs=("torque",)),
+    IntegratorPlant("torque-frozen", _frozen, needs=("waves",)),
+    IntegratorPlant("torque-rate-missing", change_at("torque.rate", lambda rate: [0.0] * 3),
+                    needs=("waves",)),
+    *(IntegratorPlant(f"torque-{name}-missing", change_at(f"torque.{name}", lambda waves: []),
+                      needs=("waves",)) for name in ("sines", "cosines")),
+    IntegratorPlant("torque-sign", lambda asked: _scaled(asked, (-1.0, -1.0, -1.0)),
+                    needs=("torque",)),
+    IntegratorPlant("torque-undivided", lambda asked: _scaled(asked, asked["moments"]),
+                    needs=("torque",)),
+    IntegratorPlant("torque-held", _held, needs=("steps", "waves")),
+    IntegratorPlant("half-speed", _at_times(lambda t, h: 0.5 * t)),
+    IntegratorPlant("double-speed", _at_times(lambda t, h: 2.0 * t)),
+    IntegratorPlant("step-late", _at_times(lambda t, h: t - h)),
+    IntegratorPlant("step-early", _at_times(lambda t, h: t + h)),
+    IntegratorPlant("first-order", needs=("steps",), request=lambda asked: asked.update(
+        omega=[(1.0 + asked["step_size"]) * x for x in asked["omega"]])),
+    IntegratorPlant("first-order-splitting", _turned_start, needs=("steps",)),
+    IntegratorPlant("omega-in-space", state=_STATES["omega-in-space"], needs=("attitude",)),
+    IntegratorPlant("omega-in-degrees", state=_STATES["omega-in-degrees"]),
+    *(IntegratorPlant(name, state=_STATES[name], needs=("attitude",))
+      for name in ("quaternion-transposed", "scalar-last")),
+    IntegratorPlant("attitude-from-identity", needs=("attitude",),
+                    request=change_at("attitude", lambda attitude: [1.0, 0.0, 0.0, 0.0])),
+    IntegratorPlant("attitude-frame", needs=("attitude",),
                     advance=lambda q, a, b, h: product(_turn(0.5 * (a + b), h), q)),
-    IntegratorPlant("attitude-rate",
+    IntegratorPlant("attitude-rate", needs=("attitude",),
                     advance=lambda q, a, b, h: product(q, _turn(a + b, h))),
-    IntegratorPlant("first-order-attitude", needs_step=True,
+    IntegratorPlant("first-order-attitude", needs=("steps", "attitude"),
                     advance=lambda q, a, b, h: product(q, _turn(a, h))),
 )  # fmt: skip
 """The planted faults."""
@@ -173,7 +150,11 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
         if plant.request is not None:
             plant.request(asked)
         motion = ask(json.dumps(asked).encode(), rows)
-        return motion if plant.motion is None else plant.motion(scene, motion)
+        if plant.state is None or (motion.attitude is None and "attitude" in plant.needs):
+            return motion
+        # A fault of omega alone does not read the attitude, which may be None.
+        state: Any = State(motion.omega, motion.attitude)  # type: ignore[arg-type]
+        return replace(motion, **plant.state(state, scene)._asdict())
 
     return asked_with_fault
 
@@ -204,59 +185,45 @@ def self_test(
 
     Without valid answers, only a failed control is yielded.
     """
+
+    def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
+        """Return the results with a fault, the names of the recognised ones, and the failures."""
+        found = Verdict(command)
+        for problem in chosen:
+            asking = with_plant(ask, plant, problem.scene) if plant else ask
+            judge_problem(asking, problem, due, found)
+        failed = sum(not check.passed for check in found.checks)
+        return found, [each.name for each in recognised(found.judged)], failed
+
     try:
         with PortProcess(command, patience, "--integrator") as process:
-
-            def ask(line: bytes, rows: int) -> Motion:
-                return read_motion(process.ask(line), rows)
-
-            right = Verdict(command)
-            for problem in chosen:
-                judge_problem(ask, problem, due, right, lambda name: "")
+            ask = asking_of(process)
+            right, names, failed = judge()
             if not right.judged:
                 raise PortError("the integrator refused every scene")
-            names, failed = _recognise(right)
             yield control(failed + len(names), _note(names))
+            possible = _possible(right)
             for plant in PLANTS:
-                found = Verdict(command)
-                for problem in chosen:
-                    faulty = with_plant(ask, plant, problem.scene)
-                    judge_problem(faulty, problem, due, found, lambda name: "")
-                yield _outcome(plant, found, _can_have(plant, right))
+                _, names, failed = judge(plant)
+                has_effect = {*plant.needs} <= possible
+                note = _note(names) if has_effect else "the integrator can't have this fault"
+                is_named = plant.name in names or not has_effect
+                yield Outcome(plant.name, SAYS[plant.name], is_named, failed, note, has_effect)
     except PortError as error:
         yield control(1, str(error))
-
-
-def _recognise(verdict: Verdict) -> tuple[list[str], int]:
-    failed = sum(not check.passed for check in verdict.checks)
-    return [each.name for each in recognised(verdict.judged)], failed
 
 
 def _note(names: Sequence[str]) -> str:
     return f"recognised: {', '.join(names) or 'no fault'}"
 
 
-def _outcome(plant: IntegratorPlant, found: Verdict, has_effect: bool) -> Outcome:
-    names, failed = _recognise(found)
-    note = _note(names) if has_effect else "the integrator can't have this fault"
-    is_named = plant.name in names or not has_effect
-    return Outcome(plant.name, _SAYS[plant.name], is_named, failed, note, has_effect)
-
-
-def _can_have(plant: IntegratorPlant, right: Verdict) -> bool:
-    if plant.needs_step and right.control == "tolerance":
-        return False
+def _possible(right: Verdict) -> set[str]:
+    """Return what the integrator and its scenes have of `IntegratorPlant.needs`."""
     kinds = {each.problem.kind for each in right.judged}
-    if plant.name.startswith("torque"):
-        return bool(kinds & ({"wave"} if plant.name in _OF_WAVES else {"constant", "wave"}))
-    needs_attitude = plant.advance or plant.name in _OF_ATTITUDE
-    return not needs_attitude or right.judged[0].finest.attitude is not None
-
-
-_OF_WAVES = (
-    "torque-frozen", "torque-held", "torque-rate-missing", "torque-sines-missing",
-    "torque-cosines-missing",
-)  # fmt: skip
-_OF_ATTITUDE = (
-    "omega-in-space", "quaternion-transposed", "scalar-last", "attitude-from-identity",
-)  # fmt: skip
+    found = {
+        "steps": right.control != "tolerance",
+        "torque": bool(kinds - {"free"}),
+        "waves": "wave" in kinds,
+        "attitude": right.judged[0].finest.attitude is not None,
+    }
+    return {name for name, has in found.items() if has}

@@ -1,6 +1,8 @@
-"""Random scenes in which an integrator is judged, and its errors in them.
+"""Random scenes in which an integrator is judged, its errors in them, and its drift.
 
-A level, from 0 to `LEVELS` - 1, determines a step size (s) and a tolerance; both decrease with it.
+The drift is that of conserved quantities in a long torque-free motion: relative for energy and |L|,
+an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
+`LEVELS` - 1, determines a step size (s) and a tolerance; both decrease with it.
 """
 
 import math
@@ -11,10 +13,11 @@ from functools import cached_property
 import numpy as np
 
 from pyharness.checks.compare.orders import ORDER_SLACK
-from pyharness.checks.integrators.faults import Fault, State, motions
+from pyharness.checks.integrators.faults import Fault, State, in_space, motions
 from pyharness.checks.integrators.protocol import Motion, request
 from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.model.attitude import angle_between
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.bounded import ErrorBound, bound_of
@@ -35,6 +38,21 @@ _LEAST = 1e-300  # in place of an error of 0
 # An error above this many roundings, times the square root of the number of steps, is due to the
 # method.
 _ROUNDINGS = 240.0
+_BETWEEN = 8.0  # s from a row to the next
+_ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
+# The largest step size (1/32 s) and tolerance (1e-6) of the motion.
+_FIRST = {"step_size": 4, "tolerance": 3}
+_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # the attitude has the larger error
+_TOTAL = 3.0  # largest sum of the limits of all rows: the errors of explicit methods may grow
+_MOST = 0.9  # a larger limit would pass a body that stops
+
+CHANGE = Basis(
+    "measured",
+    "change of energy or angular momentum without torque (relative, or rad) in 8 s: 16 times the "
+    "error in a short motion with the same step or tolerance, in proportion to time; 64 times "
+    "without attitude",
+    "`python -m tests.campaigns.integrator_campaign 40 1`, where the largest ratio to it is .23",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +118,10 @@ class Problem:
         """Return the largest error that roundings of the relative size `rounding` may cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
-    def request(self, level: int) -> bytes:
-        """Return the line of JSON that requests the states at a level."""
-        times, tolerance = self.times.tolist(), self.tolerance(level)
-        return request(self.scene, times, self.step_size(level), tolerance)
+    def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
+        """Return the line of JSON that requests states at a level; by default the problem's."""
+        asked = (self.times if times is None else times).tolist()
+        return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 
     def errors(self, motion: Motion) -> tuple[float, float | None]:
         """Return the errors of omega (relative) and attitude (rad, or None), possibly infinite."""
@@ -246,3 +264,74 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
         for scene in drawn
         if not names or scene.name in names or scene.name.partition("-")[0] in names
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """The drifts from time 0, shape (n,), and the largest `change` between neighbouring rows."""
+
+    times: Array
+    energy: Array
+    momentum: Array
+    direction: Array | None
+    change: float
+
+    def named(self) -> dict[str, Array]:
+        """Return the drifts by name."""
+        found = {"energy": self.energy, "momentum": self.momentum}
+        return found if self.direction is None else {**found, "direction": self.direction}
+
+
+def long_motion(free: Judged) -> tuple[int, Array, float | None]:
+    """Return level and times (s) of the long motion, and the limit of the change between rows.
+
+    The level is the first step size or tolerance whose limits allow enough rows, else the last. The
+    limit is None if the errors are too large.
+    """
+    control = free.finest.control
+    levels = range(_FIRST[control], LEVELS)
+    margin = _WITHOUT_ATTITUDE if free.finest.attitude is None else _MARGIN
+    limits = [margin * free.error(k) * _BETWEEN / free.problem.times[-1] for k in levels]
+    number = next((n for n, limit in enumerate(limits) if _TOTAL / limit >= _FEWEST), -1)
+    most = max(_FEWEST, _ROWS if control == "tolerance" or number < 0 else _ROWS >> number)
+    if number < 0 and limits[-1] > 0.5 * limits[0]:
+        # The errors do not decrease with the step size, so that small steps would be useless.
+        return levels[0], _BETWEEN * np.arange(1.0, _FEWEST + 1.0), None
+    limit = limits[number]
+    rows = max(_FEWEST_COARSE, int(min(most, _TOTAL / limit)))
+    return levels[number], _BETWEEN * np.arange(1.0, rows + 1.0), limit if limit <= _MOST else None
+
+
+def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
+    """Return the drift in `motion`, whose rows are at `times` (s)."""
+    omega = np.vstack([scene.omega, motion.omega])
+    with np.errstate(all="ignore"):
+        vectors = np.array(scene.moments) * omega
+        energy, momentum = (vectors * omega).sum(axis=1), np.linalg.norm(vectors, axis=1)
+        changes = [np.abs(each[1:] / each[:-1] - 1.0) for each in (energy, momentum)]
+        direction = None
+        if motion.attitude is not None:
+            there = in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
+            direction = _angle(there[1:], there[:1])
+            changes.append(_angle(there[1:], there[:-1]))
+        # The change from a row that is 0 or not finite is NaN, which is ignored.
+        change = np.fmax.reduce(np.concatenate(changes), initial=0.0)
+        drifts = [each[1:] / each[0] - 1.0 for each in (energy, momentum)]
+    return Drift(times, drifts[0], drifts[1], direction, float(change))
+
+
+def _angle(first: Array, second: Array) -> Array:
+    sine = np.linalg.norm(np.cross(first, second), axis=1)
+    return np.asarray(np.arctan2(sine, (first * second).sum(axis=1)))
+
+
+def growth_power(times: Array, drift: Array) -> float | None:
+    """Return the power of time with which the largest drift grows.
+
+    Return None if the drift is 0 in the first quarter of the time, or not finite.
+    """
+    quarter = times <= times[-1] / 4.0
+    early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())
+    if not math.isfinite(late) or early <= 0.0:
+        return None
+    return math.log(late / early) / math.log(4.0)

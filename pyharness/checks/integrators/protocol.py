@@ -2,13 +2,13 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pyharness.checks.port_process import PortError, refuse_other
+from pyharness.checks.port_process import PortError, PortProcess, refuse_other
 from pyharness.checks.port_protocol import read_list, read_number, read_object
 from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.model.records import scene_record
@@ -63,6 +63,15 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
         "tolerance": tolerance,
     }
     return json.dumps(asked, allow_nan=False).encode()
+
+
+Ask = Callable[[bytes, int], Motion]
+"""A function that sends a request for as many states as the number, and returns the answer."""
+
+
+def asking_of(process: PortProcess) -> Ask:
+    """Return the function that asks an integrator's process."""
+    return lambda line, rows: read_motion(process.ask(line), rows)
 
 
 def refuse_integrator(command: str) -> None:

@@ -8,9 +8,8 @@ from functools import partial
 import numpy as np
 
 from pyharness.checks.compare.orders import ORDER_SLACK
-from pyharness.checks.integrators.drift import drift_of
-from pyharness.checks.integrators.faults import OUTPUTS, Fault, State, as_output
-from pyharness.checks.integrators.problem import Judged, convergence, errors_between
+from pyharness.checks.integrators.faults import FAULTS, OUTPUTS, Fault, State
+from pyharness.checks.integrators.problem import Judged, convergence, drift_of, errors_between
 
 # A motion has a known fault if the fault explains all but this part of the error, and if the rest
 # decreases at least with this power of the step size or tolerance.
@@ -30,6 +29,8 @@ FIRST_ORDER = {
     "the torque of a step is that at one end of the step, or at another wrong time",
 }
 """The faults that measured orders reveal, with a sentence on each."""
+SAYS = {each.name: each.says for each in FAULTS} | FIRST_ORDER
+"""A sentence on each known fault."""
 UNKNOWN = "unknown"
 """The name of any unknown fault."""
 
@@ -39,31 +40,24 @@ class Finding:
     """A recognised fault, a sentence on it, and the problems that show it."""
 
     name: str
-    says: str
+    text: str
     problems: tuple[str, ...]
 
 
 def recognised(results: Sequence[Judged]) -> list[Finding]:
     """Return the known faults that explain the errors, else those that the orders reveal."""
-    names: dict[str, tuple[str, list[str]]] = {}
-
-    def add(name: str, says: str, problem: str) -> None:
-        names.setdefault(name, (says, []))[1].append(problem)
-
-    rest = []
-    for judged in results:
-        found = _explained(judged)
-        for name, says in found:
-            add(name, says, judged.problem.name)
-        if not found:
-            rest.append(judged)
-    for name, problem in _by_orders(rest):
-        add(name, FIRST_ORDER[name], problem)
-    listed = [Finding(name, says, tuple(where)) for name, (says, where) in names.items()]
+    explained = [(judged, _explained(judged)) for judged in results]
+    pairs = [(name, judged.problem.name) for judged, names in explained for name in names]
+    pairs += _by_orders([judged for judged, names in explained if not names])
+    where: dict[str, list[str]] = {}
+    for name, problem in pairs:
+        where.setdefault(name, []).append(problem)
+    listed = [Finding(name, SAYS[name], tuple(problems)) for name, problems in where.items()]
     return sorted(listed, key=lambda each: -len(each.problems))
 
 
-def _explained(judged: Judged) -> list[tuple[str, str]]:
+def _explained(judged: Judged) -> list[str]:
+    """Return the name of the fault that explains the errors, and names of faults of the output."""
     true = judged.convergences
     if judged.lost or all(each.is_higher for each in true):
         return []
@@ -74,23 +68,23 @@ def _explained(judged: Judged) -> list[tuple[str, str]]:
     known = [(f, state) for f, state in judged.problem.faulty if f.of_step or not converges]
     both = _best(judged, known, range(len(true)))
     if both is not None:
-        return [(both.name, both.says)]
+        return [both.name]
     # One fault of omega, and one of the returned attitude.
     first = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if first is None:
         return []
     base = first
-    outputs = []
+    names = [base.name]
     for fault, _ in judged.problem.faulty:
         if fault.name in OUTPUTS:
 
-            def states(level: int, name: str = fault.name) -> State:
-                state = judged.problem.faulty_states(base, level)
-                return State(state.omega, as_output(name, state.attitude, judged.problem.scene))
+            def states(level: int, output: Fault = fault) -> State:
+                problem = judged.problem
+                return output.state(problem.faulty_states(base, level), problem.scene)
 
             if _approaches(judged, base, states, range(2)):
-                outputs.append((fault.name, fault.says))
-    return [(first.name, first.says), *outputs]
+                names.append(fault.name)
+    return names
 
 
 def _best(
@@ -98,13 +92,12 @@ def _best(
 ) -> Fault | None:
     most = _UNEXPLAINED * max(judged.convergences[k].errors[-1] for k in parts)
     scored = []
-    for number, (fault, state) in enumerate(known):
+    for fault, state in known:
         left = errors_between(state, judged.finest)
-        worst = max(left[k] or 0.0 for k in parts)
-        if worst <= most:
-            scored.append((worst, number, fault))
-    for _, _, fault in sorted(scored, key=lambda each: each[:2]):
-        if _approaches(judged, fault, partial(judged.problem.faulty_states, fault), parts):
+        scored.append((max(left[k] or 0.0 for k in parts), fault))
+    for worst, fault in sorted(scored, key=lambda each: each[0]):
+        states = partial(judged.problem.faulty_states, fault)
+        if worst <= most and _approaches(judged, fault, states, parts):
             return fault
     return None
 

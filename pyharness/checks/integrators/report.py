@@ -1,13 +1,12 @@
 """The report of `verify --integrator`: orders, errors, drifts, recognised faults, a picture."""
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.checks.check import Check
-from pyharness.checks.integrators.drift import growth_power
 from pyharness.checks.integrators.judging import Verdict
-from pyharness.checks.integrators.problem import PARTS, Convergence
+from pyharness.checks.integrators.problem import PARTS, growth_power
 from pyharness.checks.report import checks_report, listed_singly, references, summary_page, verdict
 from pyharness.model.report import (
     Column,
@@ -53,16 +52,15 @@ def integrator_report(found: Verdict, seed: str) -> Report:
         *map(str, references(found.checks)),
     ]
     tables = [_orders(found), _drifts(found), _findings(found)]
-    text: list[Section] = [title, _failed(found.checks), *tables, [verdict(found.checks)]]
+    failed = listed_singly([check for check in found.checks if not check.passed])
+    text: list[Section] = [title, failed, *tables, [verdict(found.checks)]]
     page = summary_page("verify --integrator", found.checks, title, depth=2, more=tables)
     report = checks_report(
         "verify", found.checks, text, page, integrator=found.command, seed=seed,
-        findings=[
-            {"name": each.name, "text": each.says, "problems": list(each.problems)}
-            for each in found.findings
-        ],
+        findings=list(map(asdict, found.findings)),
         convergence=[
-            _record(judged.problem.name, found.control, each)
+            {"problem": judged.problem.name, "part": each.part, "control": found.control}
+            | asdict(each)
             for judged in found.judged
             for each in judged.convergences
         ],
@@ -70,42 +68,20 @@ def integrator_report(found: Verdict, seed: str) -> Report:
     return report._replace(pictures={"integrator": lambda: integrator_picture(found)})
 
 
-def _failed(checks: list[Check]) -> Section:
-    return listed_singly([check for check in checks if not check.passed])
-
-
-def _record(problem: str, control: str, each: Convergence) -> dict[str, Any]:
-    return {
-        "problem": problem,
-        "part": each.part,
-        "control": control,
-        "settings": list(each.settings),
-        "errors": list(each.errors),
-        "order": each.order,
-    }
-
-
 def _orders(found: Verdict) -> Section:
     rows = []
     for judged in found.judged:
-        parts = [judged.order_of(part) for part in PARTS]
         row: list[Any] = [judged.problem.name]
-        for each in parts:
+        for each in map(judged.order_of, PARTS):
             row += [None, None] if each is None else [each.order, each.errors[-1]]
         rows.append(row)
-    if not rows:
-        return []
-    if found.control == "tolerance":
-        told = (
-            "order: power of the tolerance with which the error falls (1: in proportion); a dash: "
-            "rounding only. error: with the smallest tolerance, of omega relative to the largest"
-        )
-    else:
-        told = (
-            "order: power of the step size with which the error falls; a dash: rounding only. "
-            "error: with the smallest step, of omega relative to the largest"
-        )
-    return [told, Table(_ORDERS, rows)]
+    by_tolerance = found.control == "tolerance"
+    told = (
+        f"order: power of the {'tolerance' if by_tolerance else 'step size'} with which the error "
+        f"falls{' (1: in proportion)' if by_tolerance else ''}; a dash: rounding only. error: with "
+        f"the smallest {'tolerance' if by_tolerance else 'step'}, of omega relative to the largest"
+    )
+    return [told, Table(_ORDERS, rows)] if rows else []
 
 
 def _drifts(found: Verdict) -> Section:
@@ -120,12 +96,15 @@ def _drifts(found: Verdict) -> Section:
 
 
 def _findings(found: Verdict) -> Section:
-    lines: list[str] = []
-    for each in found.findings:
-        lines.append(f"FOUND {each.name}: {each.says} (in {', '.join(each.problems)})")
-    if not lines and found.judged:
-        lines.append(Line("no known fault was recognised"))
-    return lines
+    if found.judged and not found.findings:
+        return [Line("no known fault was recognised")]
+    return [
+        f"FOUND {each.name}: {each.text} (in {', '.join(each.problems)})" for each in found.findings
+    ]
+
+
+def _inside(values: Any) -> Any:
+    return np.clip(values, _FLOOR, 1e3)
 
 
 def integrator_picture(found: Verdict) -> Picture:
@@ -141,10 +120,10 @@ def integrator_picture(found: Verdict) -> Picture:
             each = judged.order_of(part)
             if each is None:
                 continue
-            shown = np.maximum(np.minimum(each.errors, 1e3), _FLOOR)
             number = int(judged.problem.name.rpartition("-")[2])
-            axes.loglog(each.settings, shown, marker=_MARKERS[number % len(_MARKERS)],
-                        markersize=4.5, markerfacecolor="none", label=judged.problem.name,
+            marker = _MARKERS[number % len(_MARKERS)]
+            axes.loglog(each.settings, _inside(each.errors), marker=marker, markersize=4.5,
+                        markerfacecolor="none", label=judged.problem.name,
                         **_STYLES[judged.problem.kind])  # fmt: skip
             pairs = zip(each.settings, each.errors, strict=True)
             rows += [[judged.problem.name, part, x, error] for x, error in pairs]
@@ -157,7 +136,7 @@ def integrator_picture(found: Verdict) -> Picture:
     if found.drift is not None:
         drawn = zip(found.drift.named().items(), _STYLES.values(), strict=False)
         for (name, values), style in drawn:
-            shown = np.maximum(np.minimum(np.abs(values), 1e3), _FLOOR)
+            shown = _inside(np.abs(values))
             panels[2].semilogy(found.drift.times, shown, label=_MEANINGS[name], **style)
             pairs = zip(found.drift.times.tolist(), values.tolist(), strict=True)
             rows += [["long", name, t, value] for t, value in pairs]

@@ -1,17 +1,24 @@
 """Names and results of checks, and the selection of the checks to run."""
 
 import math
+import shlex
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from pyharness.checks.scenes.random_scenes import weekly_seed
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError, NotBuiltError, printable
 from pyharness.model.scene import Scene
 from pyharness.truth.bounded import ErrorBound
 
+if TYPE_CHECKING:
+    from pyharness.checks.external_file import Problem
+
+DRAWS = 1000
+RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 # Beginning of a check's note if a method could not solve the problem or reached its work limit.
 REFUSED = "refused: "
 # Suites whose ids name the problem before the method that solves it.
@@ -242,3 +249,30 @@ def selected(id: str, only: Sequence[str]) -> bool:
 def may_hold(id: str, only: Sequence[str]) -> bool:
     """Return whether `only` may request a check whose id equals or begins with `id`."""
     return selected(id, only) or any(each.startswith(id + "/") for each in only)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The checks that one run of `verify` makes."""
+
+    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
+    seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
+    draws: int = DRAWS  # number of random draws
+    record: Path = RECORD  # folder of the golden record; by default tests/golden
+    # problems with published results; None selects the problems of the package
+    problems: Sequence["Problem"] | None = None
+    thin: bool = False  # only a few checks of every kind, for `verify --self-test`
+
+    def asks(self, id: str) -> bool:
+        """Return whether the check `id` is requested."""
+        return selected(id, self.only)
+
+    def may_ask(self, id: str) -> bool:
+        """Return whether a check whose id equals or begins with `id` may be requested."""
+        return may_hold(id, self.only)
+
+    def name_draw(self, number: int, subject: str = "") -> Name:
+        """Return the name of the check of `subject` in random draw `number`."""
+        draws = f" --draws {self.draws}" if self.draws > DRAWS else ""
+        options = f"{draws} --seed {shlex.quote(self.seed)}"
+        return Name("random", subject, str(number), options=options)

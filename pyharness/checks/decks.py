@@ -14,8 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from pyharness.checks.cells import of_cell
-from pyharness.checks.check import BITS, Check, Name
-from pyharness.checks.selection import Selection
+from pyharness.checks.check import BITS, Check, Name, Selection
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.thesis.cells import cell_name

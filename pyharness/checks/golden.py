@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.check import RECORD, Attempt, Check, Name, Selection
 from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
-from pyharness.checks.selection import RECORD, Selection
 from pyharness.checks.theory.conditioning import FLOW, conditioning
 from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import METHODS, SCIPY_METHODS

@@ -4,20 +4,16 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
 
-from pyharness.checks.cells import cells, random_programs
-from pyharness.checks.check import Attempts, Check, run_suites
+from pyharness.checks.cells import cells, random_programs, words
+from pyharness.checks.check import Attempts, Check, Selection, run_suites
 from pyharness.checks.decks import decks
 from pyharness.checks.external import external_checks
 from pyharness.checks.external_file import problems
 from pyharness.checks.golden import golden
 from pyharness.checks.methods import attitudes, methods, prepared
 from pyharness.checks.orders import orders
-from pyharness.checks.random_methods import random_attitudes, random_methods
-from pyharness.checks.random_torques import random_torques
-from pyharness.checks.schemes import schemes
-from pyharness.checks.selection import Selection
-from pyharness.checks.stops import stops
-from pyharness.checks.words import words
+from pyharness.checks.random_methods import random_attitudes, random_methods, random_torques
+from pyharness.checks.schemes import schemes, stops
 
 
 def _external(chosen: Selection) -> Iterator[Check]:

@@ -10,7 +10,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import BITS, Attempt, Check, Name
+from pyharness.checks.check import BITS, Attempt, Check, Name, Selection
 from pyharness.checks.compare.agreement import ulps
 from pyharness.checks.compare.candidates import (
     attitude_candidate,
@@ -26,7 +26,6 @@ from pyharness.checks.judge import (
     judge,
     reference_truth,
 )
-from pyharness.checks.selection import Selection
 from pyharness.checks.tolerances import FEW_DIGITS, OF_CASES, of_case
 from pyharness.engine.problem import closed_form, normalized
 from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS, SCIPY_METHODS

@@ -10,11 +10,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name
+from pyharness.checks.check import Attempt, Check, Name, Selection
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.compare.orders import Order, measured_order, order_of
 from pyharness.checks.methods import cases
-from pyharness.checks.selection import Selection
 from pyharness.engine.registry import FIXED_STEP, METHODS
 from pyharness.engine.solve import finest
 from pyharness.model.basis import Basis

@@ -4,15 +4,19 @@ The true omega is from `integer_series`, the true attitude from `reference`. An 
 `solve` or a prepared solver, with one method. Its tolerance limits the error of omega, relative to
 the largest omega until the last time, or the attitude error (rad). With the error amplification K,
 rounding alone causes errors of 2e-15 K.
+
+Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
+reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
+from random import Random
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name, Sample
+from pyharness.checks.check import Attempt, Check, Name, Sample, Selection
 from pyharness.checks.compare.candidates import prepared_candidate
 from pyharness.checks.judge import (
     IF_CALM,
@@ -29,21 +33,28 @@ from pyharness.checks.judge import (
     tolerance_of,
 )
 from pyharness.checks.methods import START, run_of_call, run_of_solve
-from pyharness.checks.scenes.random_scenes import Draw, draw
-from pyharness.checks.selection import Selection
+from pyharness.checks.scenes import state_scenes
+from pyharness.checks.scenes.random_scenes import COARSEST, Draw, draw
 from pyharness.checks.theory.conditioning import along
+from pyharness.engine.many import solve_many
 from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
+from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, SCIPY_METHODS
 from pyharness.engine.solve import finest
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
+from pyharness.model.extension import ENDS
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.truth.integer_series import integer_series
 
 # The draws of a pair are a plain scene and a scene of a kind in `NASTY`. Methods run in one of 4
 # pairs, because the true solution takes longer than the methods. Methods in Python or decimal
-# arithmetic take longer still, and run in one of 60 pairs; attitudes in one of 20 draws.
+# arithmetic take longer still, and run in one of 60 pairs; attitudes in one of 20 draws. One of 20
+# draws has a torque that depends on the state; one of 80 also runs the methods in Python.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
-_EFFORT = 0.05  # factor on the work limit of the reference, for an attitude
+_EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
+# Factors on the work limit of the reference, for an attitude and for such a torque.
+_EFFORT, _EFFORT_TORQUE = 0.05, 0.2
 ROUNDING = 2e-15  # relative, for an error amplification of 1
 CAMPAIGN = Basis(
     "measured",
@@ -54,6 +65,7 @@ CAMPAIGN = Basis(
 _CALM = 10.0  # error amplification below which the series has no reason to refuse
 # Kinds of random scenes that may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
+# Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
 _MORE_WORK = "allow more work"
 _EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
@@ -99,16 +111,24 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     return finest(method, tried.scene, truth.end) > tolerance
 
 
+def _may_refuse_torque(tried: MethodRun, truth: Truth, why: str) -> bool:
+    return tried.method in SCIPY_METHODS and ("can't meet it" in why or _MORE_WORK in why)
+
+
 def _limit(truth: Truth, tried: MethodRun) -> float:
     growth = truth.flow.amplification
-    return tolerance_of(tried) * lively(growth) + ROUNDING * growth
+    own = truth.relative_error if truth.attitude is None else truth.angle_error
+    return tolerance_of(tried) * lively(growth) + ROUNDING * growth + own
 
 
 POLICY = Policy(_limit, CAMPAIGN, may_refuse)
-"""Policy whose limit is the tolerance plus `ROUNDING` times the error amplification.
+"""Policy whose limit adds tolerance, amplified rounding and the error of the true solution.
 
-The tolerance is multiplied by the error amplification too if this exceeds `LIVELY`.
+The rounding is `ROUNDING` times the error amplification. The tolerance is amplified too if the
+error amplification exceeds `LIVELY`.
 """
+TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
+"""The policy under torques that depend on the state."""
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
@@ -117,7 +137,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
-        asked = _requested(chosen, number, _entrances(drawn, number, chosen.thin))
+        asked = _requested(chosen.asks, number, _entrances(drawn, number, chosen.thin))
         if not asked:
             continue
         try:
@@ -147,7 +167,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             "attitude-taylor": partial(run_of_solve, "taylor", tolerance, scene, times),
             "attitude-prepared": partial(run_of_call, "auto", tolerance, scene, times[-1]),
         }
-        asked = _requested(chosen, number, entrances)
+        asked = _requested(chosen.asks, number, entrances)
         try:
             truth = reference_truth(scene, times, _EFFORT) if asked else None
         except InputError:
@@ -157,8 +177,10 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             yield from _sampled(chosen, number, asked, truth, IF_CALM)
 
 
-def _requested(chosen: Selection, number: int, entrances: Entrances) -> Entrances:
-    return {name: x for name, x in entrances.items() if chosen.asks(f"random/{number}/{name}")}
+def _requested(
+    is_asked: Callable[[str], bool], number: int, entrances: Entrances
+) -> dict[str, Callable[[], MethodRun]]:
+    return {name: x for name, x in entrances.items() if is_asked(f"random/{number}/{name}")}
 
 
 def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
@@ -207,3 +229,62 @@ def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: N
         reference_bound=found.reference_bound,
         entrance=name.subject, tolerance=tolerance, growth=growth,
     )  # fmt: skip
+
+
+def random_torques(chosen: Selection) -> Iterator[Attempt]:
+    """Yield deferred checks of omega and attitude, if the true solution is known."""
+    for number in range(0, chosen.draws, _EVERY_TORQUE):
+        if not chosen.may_ask(f"random/{number}"):
+            continue
+        source = Random(f"torque {chosen.seed}/{number}")
+        # Both kinds of torque occur in the draws that run all methods.
+        kind = (number // _EVERY_TORQUE + number // _EVERY_SLOW_TORQUE) % 2
+        scene, time = (state_scenes.draw, state_scenes.draw_ready)[kind](source)
+        is_slow = number % _EVERY_SLOW_TORQUE == 0 and not chosen.thin
+        entrances = _torque_entrances(scene, time, source, is_slow)
+        asked = _requested(chosen.may_ask, number, entrances)
+        times = (_EARLIER * time, time)
+        try:
+            truth = reference_truth(scene, times, _EFFORT_TORQUE) if asked else None
+        except InputError:
+            # The motion diverges, or is too fast or long for any true solution.
+            continue
+        if truth and ROUNDING * truth.flow.amplification < 1.0:
+            for subject, tried in asked.items():
+                yield Attempt(chosen.name_draw(number, subject), partial(_samples, tried, truth))
+
+
+def _torque_entrances(scene: Scene, time: float, source: Random, is_slow: bool) -> Entrances:
+    """Return deferred runs by name of the entry point, at tolerances from 1e-3 to the finest."""
+    times, digits = (_EARLIER * time, time), source.random()
+    slow = ("reference", *SCIPY_METHODS) if is_slow else ()
+
+    def tolerance(name: str) -> float:
+        finest = max(METHODS[name].finest, 0.0 if name in PREPARED_FOR_STATE else _FINE)
+        return float(COARSEST * (finest / COARSEST) ** digits)
+
+    found: dict[str, Callable[[], MethodRun]] = {}
+    for name in (*PREPARED_FOR_STATE, *slow):
+        found[f"torque-solve-{name}"] = partial(by_rows, name, tolerance(name), scene, times)
+    for name in PREPARED_FOR_STATE:
+        run = partial(run_of_call, name, tolerance(name), scene, time)
+        found[f"torque-prepare-{name}"] = run
+    found["torque-solve-many"] = partial(_by_many, tolerance("auto"), scene, time)
+    return found
+
+
+def _by_many(tolerance: float, scene: Scene, time: float) -> MethodRun:
+    def ask() -> Answer:
+        found = solve_many([scene, scene], time, tolerance=tolerance)
+        attitude = None if found.attitude is None else found.attitude[1:]
+        ended = ENDS[found.status[1]]
+        return Answer(found.omega[1:], attitude, ended, is_whole=ended in WITH_ALL_ROWS)
+
+    return MethodRun("auto", tolerance, scene, ask)
+
+
+def _samples(tried: Callable[[], MethodRun], truth: Truth, name: Name) -> Iterator[Check]:
+    run = cache(tried)
+    yield sample(run, replace(truth, attitude=None), TORQUE_POLICY, name.with_quantity("omega"))
+    if truth.attitude is not None:
+        yield sample(run, truth, TORQUE_POLICY, name.with_quantity("angle"))

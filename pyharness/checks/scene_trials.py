@@ -19,7 +19,7 @@ from pyharness.checks.judge import (
     reference_truth,
 )
 from pyharness.checks.orders import in_few_steps, order_if_seen
-from pyharness.checks.random_torques import POLICY
+from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import FLOW, Conditioning
 from pyharness.checks.theory.state_conditioning import conditioning_at
@@ -154,9 +154,9 @@ def _truth(scene: Scene, times: Sequence[float]) -> Truth:
 
 def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
     run, exact = tried(), truth()
-    found = [judge(name.with_quantity("omega"), run, replace(exact, attitude=None), POLICY)]
+    found = [judge(name.with_quantity("omega"), run, replace(exact, attitude=None), TORQUE_POLICY)]
     if exact.attitude is not None:
-        found.append(judge(name.with_quantity("angle"), run, exact, POLICY))
+        found.append(judge(name.with_quantity("angle"), run, exact, TORQUE_POLICY))
     return found
 
 

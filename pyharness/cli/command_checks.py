@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
+from pyharness.checks.check import Selection
 from pyharness.checks.integrators.judging import judge_integrator, replay_command
 from pyharness.checks.integrators.problem import DRAWS, Problem, problems
 from pyharness.checks.integrators.protocol import refuse_integrator
 from pyharness.checks.plants.outcome import Outcome, self_test_report
-from pyharness.checks.port import Cell, port, port_cells, random_cells, refuse_port
-from pyharness.checks.port_report import port_report
+from pyharness.checks.port import Cell, port, port_cells, port_report, random_cells, refuse_port
 from pyharness.checks.scenes.random_scenes import MODERATE as KINDS
-from pyharness.checks.selection import Selection
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
 

@@ -18,17 +18,16 @@ import numpy as np
 import pytest
 
 from pyharness.checks import cells as verify_programs
-from pyharness.checks.check import BITS, Check, Name, selected
+from pyharness.checks.check import BITS, DRAWS, RECORD, Check, Name, Selection, selected
 from pyharness.checks.compare.orders import Order, State
 from pyharness.checks.golden import mathematics, read_record, recorded, update
 from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.orders import judged_order
-from pyharness.checks.plants import program_self_test
+from pyharness.checks.plants import plants
 from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of
 from pyharness.checks.scenes.random_scenes import draw, weekly_seed
-from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli.main import main
 from pyharness.engine import problem
 from pyharness.engine.registry import METHODS
@@ -237,7 +236,7 @@ def test_no_record_is_said(tmp_path: Path, capsys: Capture) -> None:
 def test_plant_is_caught_by_more_than_the_record(name: str) -> None:
     plant = BY_NAME[name]
     chosen = Selection(seed="fixed", draws=12, thin=True, only=plant.kinds)
-    found = program_self_test.outcome(plant, chosen)
+    found = plants.outcome(plant, chosen)
     assert found.passed
     assert "(golden" not in found.note
 
@@ -250,7 +249,7 @@ def test_plant_that_nothing_catches_is_a_failure(capsys: Capture) -> None:
         """Yield a small control; `verify --self-test` makes one of every kind."""
         return verify(replace(chosen, only=("cells",)))
 
-    with patch.multiple(program_self_test, PLANTS=(harmless,), verify=few):
+    with patch.multiple(plants, PLANTS=(harmless,), verify=few):
         assert main(["verify", "--self-test"]) == 1
     output = capsys.readouterr().out
     assert "FAILED harmless" in output

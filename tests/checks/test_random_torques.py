@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from pyharness.checks import judge
-from pyharness.checks import random_torques as room
-from pyharness.checks.check import Check, make_checks
+from pyharness.checks import random_methods as room
+from pyharness.checks.check import Check, Selection, make_checks
 from pyharness.checks.compare import candidates
-from pyharness.checks.random_torques import random_torques
-from pyharness.checks.selection import Selection
+from pyharness.checks.random_methods import random_torques
 from pyharness.engine import many_prepared, recorded, solve, system
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape

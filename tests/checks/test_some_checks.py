@@ -2,8 +2,8 @@
 
 import pytest
 
+from pyharness.checks.check import Selection
 from pyharness.checks.kinds import verify
-from pyharness.checks.selection import Selection
 from pyharness.checks.stress import stress
 
 BESSEL = "external/bessel-j0/6.28318530717958647693"

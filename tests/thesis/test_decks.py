@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pyharness.checks.check import Selection
 from pyharness.checks.decks import decks
-from pyharness.checks.selection import Selection
 from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.facts import facts

@@ -14,7 +14,7 @@ from jsonschema import Draft202012Validator
 from pyharness import Scene, case_scene, solve
 from pyharness.bench import measure as bench
 from pyharness.checks import judge
-from pyharness.checks.compare import comparison, method_comparison
+from pyharness.checks.compare import comparison
 from pyharness.engine import registry
 from pyharness.engine.reference_bound import trajectory_bound
 from pyharness.model.attitude import angle_between
@@ -241,7 +241,7 @@ def test_verbs_print_the_bound_and_its_basis(printed: Printed, hide: Hide) -> No
 
 MODULES = {
     "compare --case 3 --program two-term": comparison,
-    "compare --case 3 --method auto": method_comparison,
+    "compare --case 3 --method auto": comparison,
     "run --case 3 --method reference": reference_module,
     "verify --only methods/taylor/case-3/1.0e-03": judge,
 }

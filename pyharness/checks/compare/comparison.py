@@ -1,4 +1,4 @@
-"""Comparisons of programs, original and corrected, and of SciPy's methods, on one scene.
+"""Comparisons of programs, original and corrected, and of methods, on one scene.
 
 Differences between Fortran and twin are in units in the last place. Errors against the
 reference (rad/s) have no meaning below the reference's own error.
@@ -7,7 +7,7 @@ reference (rad/s) have no meaning below the reference's own error.
 import itertools
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,6 +22,8 @@ from pyharness.engine.from_rows import attitude_from_rows
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
+    check_attitude,
+    check_torque,
     requested_tolerance,
 )
 from pyharness.engine.sensitivity import is_sensitive, motion_growth
@@ -271,16 +273,8 @@ def compare_programs(
         found = tuple(differences(run, *other)) if other else ()
         good, per_step = accuracy(scene, run, truth), seconds / max(run.steps, 1)
         programs.append(ProgramFinding(listing, run, good, ulp, found, order, per_step))
-    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
-
-    methods = [
-        method_finding(scene, name, requested_tolerance(name, tolerance), effort, truth)
-        for name in SCIPY_METHODS
-    ]
-    growth = motion_growth(scene, scene.times()[-1])
-    judged_programs, judged_methods = tuple(programs), tuple(methods)
-    bound = bound_of(scene, truth, effort=effort)
-    return Comparison(scene, lipschitz, truth, bound, judged_programs, judged_methods, growth, word)
+    tolerances = {name: requested_tolerance(name, tolerance) for name in SCIPY_METHODS}
+    return _with_methods(scene, lipschitz, truth, programs, tolerances, effort, word)
 
 
 def listings_for(
@@ -324,14 +318,101 @@ def listings_for(
     return result
 
 
-def method_finding(
-    scene: Scene, name: str, tolerance: float, effort: float, truth: Reference
-) -> MethodFinding:
-    """Return a method's results at the scene's steps, or the message of its InputError."""
-    start = time.perf_counter()
-    try:
-        trajectory = method_candidate(name, tolerance, effort).rows(scene)
-    except InputError as error:
-        return MethodFinding(name, tolerance, None, None, math.nan, str(error))
-    seconds = time.perf_counter() - start
-    return MethodFinding(name, tolerance, trajectory, accuracy(scene, trajectory, truth), seconds)
+def compare_methods(
+    scene: Scene,
+    methods: Sequence[str] = ("auto", *SCIPY_METHODS),
+    *,
+    tolerance: float | None = None,
+    effort: float = 1.0,
+    attitude: bool = False,
+) -> Comparison:
+    """Compare methods on one scene with each other and with the reference solution.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; times are the ends of its steps. A torque may depend on omega or attitude if it
+        can be recorded.
+    methods : sequence of str
+        Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
+    tolerance : float, optional
+        The tolerance of each method, relative to the largest component of omega; by default that of
+        `solve`. Methods with a fixed step ignore it.
+    effort : float
+        Factor on the work limits of the methods and the reference.
+    attitude : bool
+        Whether attitudes are compared too; always if the torque depends on the attitude.
+
+    Returns
+    -------
+    Comparison
+        The results; its property `unexpected` is empty if every method meets its tolerance.
+
+    Raises
+    ------
+    NotBuiltError
+        If the extension is not built.
+    InputError
+        If a method is unknown or can't solve the scene, a tolerance is out of range, or the
+        reference would exceed its work limit.
+
+    Examples
+    --------
+    >>> from pyharness import case_scene, compare_methods
+    >>> compare_methods(case_scene(2), ["auto", "dop853"]).unexpected
+    ()
+    """
+    checked_scene(scene, any_state=True)
+    attitude = boolean("attitude", attitude)
+    if isinstance(methods, str):
+        raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
+    attitude = attitude or scene.torque.needs_attitude
+    tolerances = {name: _tolerance_of_method(name, tolerance) for name in methods}
+    if not tolerances:
+        raise InputError(f"methods: the list is empty; allowed: {', '.join(METHODS)}")
+    for name in tolerances:
+        check_torque(scene, name, attitude)
+        if attitude:
+            check_attitude(name)
+    scene = replace(scene, attitude=(scene.attitude or IDENTITY) if attitude else None)
+    truth = reference(scene, scene.times(), effort=effort)
+    return _with_methods(scene, None, truth, (), tolerances, effort)
+
+
+def _with_methods(
+    scene: Scene,
+    lipschitz: float | None,
+    truth: Reference,
+    programs: Sequence[ProgramFinding],
+    tolerances: Mapping[str, float],
+    effort: float,
+    word: str = BINARY64,
+) -> Comparison:
+    """Return the comparison of programs, and of methods with their tolerances."""
+    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
+
+    methods = []
+    for name, tolerance in tolerances.items():
+        start = time.perf_counter()
+        try:
+            run = method_candidate(name, tolerance, effort).rows(scene)
+        except InputError as error:
+            methods.append(MethodFinding(name, tolerance, None, None, math.nan, str(error)))
+            continue
+        seconds = time.perf_counter() - start
+        good = accuracy(scene, run, truth)
+        methods.append(MethodFinding(name, tolerance, run, good, seconds))
+    growth = motion_growth(scene, scene.times()[-1])
+    bound = bound_of(scene, truth, effort=effort)
+    found = tuple(programs), tuple(methods)
+    return Comparison(scene, lipschitz, truth, bound, *found, growth, word)
+
+
+def _tolerance_of_method(name: str, tolerance: float | None) -> float:
+    if name not in METHODS:
+        raise unknown("method", name, METHODS)
+    chosen = METHODS[name]
+    found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)
+    if not chosen.finest <= found <= 1.0:
+        raise InputError(f"tolerance is {found:g}; allowed for {name}: {chosen.finest:.2g} to 1")
+    return found

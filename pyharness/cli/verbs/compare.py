@@ -3,8 +3,7 @@
 import argparse
 from collections.abc import Sequence
 
-from pyharness.checks.compare.comparison import compare_programs, listings_for
-from pyharness.checks.compare.method_comparison import compare_methods
+from pyharness.checks.compare.comparison import compare_methods, compare_programs, listings_for
 from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
 from pyharness.engine.registry import METHODS, SCIPY_METHODS

@@ -4,11 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from pyharness.checks.check import Check, requested_suites
+from pyharness.checks.check import DRAWS, RECORD, Check, Selection, requested_suites
 from pyharness.checks.kinds import KINDS, verify
 from pyharness.checks.random_methods import ROUNDING
 from pyharness.checks.report import checks_report, references, samples, summary
-from pyharness.checks.selection import DRAWS, RECORD, Selection
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError
 from pyharness.thesis.decks import compiler
@@ -119,8 +118,7 @@ def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], l
 
 
 def _self_test(options: argparse.Namespace, chosen: Selection) -> int:
-    from pyharness.checks.plants.plants import PLANTS
-    from pyharness.checks.plants.program_self_test import self_test
+    from pyharness.checks.plants.plants import PLANTS, self_test
     from pyharness.cli.command_checks import show_self_test
 
     outcomes = self_test(chosen.seed, chosen.record)

@@ -137,10 +137,6 @@ class Truth:
         bound = bound_of(self.scene, self.reference, any_torque=True, effort=self.effort)
         return bound.turned or bound.over(self.flow.largest)
 
-    def get_bound(self) -> ErrorBound | None:
-        """Return `bound`."""
-        return self.bound
-
     @property
     def end(self) -> float:
         """Return the last time of the true solution (s)."""
@@ -269,4 +265,4 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
         check = name.described(error, "" if limit is None else "the flow leaves no two digits")
     else:
         check = name.bounded(error, MOST if bound is None else bound, policy.basis, note)
-    return replace(check, reference_bound=truth.get_bound)
+    return replace(check, reference_bound=lambda: truth.bound)

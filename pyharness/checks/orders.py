@@ -61,23 +61,25 @@ def _of_program(scene: Scene, truth: Callable[[], Reference], name: Name) -> Che
 
 
 def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> Check:
-    def run(scene: Scene) -> Array:
-        velocity = (
-            program_candidate(Listing.corrected(name.subject), may_stop=False).rows(scene).velocity
-        )
-        # A run without velocity counts as one without rows, whose order is undecided.
-        return np.empty((0, 3)) if velocity is None else velocity
+    run = program_candidate(Listing.corrected(name.subject), may_stop=False).rows
 
-    due = PROGRAM_REGISTRY[name.subject].order
-    return judged_order(name, order_of(scene, run, due, truth(velocity=True), "velocity", _PAIRS))
+    def velocity(scene: Scene) -> Array:
+        found = run(scene).velocity
+        # A run without velocity counts as one without rows, whose order is undecided.
+        return np.empty((0, 3)) if found is None else found
+
+    due, known = PROGRAM_REGISTRY[name.subject].order, truth(velocity=True)
+    return judged_order(name, order_of(scene, velocity, due, known, "velocity", _PAIRS))
 
 
 def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
-    run = method_candidate(name.subject, 1.0)
-    due = METHODS[name.subject].order
-    return judged_order(
-        name, order_of(scene, lambda each: run.rows(each).omega, due, truth(), pairs=_PAIRS)
-    )
+    return judged_order(name, _order_of_method(scene, name.subject, truth(), pairs=_PAIRS))
+
+
+def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: int) -> Order:
+    run = method_candidate(method, 1.0).rows
+    due = METHODS[method].order
+    return order_of(scene, lambda finer: run(finer).omega, due, truth, **limits)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
@@ -92,16 +94,12 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
     torque has a table. Steps do not end where a table changes, which lowers the order.
     """
     method = name.setting or name.subject
-    run, due = method_candidate(method, 1.0), METHODS[method].order
-    found = order_of(scene, lambda each: run.rows(each).omega, due, truth(), most_steps=_MOST)
-    if found.is_judged and not _has_tables(scene):
+    found = _order_of_method(scene, method, truth(), most_steps=_MOST)
+    tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
+    has_tables = tape is not None and any(each.table for each in tape.operations)
+    if found.is_judged and not has_tables:
         return judged_order(name, found)
     return name.described(None, str(found))
-
-
-def _has_tables(scene: Scene) -> bool:
-    tape = scene.torque.tape if isinstance(scene.torque, StateTorque) else None
-    return tape is not None and any(each.table for each in tape.operations)
 
 
 def judged_order(name: Name, found: Order) -> Check:

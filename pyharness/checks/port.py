@@ -11,7 +11,7 @@ import shlex
 import statistics
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import Column, Report, Section, Table, counted, digits, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.cells import all_cells, cell_name
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
@@ -120,9 +120,12 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
         with PortProcess(command, patience) as process:
             for cell in cells:
                 name, again = cell.of, replay_command(command, cell)
-                yield check_answer(process, command, cell)
+                begin = time.perf_counter()
+                line = process.ask(cell.request)
+                seconds = time.perf_counter() - begin
+                yield compared(cell, cell.twin(), line, again, seconds)
     except PortError as error:
-        yield _port_check(name.judged(False, str(error)), again)
+        yield PortCheck(**vars(name.judged(False, str(error))) | {"again": again})
 
 
 def refuse_port(command: str) -> None:
@@ -140,14 +143,6 @@ def replay_command(command: str, cell: Cell | None = None) -> str:
     return verb if cell is None else f"{verb} {cell.options}"
 
 
-def check_answer(process: PortProcess, command: str, cell: Cell) -> PortCheck:
-    """Return the check of a port's answer to a run; raise PortError if it is invalid."""
-    begin = time.perf_counter()
-    line = process.ask(cell.request)
-    seconds = time.perf_counter() - begin
-    return compared(cell, cell.twin(), line, replay_command(command, cell), seconds)
-
-
 def compared(
     cell: Cell, twin: Trajectory, line: bytes, again: str = "", seconds: float | None = None
 ) -> PortCheck:
@@ -161,28 +156,18 @@ def compared(
     same = len(wanted) == len(answer.rows)
     apart = ulps(wanted, answer.rows) if same else math.inf
     check = cell.of.judged(not found, "; ".join(found), apart, 0.0, BITS)
-    return _port_check(check, again, seconds, difference)
-
-
-def _port_check(
-    check: Check, again: str, seconds: float | None = None, difference: dict[str, Any] | None = None
-) -> PortCheck:
-    given = {each.name: getattr(check, each.name) for each in fields(Check)}
-    return PortCheck(**{**given, "again": again}, seconds=seconds, difference=difference)
+    return PortCheck(**vars(check) | {"again": again}, seconds=seconds, difference=difference)
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
     """Return descriptions of how a port's answer differs from the twin's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
-    step = _first_step(wanted, given)
-    if step is not None:
-        due, row = wanted[step], given[step]
-        apart = _apart(due, row)
-        first = next(i for i, distance in enumerate(apart) if distance)
+    if difference := _difference(wanted, given):
+        first = next(each for each in difference["values"] if each["ulps"])
         found.append(
-            f"first at step {step + 1}, {VARIABLES[first]}: {apart[first]:.0f} ulp "
-            f"({float(row[first]).hex()}, due {float(due[first]).hex()})"
+            f"first at step {difference['step']}, {first['variable']}: {first['ulps']:.0f} ulp "
+            f"({first['theirs']}, due {first['ours']})"
         )
     for name, value, wants in (
         ("rows", len(given), len(wanted)),
@@ -195,29 +180,17 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
     return found
 
 
-_Rows = np.ndarray[tuple[int, int], np.dtype[np.float64]]
-
-
-def _first_step(wanted: _Rows, given: _Rows) -> int | None:
-    pairs = enumerate(zip(wanted, given, strict=False))
-    return next((step for step, (due, row) in pairs if ulps(due, row)), None)
-
-
-def _apart(due: Any, row: Any) -> list[float]:
-    return [ulps(due[i : i + 1], row[i : i + 1]) for i in range(len(VARIABLES))]
-
-
-def _difference(wanted: _Rows, given: _Rows) -> dict[str, Any] | None:
+def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
     """Return the values in the first step that differs, in hexadecimal: JSON has no inf and nan."""
-    step = _first_step(wanted, given)
-    if step is None:
-        return None
-    due, row = wanted[step], given[step]
-    values = [
-        {"variable": name, "ours": float(x).hex(), "theirs": float(y).hex(), "ulps": distance}
-        for name, x, y, distance in zip(VARIABLES, due, row, _apart(due, row), strict=True)
-    ]
-    return {"step": step + 1, "values": values}
+    for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
+        if ulps(due, row):
+            pairs = zip(VARIABLES, due.tolist(), row.tolist(), strict=True)
+            values = [
+                {"variable": name, "ours": x.hex(), "theirs": y.hex(), "ulps": ulps(x, y)}
+                for name, x, y in pairs
+            ]
+            return {"step": step, "values": values}
+    return None
 
 
 def _of_ier(wanted: list[int] | None, given: list[int] | None) -> list[str]:
@@ -231,7 +204,7 @@ def _of_ier(wanted: list[int] | None, given: list[int] | None) -> list[str]:
     return wrong[:1]
 
 
-def _rows(twin: Trajectory) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _rows(twin: Trajectory) -> Array:
     assert twin.velocity is not None
     return np.column_stack([twin.recorded_time, twin.omega, twin.velocity])
 
@@ -252,13 +225,14 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
         title.append(f"seed of the random scenes: {seed}")
     if checks[-1].value is None:
         title.append(f"ended at the first of {asked} cells that it did not answer")
-    extra = {"port": command, "seconds": _total(checks), **({"seed": seed} if seed else {})}
+    seconds = sum(check.seconds or 0.0 for check in checks)
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
     # Sections for steps follow the list of failures, the second section.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
-    return checks_report("verify", checks, text, page, **extra)
+    known = {"seed": seed} if seed else {}
+    return checks_report("verify", checks, text, page, port=command, seconds=seconds, **known)
 
 
 def step_section(check: PortCheck) -> Section:
@@ -272,10 +246,6 @@ def step_section(check: PortCheck) -> Section:
         for each in check.difference["values"]
     ]  # fmt: skip
     return [f"{check.id}, step {check.difference['step']}:", Table(_STEP, rows)]
-
-
-def _total(checks: Sequence[PortCheck]) -> float:
-    return sum(check.seconds for check in checks if check.seconds is not None)
 
 
 def _times(checks: Sequence[PortCheck]) -> Section:

@@ -43,40 +43,36 @@ def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
         errors = np.abs(trajectory.omega[:n] - truth.omega[:n])
-        first, second, third = (_largest(component) for component in errors.T)
         speed = None
         if trajectory.velocity is not None and truth.velocity is not None:
             speed = _largest(np.abs(trajectory.velocity[:n] - truth.velocity[:n]))
-        energy = momentum = None
-        if scene.moments is not None and scene.torque.is_zero:
+        energy = momentum = turned = in_space = None
+        is_free = scene.moments is not None and scene.torque.is_zero and len(trajectory.omega) > 0
+        if is_free:
             inertia = np.array(scene.moments)
             energy = _drift(scene, trajectory, inertia)
             momentum = _drift(scene, trajectory, inertia * inertia)
-        found = Accuracy(
-            (first, second, third), speed, energy, momentum, errors.max(axis=1, initial=0)
-        )
-        if trajectory.attitude is None or truth.attitude is None:
-            return found
-        turned = angle_between(trajectory.attitude[:n], truth.attitude[:n])
-        return replace(found, turned=turned, momentum_in_space=_drift_in_space(scene, trajectory))
+        if trajectory.attitude is not None and truth.attitude is not None:
+            turned = angle_between(trajectory.attitude[:n], truth.attitude[:n])
+            in_space = _drift_in_space(scene, trajectory) if is_free else None
+        first, second, third = map(_largest, errors.T)
+        largest = errors.max(axis=1, initial=0)
+        omega = first, second, third
+        return Accuracy(omega, speed, energy, momentum, largest, turned, in_space)
 
 
 def _largest(errors: Array) -> float:
     return float(errors.max()) if errors.size else math.inf
 
 
-def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float | None:
-    if not len(trajectory.omega):
-        return None
+def _drift(scene: Scene, trajectory: Trajectory, weights: Array) -> float:
     start = float(weights @ np.square(scene.omega))
     if start == 0.0:
         return 0.0
     return float(np.abs(np.square(trajectory.omega) @ weights / start - 1.0).max(initial=0.0))
 
 
-def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float | None:
-    if scene.moments is None or not scene.torque.is_zero or not len(trajectory.omega):
-        return None
+def _drift_in_space(scene: Scene, trajectory: Trajectory) -> float:
     before = np.array(scene.moments) * scene.omega
     (start,) = turned_to_space(np.array([scene.attitude]), before[None, :])
     size = float(np.linalg.norm(start))
@@ -93,31 +89,19 @@ def distance(first: Trajectory, second: Trajectory) -> float:
     """
     if len(first.time) != len(second.time):
         return math.inf
-    return max(
-        ulps(first.recorded_time, second.recorded_time),
-        ulps(first.omega, second.omega),
-        ulps(_velocity(first), _velocity(second)),
-    )
+    names = ("recorded_time", "omega", "velocity")
+    return max(ulps(_rows(first, name), _rows(second, name)) for name in names)
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
     """Return the names of the results that differ: counts and ending or, if these agree, arrays."""
-    counts = (
-        ("steps", first.steps, second.steps),
-        ("evaluations", first.evaluations, second.evaluations),
-        ("ending", first.ended, second.ended),
-        ("stop", first.stop, second.stop),
-    )
-    found = [name for name, x, y in counts if x != y]
+    names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
+    found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:
         return found
-    arrays = (
-        ("time", first.time, second.time),
-        ("TIME", first.recorded_time, second.recorded_time),
-        ("omega", first.omega, second.omega),
-        ("velocity", _velocity(first), _velocity(second)),
-    )
-    found = [name for name, x, y in arrays if ulps(x, y)]
+    names = {"time": "time", "recorded_time": "TIME", "omega": "omega", "velocity": "velocity"}
+    arrays = ((_rows(first, name), _rows(second, name)) for name in names)
+    found = [told for told, (x, y) in zip(names.values(), arrays, strict=True) if ulps(x, y)]
     if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
         found.append("IER")
     if first.exact is not None and second.exact is not None:
@@ -128,11 +112,12 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
     return found
 
 
-def _velocity(trajectory: Trajectory) -> Array:
-    return np.empty((0, 3)) if trajectory.velocity is None else trajectory.velocity
+def _rows(trajectory: Trajectory, name: str) -> Array:
+    found: Array | None = getattr(trajectory, name)
+    return np.empty((0, 3)) if found is None else found
 
 
-def ulps(x: Array, y: Array) -> float:
+def ulps(x: Array | float, y: Array | float) -> float:
     """Return the largest distance, in floats, between corresponding elements of `x` and `y`.
 
     Two NaNs are at distance 0, a NaN and a number at infinite distance.
@@ -145,7 +130,7 @@ def ulps(x: Array, y: Array) -> float:
     return float((np.maximum(first, second) - np.minimum(first, second)).max(initial=0))
 
 
-def _ordinal(x: Array) -> NDArray[np.uint64]:
+def _ordinal(x: Array | float) -> NDArray[np.uint64]:
     """Return the rank of each float among all floats; -0 is just below +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.many import solve_many
 from pyharness.engine.many_scenes import scene_of_row
-from pyharness.engine.registry import METHODS, PREPARED_FOR_STATE, REGISTRY, requested_tolerance
+from pyharness.engine.registry import PREPARED_FOR_STATE, REGISTRY, requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED
 from pyharness.model.attitude import IDENTITY, product
@@ -130,10 +130,7 @@ class Batch:
 
         They are quaternions, scalar first, from the body's axes to its axes at time 0.
         """
-        ends = []
-        for each in self._samples(samples):
-            assert each.attitude is not None
-            ends.append(each.attitude)
+        ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
         if self.scene.torque.needs_attitude:
             w, x, y, z = self.first_attitudes.T[:, :, None]
@@ -206,25 +203,24 @@ class Batch:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
-        more = {}
         if self.attitude and not self.scene.torque.needs_attitude:
             # One attitude suits all scenes, because `attitudes` multiplies the result by
             # `first_attitudes`.
-            more["attitude0"] = IDENTITY
-        return self._solve(method, tolerance, t_end, **more)
+            return self._solve(method, tolerance, t_end, attitude0=IDENTITY)
+        return self._solve(method, tolerance, t_end)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
         by_state = isinstance(self.scene.torque, StateTorque)
+        tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)
-        tolerance = max(tolerance, REGISTRY[method].finest)
         arrays: dict[str, Any] = {
             name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
         }
         scene = self.scene
         if not scene.torque.needs_attitude:
-            scene = scene if scene.attitude is None else replace(scene, attitude=None)
+            scene = replace(scene, attitude=None)
             arrays.pop("attitude0", None)
         arrays |= more
         return solve_many(scene, t_end, method=method, tolerance=tolerance, **arrays)
@@ -232,13 +228,10 @@ class Batch:
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)
         ends, status = np.full((n, 3), np.nan), np.full(n, Statuses.REFUSED, dtype=np.int8)
-        for i in range(n):
+        attitude = self.scene.torque.needs_attitude
+        for i, time in enumerate(t_end.tolist()):
             try:
-                finest = METHODS[method].finest
-                found = solve(
-                    self.scene_of(i), float(t_end[i]), method, max(tolerance, finest),
-                    attitude=self.scene.torque.needs_attitude,
-                )  # fmt: skip
+                found = solve(self.scene_of(i), time, method, tolerance, attitude=attitude)
             except InputError:  # refuses this scene alone
                 continue
             status[i] = ENDS.index(found.ended)

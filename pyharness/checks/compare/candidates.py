@@ -88,39 +88,33 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
     return Candidate(name, ready, rows)
 
 
-def prepared_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
+def prepared_candidate(
+    name: str, tolerance: float | None, primed: bool = False, attitude: bool = False
+) -> Candidate:
     """Return a candidate that calls a solver made by `prepare` for the method `name`.
 
     If `primed`, the solver is first called with another omega, which must have no effect. Methods
     with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
     """
+    read = _turned if attitude else _answered
 
     def ready(scene: Scene, time: float) -> Ready:
-        solver, start = prepare(scene, name, tolerance), np.array(scene.omega)
+        # A solver with attitudes takes the initial one as its third argument.
+        solver: Any = (
+            prepare(scene, name, tolerance, attitude=True)
+            if attitude
+            else prepare(scene, name, tolerance)
+        )
+        start, turned = np.array(scene.omega), ((0.0, 0.0, 1.0, 0.0),) if attitude else ()
         if primed:
-            solver(start[::-1].copy(), 0.5 * time)
-        return Ready(partial(solver, start, time), partial(_answered, solver))
+            solver(start[::-1].copy(), 0.5 * time, *turned)
+        return Ready(partial(solver, start, time), partial(read, solver))
 
     return Candidate(name, ready, _no_rows)
 
 
-def attitude_candidate(name: str, tolerance: float | None, primed: bool = False) -> Candidate:
-    """Return a candidate like `prepared_candidate`'s that also computes the attitude."""
-
-    def ready(scene: Scene, time: float) -> Ready:
-        solver, start = prepare(scene, name, tolerance, attitude=True), np.array(scene.omega)
-        if primed:
-            solver(start[::-1].copy(), 0.5 * time, (0.0, 0.0, 1.0, 0.0))
-
-        def read(found: tuple[Array, Array]) -> End:
-            omega, attitude = found
-            return End(
-                copied_result(omega), solver.status, solver.steps, attitude=copied_result(attitude)
-            )
-
-        return Ready(partial(solver, start, time), read)
-
-    return Candidate(name, ready, _no_rows)
+attitude_candidate = partial(prepared_candidate, attitude=True)
+"""Return a candidate like `prepared_candidate`'s that also computes the attitude."""
 
 
 def _no_rows(scene: Scene) -> Trajectory:
@@ -178,6 +172,11 @@ def _last(found: Trajectory) -> End:
     return End(omega, found.ended, found.steps, found.evaluations)
 
 
+def _turned(solver: Any, found: tuple[Array, Array]) -> End:
+    omega, attitude = map(copied_result, found)
+    return End(omega, solver.status, solver.steps, attitude=attitude)
+
+
 def _answered(solver: Solver, omega: Array) -> End:
     method, counted = solver.plan.method, 0
     if method in FIXED_STEP:
@@ -185,9 +184,8 @@ def _answered(solver: Solver, omega: Array) -> End:
     elif method.startswith("gauss-"):
         counted = solver.steps
     # A Taylor series has no evaluations, because it expands the right-hand side.
-    return End(
-        copied_result(omega), solver.status, solver.steps, None if method == "taylor" else counted
-    )
+    evaluations = None if method == "taylor" else counted
+    return End(copied_result(omega), solver.status, solver.steps, evaluations)
 
 
 def _printed(result: Any) -> End:

@@ -7,6 +7,7 @@ and so is the programs' translational velocity, which no other method computes.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,7 @@ def _of_method(scene: Scene, truth: Callable[[], Reference], name: Name) -> Chec
     return judged_order(name, _order_of_method(scene, name.subject, truth(), pairs=_PAIRS))
 
 
-def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: int) -> Order:
+def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any) -> Order:
     run = method_candidate(method, 1.0).rows
     due = METHODS[method].order
     return order_of(scene, lambda finer: run(finer).omega, due, truth, **limits)

@@ -94,7 +94,13 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
     series = {(mark.rank, mark.what): mark for mark in reversed(marks)}
     handles = [
-        Line2D([], [], **series[each].style, markersize=4.0, label=_label(*each))
+        Line2D(
+            [],
+            [],
+            **series[each].style,
+            markersize=4.0,
+            label=" ".join(each).strip() or "no setting",
+        )
         for each in dict.fromkeys((mark.rank, mark.what) for mark in marks)
     ]
     inches = width * columns
@@ -111,10 +117,6 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     )  # fmt: skip
     found = [[check.id, repr(check.value), repr(check.limit), check.note] for check in drawn]
     return Picture(figure, numbers("id value limit note", found))
-
-
-def _label(rank: str, what: str) -> str:
-    return f"{rank} {what}".strip() or "no setting"
 
 
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
@@ -259,13 +261,9 @@ def regions_picture(found: Regions) -> Picture:
                 handles.append(line)
     plane.axhline(0.0, color="#808080", linewidth=0.6)
     plane.axvline(0.0, color="#808080", linewidth=0.6)
-    plane.set_aspect("equal")
-    plane.set_xlabel("real part of z = h lambda")
-    plane.set_ylabel("imaginary part")
+    plane.set(aspect="equal", xlabel="real part of z = h lambda", ylabel="imaginary part")
     plane.set_title("Where a disturbance does not grow", fontsize=10)
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.set_ylim(_LEAST, 10.0)
+    axis.set(xscale="log", yscale="log", ylim=(_LEAST, 10.0))
     axis.axvline(0.05, color="#808080", linewidth=0.8)
     axis.text(0.053, 2e-13, "Case 2 at .01 s", fontsize=8, color="#505050")
     axis.set_xlabel("z / i: angle of the wobble in a step (rad)")

@@ -1,6 +1,7 @@
 """The lines that a port reads and writes, described in docs/how-to/ports.md."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,10 +71,12 @@ def read_answer(line: bytes, steps: int) -> Answer:
     for name in ("rows", "ended", "stop", "ier"):
         if name not in given:
             raise PortError(f"no '{name}'; an answer has rows, ended, stop and ier")
-    ended = given["ended"]
-    if ended not in ENDINGS:
-        raise PortError(f"ended is {json.dumps(ended)[:60]}; allowed: {', '.join(ENDINGS)}")
-    rows = [_row(n, row) for n, row in enumerate(read_list("rows", given["rows"]), 1)]
+    ended = read_name("ended", given["ended"], ENDINGS)
+    told = f"it takes {len(VARIABLES)}: {' '.join(VARIABLES)}"
+    rows = [
+        read_row(f"row {number}", row, len(VARIABLES), told)
+        for number, row in enumerate(read_list("rows", given["rows"]), 1)
+    ]
     if len(rows) > steps or (ended == "complete" and len(rows) < steps):
         raise PortError(f"{len(rows)} rows of a run of {steps} steps that ended '{ended}'")
     stop = None if given["stop"] is None else _stop(given["stop"])
@@ -99,15 +102,6 @@ def read_object(line: bytes) -> dict[str, Any]:
     return given
 
 
-def _row(number: int, row: object) -> list[float]:
-    where = f"row {number}"
-    values = read_list(where, row)
-    if len(values) != len(VARIABLES):
-        count = f"{len(values)} numbers"
-        raise PortError(f"{where} has {count}; it takes {len(VARIABLES)}: {' '.join(VARIABLES)}")
-    return [read_number(where, value) for value in values]
-
-
 def _stop(stop: object) -> Stop:
     if not isinstance(stop, dict) or {"step", "variable", "quotient"} - set(stop):
         raise PortError("stop is no object with step, variable and quotient")
@@ -123,6 +117,21 @@ def read_list(where: str, value: object) -> list[Any]:
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
+
+
+def read_row(where: str, row: object, width: int, told: str) -> list[float]:
+    """Return a JSON list of `width` numbers; the PortError for another count ends with `told`."""
+    values = read_list(where, row)
+    if len(values) != width:
+        raise PortError(f"{where} has {len(values)} numbers; {told}")
+    return [read_number(where, value) for value in values]
+
+
+def read_name(field: str, value: object, allowed: Sequence[str]) -> str:
+    """Return one of the `allowed` texts; raise PortError, naming the field, for another value."""
+    if value not in allowed:
+        raise PortError(f"{field} is {json.dumps(value)[:60]}; allowed: {', '.join(allowed)}")
+    return str(value)
 
 
 def read_whole(where: str, value: object) -> int:

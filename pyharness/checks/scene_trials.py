@@ -10,7 +10,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from pyharness.checks.check import BITS, REFUSED, Attempt, Check, Name
+from pyharness.checks.check import BITS, REFUSED, Attempt, Attempts, Check, Name
 from pyharness.checks.judge import (
     MethodRun,
     Truth,
@@ -21,7 +21,7 @@ from pyharness.checks.judge import (
 from pyharness.checks.orders import in_few_steps, order_if_seen
 from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named
-from pyharness.checks.theory.conditioning import FLOW, Conditioning
+from pyharness.checks.theory.conditioning import FLOW
 from pyharness.checks.theory.state_conditioning import conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import THREADS, Job, different
@@ -37,7 +37,7 @@ from pyharness.engine.registry import (
 )
 from pyharness.engine.rotated import axes_of, restarted_at, rotated
 from pyharness.engine.solve import solve
-from pyharness.model.attitude import IDENTITY, angle_between, product, quaternion_of_axes
+from pyharness.model.attitude import angle_between, product, quaternion_of_axes
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
@@ -51,6 +51,7 @@ _PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
 _REPEATS = 4
 
+Attempting = Callable[[Scene, Name], Attempts]
 # Omega (rad/s, shape (3,)) and the attitude (shape (4,)), or None without one.
 State = tuple[Array, Array | None]
 
@@ -70,7 +71,7 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     else:
         # Gauss collocation computes no attitude under a torque law.
         scene = replace(scene, attitude=None)
-    made: dict[str, tuple[str, str, Callable[[Scene, Name], Iterator[Attempt]]]] = {
+    made: dict[str, tuple[str, str, Attempting]] = {
         "length": (
             "errors after an eighth, a quarter, half and all of the scene's time",
             "The tolerance, plus 2e-15 K where K is the error amplification. The tolerance is "
@@ -104,12 +105,7 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     }
 
 
-def _make(
-    attempts: Callable[[Scene, Name], Iterator[Attempt]],
-    scene: Scene,
-    name: Name,
-    only: Sequence[str],
-) -> Iterator[Attempt]:
+def _make(attempts: Attempting, scene: Scene, name: Name, only: Sequence[str]) -> Attempts:
     return attempts(scene, name)
 
 
@@ -119,11 +115,10 @@ def _last(scene: Scene) -> float:
 
 def _tried(scene: Scene) -> Iterator[tuple[str, float]]:
     for method in (*_METHODS, *(["closed-form"] if closed_form(scene) else [])):
-        if not _takes(method, scene):
-            continue
-        yield method, max(MIDDLING, METHODS[method].finest)
-        if method in _FINE:
-            yield method, METHODS[method].finest
+        if _takes(method, scene):
+            yield method, max(MIDDLING, METHODS[method].finest)
+            if method in _FINE:
+                yield method, METHODS[method].finest
 
 
 def _takes(method: str, scene: Scene) -> bool:
@@ -139,17 +134,12 @@ def _takes(method: str, scene: Scene) -> bool:
 def _length(scene: Scene, name: Name) -> Iterator[Attempt]:
     for part in _PARTS:
         times = (part * _last(scene),)
-        truth = cache(partial(_truth, scene, times))
+        truth = cache(partial(reference_truth, scene, times, 1.0))
         for method, tolerance in _tried(scene):
-            own = replace(
-                name, subject=method, circumstance=f"{part:g}", setting=f"{tolerance:.0e}"
-            )
+            setting = f"{tolerance:.0e}"
+            own = replace(name, subject=method, circumstance=f"{part:g}", setting=setting)
             run = partial(by_rows, method, tolerance, scene, times)
             yield Attempt(own, partial(_errors, run, truth))
-
-
-def _truth(scene: Scene, times: Sequence[float]) -> Truth:
-    return reference_truth(scene, times, 1.0)
 
 
 def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
@@ -204,12 +194,8 @@ def _from(scene: Scene, state: State, time: float) -> Scene:
     omega, attitude = state
     if attitude is None:
         return restarted_at(scene, omega, time)
-    w, x, y, z = (float(each) for each in attitude)
+    w, x, y, z = attitude.tolist()
     return restarted_at(scene, omega, time, (w, x, y, z))
-
-
-def _flow(scene: Scene, time: float) -> Conditioning:
-    return conditioning_at(scene, [time])
 
 
 def _permuted(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:
@@ -222,12 +208,11 @@ def _permuted(scene: Scene, method: str, tolerance: float) -> tuple[State, State
     if scene.coefficients is not None:
         other = replace(other, coefficients=turn(scene.coefficients))
     if scene.attitude is not None:
-        other = replace(other, attitude=product(scene.attitude or IDENTITY, (w, x, y, z)))
+        other = replace(other, attitude=product(scene.attitude, (w, x, y, z)))
     omega, attitude = _end(other, time, method, tolerance)
     if attitude is not None:
-        a, b, c, d = (float(each) for each in attitude)
-        attitude = np.array(product((a, b, c, d), (w, -x, -y, -z)))
-    limit = 2.0 * _flow(scene, time).limit(tolerance)
+        attitude = np.array(product(attitude.tolist(), (w, -x, -y, -z)))
+    limit = 2.0 * conditioning_at(scene, [time]).limit(tolerance)
     return _end(scene, time, method, tolerance), (axes @ omega, attitude), limit
 
 
@@ -236,9 +221,11 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     there = _end(scene, time, method, tolerance)
     start = _from(scene, there, time)
     again = _end(start, -time, method, tolerance)
-    back = _flow(start, -time)
+    back = conditioning_at(start, [-time])
     # The error of the forward run is an initial error of the backward run.
-    limit = _flow(scene, time).limit(tolerance) * back.amplification + back.limit(tolerance)
+    limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification + back.limit(
+        tolerance
+    )
     attitude = None if scene.attitude is None else np.array(scene.attitude)
     return (np.array(scene.omega), attitude), again, limit
 
@@ -247,9 +234,9 @@ def _split(scene: Scene, method: str, tolerance: float) -> tuple[State, State, f
     time = _last(scene)
     cut = _CUT * time
     middle = _from(scene, _end(scene, cut, method, tolerance), cut)
-    rest = _flow(middle, time - cut)
-    limit = _flow(scene, time).limit(tolerance) + rest.limit(tolerance)
-    limit += _flow(scene, cut).limit(tolerance) * rest.amplification
+    rest = conditioning_at(middle, [time - cut])
+    limit = conditioning_at(scene, [time]).limit(tolerance) + rest.limit(tolerance)
+    limit += conditioning_at(scene, [cut]).limit(tolerance) * rest.amplification
     whole = _end(scene, time, method, tolerance)
     return whole, _end(middle, time - cut, method, tolerance), limit
 

@@ -96,15 +96,12 @@ def prepared_candidate(
     If `primed`, the solver is first called with another omega, which must have no effect. Methods
     with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
     """
+    make: Any = partial(prepare, attitude=True) if attitude else prepare
     read = _turned if attitude else _answered
 
     def ready(scene: Scene, time: float) -> Ready:
         # A solver with attitudes takes the initial one as its third argument.
-        solver: Any = (
-            prepare(scene, name, tolerance, attitude=True)
-            if attitude
-            else prepare(scene, name, tolerance)
-        )
+        solver = make(scene, name, tolerance)
         start, turned = np.array(scene.omega), ((0.0, 0.0, 1.0, 0.0),) if attitude else ()
         if primed:
             solver(start[::-1].copy(), 0.5 * time, *turned)

@@ -138,6 +138,10 @@ def order_of(
     error, previous_error, worst = math.inf, math.inf, math.nan
     previous: Array | None = None
     orders: list[float] = []
+
+    def ended(state: State, value: float | None = None) -> Order:
+        return Order(due, state, value, step_size, steps, error, worst)
+
     for finer in _halved(scene, most_steps):
         parts = finer.steps // n
         try:
@@ -157,9 +161,7 @@ def order_of(
         error, worst = float(errors.max()), float(truth.time[errors.argmax()])
         if error <= _ROUNDINGS * ROUNDING * scale * steps + truth.error:
             shown = [each for each in orders if _shows(each, due)]
-            value = shown[-1] if shown else None
-            state = "as due" if shown else "rounding"
-            return Order(due, state, value, step_size, steps, error, worst)
+            return ended("as due", shown[-1]) if shown else ended("rounding")
         settles = previous is not None and np.abs(found - previous).max() < _SMALL_CHANGE * scale
         if settles and finer.step_size * fastest <= _SMALL_ANGLE:
             order = math.log2(previous_error / error)
@@ -167,12 +169,9 @@ def order_of(
                 orders.clear()
             orders.append(order)
             if len(orders) == pairs:
-                state = "as due" if _shows(order, due) else "misses"
-                return Order(due, state, order, step_size, steps, error, worst)
+                return ended("as due" if _shows(order, due) else "misses", order)
         previous, previous_error = found, error
-    if orders and _shows(orders[-1], due):
-        return Order(due, "as due", orders[-1], step_size, steps, error, worst)
-    return Order(due, state, None, step_size, steps, error, worst)
+    return ended("as due", orders[-1]) if orders and _shows(orders[-1], due) else ended(state)
 
 
 def _shows(order: float, due: int) -> bool:

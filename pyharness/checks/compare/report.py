@@ -1,9 +1,12 @@
-"""The report of `compare`: tables, verdict, picture and data."""
+"""The report of `compare`: tables, verdict and data, and a picture of omega and its errors."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.comparison import Comparison, MethodFinding, ProgramFinding
+from pyharness.engine.report import mark_end
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -22,7 +25,7 @@ from pyharness.model.report import (
     words,
 )
 from pyharness.model.scene_report import heading, sensitive
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 from pyharness.thesis.programs import BINARY64
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
@@ -36,27 +39,25 @@ _METHODS_LEGEND = (
     "w1 to w3: largest error of the angular velocity (rad/s). energy, mom.sq: largest relative "
     "drift of the energy and of the squared angular momentum. ms: time of one call."
 )
-_OF_THE_TRUTH = ("source", "estimate", "error")
 _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
 def comparison_report(comparison: Comparison) -> Report:
     """Return the report of a comparison."""
-    in_floats = comparison.word == BINARY64
-    scene, truth = heading(comparison.scene), comparison.reference
-    bound = comparison.bound
+    scene, truth, bound = heading(comparison.scene), comparison.reference, comparison.bound
     reference = [f"reference: {truth.source}, error of any w at most {bound.text()}"]
     reference += [f"WARNING: {bound.warning}"] if bound.warning else []
     legend = _PROGRAMS_LEGEND if comparison.programs else _METHODS_LEGEND
     if comparison.programs:
-        timed = "Fortran, with the call" if in_floats else _in_word(comparison)
+        has_fortran = all(each.ulps is not None for each in comparison.programs)
+        timed = f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
+        if comparison.word == BINARY64:
+            timed = "Fortran, with the call"
         legend += f" us/step: time per step of {timed}."
     motion = []
-    if comparison.growth is not None and comparison.digits is not None:
-        motion.append(
-            f"error amplification {short(comparison.growth)}: "
-            f"rounding leaves {comparison.digits:.1f} digits"
-        )
+    if comparison.digits is not None:
+        amplified = f"error amplification {short(comparison.growth)}"
+        motion.append(f"{amplified}: rounding leaves {comparison.digits:.1f} digits")
     attitudes = _attitudes(comparison)
     if attitudes:
         legend += " angle: largest error of the attitude (rad)"
@@ -69,7 +70,7 @@ def comparison_report(comparison: Comparison) -> Report:
     tables.append([_methods(comparison)])
 
     def draw() -> Picture:
-        from pyharness.checks.compare.picture import comparison_picture
+        from pyharness.checks.compare.report import comparison_picture
 
         return comparison_picture(comparison)
 
@@ -85,7 +86,7 @@ def comparison_report(comparison: Comparison) -> Report:
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],
-        pictures={"omega": draw},
+        pictures={"omega": lambda: comparison_picture(comparison)},
     )
 
 
@@ -95,11 +96,6 @@ def verdict(comparison: Comparison) -> list[str]:
     if comparison.is_sensitive:
         told.append(sensitive(comparison.growth, comparison.digits))
     return told + [f"not judged: {each}" for each in comparison.not_judged]
-
-
-def _in_word(comparison: Comparison) -> str:
-    has_fortran = all(each.ulps is not None for each in comparison.programs)
-    return f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
 
 
 def _as_expected(comparison: Comparison) -> str:
@@ -146,14 +142,13 @@ def _methods(comparison: Comparison) -> Table:
         Column("tolerance", short), *_OMEGA, *_DRIFTS,
         Column("evaluations"), Column("ms", digits(".1f", 1e3), unit="s"),
     )  # fmt: skip
-    rows: list[list[Any]] = []
+    rows = []
     for each in comparison.methods:
-        row = [each.method, each.tolerance]
-        if each.trajectory is None or each.accuracy is None:
-            rows.append([*row, *[None] * 7])
-            continue
-        row += [*each.accuracy.omega, each.accuracy.energy, each.accuracy.momentum]
-        rows.append([*row, each.trajectory.evaluations, each.seconds])
+        judged: list[Any] = [None] * 7
+        if each.trajectory is not None and each.accuracy is not None:
+            judged = [*each.accuracy.omega, each.accuracy.energy, each.accuracy.momentum]
+            judged += [each.trajectory.evaluations, each.seconds]
+        rows.append([each.method, each.tolerance, *judged])
     return Table(columns, rows)
 
 
@@ -163,15 +158,10 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
     columns = (
         *words("attitude listing"), Column("angle", short, unit="rad"), Column("L in space", short),
     )  # fmt: skip
-    rows: list[list[Any]] = []
-    for each in comparison.programs:
-        good = each.accuracy
-        row = [each.listing.program, each.listing.label]
-        rows.append([*row, good.angle, good.momentum_in_space])
-    for method in comparison.methods:
-        if method.accuracy is not None:
-            found = method.accuracy
-            rows.append([method.method, None, found.angle, found.momentum_in_space])
+    found = [
+        (each.listing.program, each.listing.label, each.accuracy) for each in comparison.programs
+    ] + [(each.method, None, each.accuracy) for each in comparison.methods if each.accuracy]
+    rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found]
     return [[Table(columns, rows)]]
 
 
@@ -210,9 +200,8 @@ def _end(run: Trajectory, limit: float | None) -> str:
     if run.stop is None:
         return "overflow" if run.ended == "overflow" else "-"
     quotient = f"{run.stop.quotient:.0f}"
-    if len(quotient) > 5:
-        quotient = short(run.stop.quotient)
-    return f"{run.stop.variable} {quotient}>{limit:g}"
+    shown = quotient if len(quotient) <= 5 else short(run.stop.quotient)
+    return f"{run.stop.variable} {shown}>{limit:g}"
 
 
 def _count(ulps: float | None) -> str:
@@ -227,7 +216,7 @@ def _record(comparison: Comparison) -> dict[str, Any]:
         "scene": scene_record(comparison.scene),
         "lipschitz": comparison.lipschitz,
         "word": comparison.word,
-        "reference": {name: getattr(truth, name) for name in _OF_THE_TRUTH}
+        "reference": {name: getattr(truth, name) for name in ("source", "estimate", "error")}
         | ({} if truth.attitude is None else {"angle_error": truth.angle_error}),
         "reference_bound": comparison.bound.record(),
         "programs": list(map(_program, comparison.programs)),
@@ -277,3 +266,130 @@ def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
         "angle_error": accuracy.angle,
         "momentum_in_space": accuracy.momentum_in_space,
     }
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Dashes and widths distinguish the lines without colour.
+_STYLES: dict[str, dict[str, Any]] = {
+    "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
+    "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
+    "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
+}
+_REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
+# A line does not show a trajectory of a single row, so that it is drawn as a marker. The markers
+# can be distinguished even at the same point.
+_MARKERS: dict[str, dict[str, Any]] = {
+    "reference": {"marker": "s", "markersize": 11.0},
+    "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
+    "custom": {"marker": "D", "markersize": 5.0, "markerfacecolor": "none"},
+    "corrected": {"marker": ".", "markersize": 5.0},
+}
+
+
+class _Curve(NamedTuple):
+    name: str  # program or method, which has a column of panels
+    label: str  # version of the program; empty for a method
+    trajectory: Trajectory
+    accuracy: Accuracy
+
+
+def _curves(comparison: Comparison) -> list[_Curve]:
+    if comparison.programs:
+        return [
+            _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
+            for each in comparison.programs
+        ]
+    return [
+        _Curve(each.method, "", each.trajectory, each.accuracy)
+        for each in comparison.methods
+        if each.trajectory is not None and each.accuracy is not None
+    ]
+
+
+def comparison_picture(comparison: Comparison) -> Picture:
+    """Return a picture with one column per program or method.
+
+    Its panels show the components of omega and their largest error (rad/s), and the error of the
+    attitude (rad) if it is compared.
+    """
+    from matplotlib.figure import Figure
+
+    curves = _curves(comparison)
+    names = list(dict.fromkeys(each.name for each in curves))
+    figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
+    truth = comparison.reference
+    bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
+    shape = 3 + len(bounds), len(names)
+    axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
+    for column, name in enumerate(names):
+        axes[0, column].set_title(name)
+        axes[-1, column].set_xlabel("time (s)")
+        for row in range(3):
+            _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
+        for each in curves:
+            if each.name != name:
+                continue
+            run, label = each.trajectory, each.label
+            for row in range(3):
+                _line(axes[row, column], run.time, run.omega[:, row], label)
+            for row, error in enumerate((each.accuracy.error, each.accuracy.turned), 3):
+                if error is not None:
+                    shown = np.isfinite(error) & (error > 0.0)
+                    _line(axes[row, column], run.time[: len(error)][shown], error[shown], label)
+    ended = [each for each in curves if each.trajectory.ended not in WITH_ALL_ROWS]
+    for row in range(3):
+        axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+        _frame(axes[row, 0], truth.omega[:, row])
+        for each in ended:
+            mark_end(axes[row, names.index(each.name)], each.trajectory, row)
+    labels = ("error of any $\\omega$ (rad/s)", "error of attitude (rad)")
+    for row, (bound, label) in enumerate(zip(bounds, labels, strict=False), 3):
+        axes[row, 0].set_yscale("log")
+        axes[row, 0].set_ylabel(label)
+        for column in range(len(names)):
+            axes[row, column].axhline(bound, color="black", linewidth=0.8)
+            axes[row, column].grid(visible=True, linewidth=0.3)
+        bottom, top = axes[row, 0].get_ylim()
+        axes[row, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
+    axes[0, 0].legend(loc="best", handlelength=4)
+    note = "x: the integration stopped or overflowed; at the edge: out of view" if ended else ""
+    title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
+    return Picture(figure, _numbers(comparison), title)
+
+
+def _numbers(comparison: Comparison) -> Table:
+    truth, names = comparison.reference, "method listing time omega1 omega2 omega3 error"
+    bounds = [truth.error]
+    if truth.attitude is not None:
+        names += " angle_error"
+        bounds.append(truth.angle_error)
+    rows = [
+        ["reference", "", t, *omega, *bounds]
+        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
+    ]
+    for each in _curves(comparison):
+        run, name = each.trajectory, [each.name, each.label]
+        errors = each.accuracy.error[:, None]
+        if each.accuracy.turned is not None:
+            errors = np.column_stack([errors, each.accuracy.turned])
+        n = len(errors)
+        found = np.column_stack([run.time[:n], run.omega[:n], errors])
+        rows += [[*name, *row] for row in found.tolist()]
+    return numbers(names, rows)
+
+
+def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:
+    style = _REFERENCE if label == "reference" else _STYLES[label or "corrected"]
+    marker = _MARKERS[label or "corrected"] if len(time) == 1 else {}
+    axes.plot(time, values, label=label or "method", **style, **marker)
+
+
+def _frame(axes: "Axes", truth: np.ndarray) -> None:
+    if not len(truth):
+        return
+    low, high = float(truth.min()), float(truth.max())
+    margin = max(0.6 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-12)
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))

@@ -90,19 +90,18 @@ def judge_integrator(
     again: Callable[[str], str],
     due: float = 1.0,
     told: Callable[[int, str], None] = lambda done, what: None,
-    patience: float = PATIENCE,
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
     ``again(name)`` returns the command that repeats the checks in a scene. ``told`` receives the
-    number of finished problems and the name of the next. `due` is the required order, `patience`
-    the longest wait (s) for an answer. An invalid answer ends the checks. Raise InputError if the
+    number of finished problems and the name of the next. `due` is the required order.
+    An invalid answer ends the checks. Raise InputError if the
     command is empty.
     """
     found = Verdict(command, again)
     where = "start"
     try:
-        with PortProcess(command, patience, "--integrator") as process:
+        with PortProcess(command, PATIENCE, "--integrator") as process:
             ask = asking_of(process)
             for done, problem in enumerate(chosen):
                 where = problem.name

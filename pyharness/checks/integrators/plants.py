@@ -178,9 +178,7 @@ def _advanced(
     return replace(motion, omega=motion.omega[chosen], attitude=attitude)
 
 
-def self_test(
-    command: str, chosen: Sequence[Problem], due: float = 1.0, patience: float = PATIENCE
-) -> Iterator[Outcome]:
+def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
     """Yield the outcomes without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
@@ -196,7 +194,7 @@ def self_test(
         return found, [each.name for each in recognised(found.judged)], failed
 
     try:
-        with PortProcess(command, patience, "--integrator") as process:
+        with PortProcess(command, PATIENCE, "--integrator") as process:
             ask = asking_of(process)
             right, names, failed = judge()
             if not right.judged:

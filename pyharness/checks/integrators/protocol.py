@@ -4,12 +4,11 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from pyharness.checks.port_process import PortError, PortProcess, refuse_other
-from pyharness.checks.port_protocol import read_list, read_number, read_object
+from pyharness.checks.port_protocol import read_list, read_name, read_object, read_row
 from pyharness.checks.scenes.random_scenes import MODERATE, draw_moderate
 from pyharness.model.records import scene_record
 from pyharness.model.scene import Scene
@@ -89,8 +88,9 @@ def read_motion(line: bytes, rows: int) -> Motion:
         return Motion(np.empty((0, 3)), refusal=given["refused"].strip())
     if "omega" not in given:
         raise PortError("no 'omega'; an answer has omega and attitude, or refused")
-    control = _named(given, "control", CONTROLS)
-    rounding = ROUNDINGS[_named(given, "precision", tuple(ROUNDINGS))]
+    control = read_name("control", given.get("control", CONTROLS[0]), CONTROLS)
+    precision = read_name("precision", given.get("precision", "binary64"), tuple(ROUNDINGS))
+    rounding = ROUNDINGS[precision]
     omega = _rows("omega", given["omega"], rows, 3)
     if given.get("attitude") is None:
         return Motion(omega, control=control, rounding=rounding)
@@ -104,22 +104,12 @@ def read_motion(line: bytes, rows: int) -> Motion:
     return Motion(omega, unit, off if math.isfinite(off) else math.inf, control, rounding)
 
 
-def _named(given: dict[str, Any], field: str, allowed: tuple[str, ...]) -> str:
-    name = given.get(field, allowed[0])
-    if name not in allowed:
-        raise PortError(f"{field} is {json.dumps(name)[:60]}; allowed: {', '.join(allowed)}")
-    return str(name)
-
-
 def _rows(what: str, value: object, rows: int, width: int) -> Array:
     found = read_list(what, value)
     if len(found) != rows:
         raise PortError(f"{what} has {len(found)} rows; {rows} times were requested")
-    numbers = []
-    for number, row in enumerate(found, 1):
-        where = f"{what}, row {number}"
-        values = read_list(where, row)
-        if len(values) != width:
-            raise PortError(f"{where} has {len(values)} numbers; allowed: {width}")
-        numbers.append([read_number(where, each) for each in values])
+    numbers = [
+        read_row(f"{what}, row {number}", row, width, f"allowed: {width}")
+        for number, row in enumerate(found, 1)
+    ]
     return np.array(numbers, dtype=float).reshape(-1, width)

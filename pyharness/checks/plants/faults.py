@@ -72,18 +72,9 @@ def changing(change: Change) -> Faulty:
     return lambda size, right, *rest, **named: change(right(*rest, **named), size)
 
 
-def change_result(target: str, change: Change, call: int | None = None) -> Fault:
-    """Return a fault that changes the result of `target`, in call number `call` or in all calls."""
-
-    def planted(size: float) -> AbstractContextManager[Any]:
-        calls = itertools.count(1)
-
-        def wrong(found: Any, size: float) -> Any:
-            return found if call and next(calls) != call else change(found, size)
-
-        return instead(target, changing(wrong))(size)
-
-    return planted
+def change_result(target: str, change: Change) -> Fault:
+    """Return a fault that changes the result of the function with the dotted name `target`."""
+    return instead(target, changing(change))
 
 
 def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:

@@ -116,15 +116,12 @@ def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
 
-def _shorter(scene: Scene, size: float) -> Scene:
-    return replace(scene, step_size=(1.0 - size) * scene.step_size)
-
-
 def _shorter_compiled(
     size: float, run: Callable[..., Trajectory], scene: Scene, *rest: Any
 ) -> Trajectory:
     """Return a compiled run with a smaller step size, but the times of the original steps."""
-    found, labels = run(_shorter(scene, size), *rest), run(scene, *rest)
+    shorter = replace(scene, step_size=(1.0 - size) * scene.step_size)
+    found, labels = run(shorter, *rest), run(scene, *rest)
     if found.steps != labels.steps:
         return found
     return replace(found, time=labels.time, recorded_time=labels.recorded_time)
@@ -134,7 +131,8 @@ def _shorter_both(
     size: float, run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any,
     **named: Any,
 ) -> Trajectory:  # fmt: skip
-    found, part = run(program, _shorter(scene, size), *rest, **named), 1.0 - size
+    part = 1.0 - size
+    found = run(program, replace(scene, step_size=part * scene.step_size), *rest, **named)
     return replace(found, time=found.time / part, recorded_time=found.recorded_time / part)
 
 
@@ -190,85 +188,65 @@ _VELOCITY, _COUNT = change_attribute("velocity", third_off), change_attribute("e
 
 PLANTS = (
     Plant("sign-in-twin", "a sign in the third equation of a twin",
-          twin("four-term", "sign", both=False), 2.0,
-          ("cells", "words")),
+          twin("four-term", "sign", both=False), 2.0, ("cells", "words")),
     Plant("sign-in-both", "a sign in the third equation, in both languages alike",
-          twin("two-term", "sign"), 2.0,
-          ("decks", "schemes")),
+          twin("two-term", "sign"), 2.0, ("decks", "schemes")),
     Plant("sign-in-series", "a sign in what the Taylor kernel is given",
           change_result("pyharness.engine.taylor.series_kernel",
-             lambda found, size: (found[0], (third_off(found[1][0], size), *found[1][1:]))), 2.0,
-          ("methods", "attitudes")),
+             lambda found, size: (found[0], (third_off(found[1][0], size), *found[1][1:]))),
+          2.0, ("methods", "attitudes")),
     Plant("sign-in-reference", "a sign in the reference itself",
           change_result("pyharness.truth.reference.exact_coefficients",
-             lambda found, size: [found[0], found[1], (1 - int(size)) * found[2]]), 2.0,
-          ("methods", "prepared")),
+             lambda found, size: [found[0], found[1], (1 - int(size)) * found[2]]),
+          2.0, ("methods", "prepared")),
     Plant("axis-in-fortran", "two axes of the compiled programs change places",
-          change_result(COMPILED, change_attribute("omega", swapped)), 1.0,
-          ("cells", "decks")),
+          change_result(COMPILED, change_attribute("omega", swapped)), 1.0, ("cells", "decks")),
     Plant("axis-in-method", "two axes of the closed form change places",
-          in_method("closed-form", changing(change_attribute("omega", swapped))), 1.0,
-          ("methods",)),
+          in_method("closed-form", changing(change_attribute("omega", swapped))),
+          1.0, ("methods",)),
     Plant("wrong-card", "the compiled programs correct another card than the one named",
-          _wrong_card, 1.0,
-          ("cells", "words")),
+          _wrong_card, 1.0, ("cells", "words")),
     Plant("half-step-in-fortran", "the compiled programs take half a step",
-          instead(COMPILED, _shorter_compiled), 0.5,
-          ("decks", "schemes")),
+          instead(COMPILED, _shorter_compiled), 0.5, ("decks", "schemes")),
     Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",
-          instead(PROGRAM, _shorter_both), 0.5,
-          ("schemes", "stops")),
+          instead(PROGRAM, _shorter_both), 0.5, ("schemes", "stops")),
     Plant("ulp-in-fortran", "one unit in the last place of one result",
-          change_result(COMPILED, bit_off), 2.0**-52,
-          ("cells",)),
+          change_result(COMPILED, bit_off), 2.0**-52, ("cells",)),
     Plant("velocity-in-fortran", "a sign in the velocity",
-          change_result(COMPILED, _VELOCITY), 2.0,
-          ("decks", "schemes")),
+          change_result(COMPILED, _VELOCITY), 2.0, ("decks", "schemes")),
     Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
-          change_result(PROGRAM, _VELOCITY), 2.0,
-          ("schemes", "stops")),
+          change_result(PROGRAM, _VELOCITY), 2.0, ("schemes", "stops")),
     Plant("coefficient-in-both", "a coefficient off by a part in 1e9, in both languages alike",
-          twin("runge-kutta", "coefficient b"), 1e-9,
-          ("schemes", "orders")),
+          twin("runge-kutta", "coefficient b"), 1e-9, ("schemes", "orders")),
     Plant("stop-in-both", "the stop test looks at another stage, in both languages alike",
-          twin("runge-kutta", "stage of the stop test"), 1.0,
-          ("stops",)),
+          twin("runge-kutta", "stage of the stop test"), 1.0, ("stops",)),
     Plant("stale-fortran", "the result of the run before",
-          lambda size: change_result(COMPILED, _stale())(size), 1.0,
-          ("stops", "cells")),
+          lambda size: change_result(COMPILED, _stale())(size), 1.0, ("stops", "cells")),
     Plant("stale-method", "the Taylor method answers with the result before",
-          lambda size: in_method("taylor", changing(_stale()))(size), 1.0,
-          ("methods", "random")),
-    Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver, 1.0,
-          ("prepared", "random")),
+          lambda size: in_method("taylor", changing(_stale()))(size), 1.0, ("methods", "random")),
+    Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver,
+          1.0, ("prepared", "random")),
     Plant("quick-refuses", "the solver for few digits refuses every scene",
-          _prepared(_refuses), 1.0,
-          ("prepared",)),
+          _prepared(_refuses), 1.0, ("prepared",)),
     Plant("label-in-fortran", "TIME shifted by half a step",
-          change_result(COMPILED, change_attribute("recorded_time", _earlier)), 0.5,
-          ("cells", "decks")),
+          change_result(COMPILED, change_attribute("recorded_time", _earlier)),
+          0.5, ("cells", "decks")),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
-          instead(PROGRAM, _label_both), 0.5,
-          ("cells", "words")),
+          instead(PROGRAM, _label_both), 0.5, ("cells", "words")),
     Plant("label-of-method", "a motion half a step late, energy and momentum conserved",
-          in_method("closed-form", _shifted), 0.5,
-          ("methods", "attitudes")),
+          in_method("closed-form", _shifted), 0.5, ("methods", "attitudes")),
     Plant("count-in-fortran", "one right-hand side too many in the count",
-          change_result(COMPILED, _COUNT), 1.0,
-          ("cells",)),
+          change_result(COMPILED, _COUNT), 1.0, ("cells",)),
     Plant("count-in-both", "the count of right-hand sides, in both languages alike",
-          change_result(PROGRAM, _COUNT), 1.0,
-          ("cells", "words")),
+          change_result(PROGRAM, _COUNT), 1.0, ("cells", "words")),
     Plant("prepared-steps", "prepared solvers in fixed steps are wrong by a hundredth",
-          _prepared(_too_large), 1e-2,
-          ("prepared",)),
+          _prepared(_too_large), 1e-2, ("prepared",)),
     Plant("digit-of-the-print", "a digit of a published figure",
           change_result("pyharness.checks.kinds.problems",
-             lambda found, size: [_digit_altered(each, size) for each in found]), 20.0,
-          ("external",)),
+             lambda found, size: [_digit_altered(each, size) for each in found]),
+          20.0, ("external",)),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
-          in_method("dop853", changing(off)), 1e-4,
-          ("methods", "orders")),
+          in_method("dop853", changing(off)), 1e-4, ("methods", "orders")),
 )  # fmt: skip
 
 

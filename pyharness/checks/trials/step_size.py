@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
 from pyharness.checks.compare.candidates import unstopped
-from pyharness.checks.divergence import DOUBLING, Runner, divergence, smallest_divergent
+from pyharness.checks.disturbances import DOUBLING, Runner, divergence, smallest_divergent
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.amplification import amplification
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below

@@ -14,8 +14,7 @@ from pyharness import case_scene
 from pyharness.checks.compare import comparison as room
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
 from pyharness.checks.compare.comparison import compare_programs, listings_for
-from pyharness.checks.compare.picture import comparison_picture
-from pyharness.checks.compare.report import comparison_report, verdict
+from pyharness.checks.compare.report import comparison_picture, comparison_report, verdict
 from pyharness.engine.registry import SCIPY_METHODS
 from pyharness.engine.report import trajectory_report
 from pyharness.model.attitude import product

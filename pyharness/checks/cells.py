@@ -6,7 +6,7 @@ Our arithmetic of machine words reproduces a machine's mantissa length and round
 for the CDC. It is checked by test vectors and by runs of the programs.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,7 +21,6 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled_in_word, in_word
 from pyharness.thesis.cells import all_cells, cell_name, listing_name
 from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
@@ -40,9 +39,8 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
     for listing, case in all_cells():
         if not chosen.thin or _is_thin(listing, case):
             is_listed = cell_name(listing, case) in listed
-            yield Attempt(
-                of_cell("cells", listing, case), partial(_of_case, listing, case, is_listed)
-            )
+            check = partial(_agreement, listing, case_scene(case), is_listed, ())
+            yield Attempt(of_cell("cells", listing, case), check)
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
@@ -56,16 +54,15 @@ def random_programs(chosen: Selection) -> Iterator[Attempt]:
         yield Attempt(chosen.name_draw(number, "program"), partial(_of_draw, chosen.seed, number))
 
 
-def _of_case(listing: Listing, case: int, is_listed: bool, name: Name) -> Check:
-    return _agreement(name, listing, case_scene(case), is_listed)
-
-
 def _of_draw(seed: str, number: int, name: Name) -> Check:
     drawn = draw(seed, number)
-    return _agreement(name, drawn.listing, drawn.scene, False, drawn.lipschitz, drawn.may_stop)
+    stop_test = drawn.lipschitz, drawn.may_stop
+    return _agreement(drawn.listing, drawn.scene, False, stop_test, name)
 
 
-def _agreement(name: Name, listing: Listing, scene: Scene, is_listed: bool, *options: Any) -> Check:
+def _agreement(
+    listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
+) -> Check:
     """Return the check that Fortran and twin agree or, if `is_listed`, that they still differ.
 
     `options` are the stop test's constant (1/s) and whether the test may end the run.
@@ -112,11 +109,11 @@ def words(chosen: Selection) -> Iterator[Attempt]:
             continue
         name = of_cell("words", listing, case)
         if chosen.only or _is_few(listing):
-            yield Attempt(name, partial(_against_floats, listing, case))
+            yield Attempt(name, partial(_in_word, listing, case, None))
         if chosen.only or _has_all_or_none(listing):
             for word in compiled_in_word.compiled_words():
                 own = replace(name, subject=f"{word}/{listing.program}")
-                yield Attempt(own, partial(_against_fortran, listing, case, word))
+                yield Attempt(own, partial(_in_word, listing, case, word))
 
 
 def _vectors(name: Name) -> Check:
@@ -124,20 +121,16 @@ def _vectors(name: Name) -> Check:
     return name.bounded(len(wrong), 0.0, _VECTORS, ", ".join(wrong))
 
 
-def _against_floats(listing: Listing, case: int, name: Name) -> Check:
-    floats = run_program(case_scene(case), listing, "python")
-    return _same(name, floats, in_word.run(case_scene(case), listing, WORDS[BINARY64]))
-
-
-def _against_fortran(listing: Listing, case: int, word: str, name: Name) -> Check:
+def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
+    """Return the check of the twin in a word against Fortran or, without a word, against floats."""
     scene = case_scene(case)
-    fortran = compiled_in_word.run(scene, listing, WORDS[word])
-    return _same(name, in_word.run(scene, listing, WORDS[word]), fortran)
-
-
-def _same(name: Name, one: Trajectory, other: Trajectory) -> Check:
-    found = differences(one, other)
-    return name.judged(not found, ", ".join(found), distance(one, other), 0.0, BITS)
+    ours = in_word.run(scene, listing, WORDS[word or BINARY64])
+    if word is None:
+        other = run_program(scene, listing, "python")
+    else:
+        other = compiled_in_word.run(scene, listing, WORDS[word])
+    found = differences(ours, other)
+    return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
 
 
 def _has_all_or_none(listing: Listing) -> bool:
@@ -145,5 +138,4 @@ def _has_all_or_none(listing: Listing) -> bool:
 
 
 def _is_few(listing: Listing) -> bool:
-    few = len(listing.defects) + len(listing.readings) <= 1
-    return few or _has_all_or_none(listing)
+    return len(listing.defects) + len(listing.readings) <= 1 or _has_all_or_none(listing)

@@ -18,7 +18,7 @@ from pyharness.checks.check import BITS, Check, Name, Selection
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.thesis.cells import cell_name
-from pyharness.thesis.decks import Run, compiler, deck_text, run_deck, solver_object
+from pyharness.thesis.decks import compiler, deck_text, run_deck, solver_object
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
@@ -72,16 +72,12 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     overflowed = port.ended == "overflow"
     if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
         faults.append("the page differs")
-    faults += _after(deck, port.steps, overflowed)
+    # Records of the deck after the port's last row.
+    rest = deck.tape5[port.steps :]
+    if not overflowed:
+        faults += [f"{len(rest)} records more"] if len(rest) else []
+    elif not len(rest) or np.isfinite(rest[:, 1:4]).all(axis=1).any():
+        faults.append("it continues with finite numbers where the port has none")
     with np.errstate(all="ignore"):
         apart = float(np.abs(found - wanted[: len(found)]).max(initial=0.0))
     return name.judged(not faults, ", ".join(faults), apart, 0.0, BITS)
-
-
-def _after(deck: Run, steps: int, overflowed: bool) -> list[str]:
-    """Return faults in the deck's records after the port's last row."""
-    rest = deck.tape5[steps:]
-    if not overflowed:
-        return [f"{len(rest)} records more"] if len(rest) else []
-    fine = len(rest) > 0 and not np.isfinite(rest[:, 1:4]).all(axis=1).any()
-    return [] if fine else ["it continues with finite numbers where the port has none"]

@@ -58,8 +58,6 @@ _PUBLISHED = Basis(
 )
 
 _Row = TypeVar("_Row")
-
-
 # Result of a method at one time: omega, and a bound on the error of each component (rad/s).
 _Result = tuple[Array, float]
 
@@ -72,10 +70,8 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
     for problem in problems:
         # Times of one sign are solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):
-            values = sorted(
-                (value for value in problem.values if float(value.time) * side > 0.0),
-                key=lambda value: abs(float(value.time)),
-            )
+            values = [value for value in problem.values if float(value.time) * side > 0.0]
+            values.sort(key=lambda value: abs(float(value.time)))
             if any(may_hold(f"external/{problem.name}/{value.time}", only) for value in values):
                 bare = replace(problem, scene=replace(problem.scene, attitude=None))
                 yield from _side(bare, [each for each in values if any(each.omega)], only)
@@ -86,12 +82,9 @@ def _names(
     problem: Problem, values: Sequence[Value], method: str, only: Sequence[str], quantity: str = ""
 ) -> list[tuple[int, Name]]:
     given = "" if problem.path is None else f" --external {shlex.quote(problem.path)}"
-    places = [f"{problem.name}/{value.time}" for value in values]
-    names = [
-        Name("external", method, place, quantity=quantity, command=f"verify{given}")
-        for place in places
-    ]
-    asked = [(row, name) for row, name in enumerate(names) if selected(name.id, only)]
+    own = partial(Name, "external", method, quantity=quantity, command=f"verify{given}")
+    names = enumerate(own(f"{problem.name}/{value.time}") for value in values)
+    asked = [(row, name) for row, name in names if selected(name.id, only)]
     times = [float(value.time) for value in values]
     return asked if asked and _can_take(method, problem.scene, times) else []
 
@@ -195,24 +188,20 @@ def _as_far_as_solved(
     return rows, ""
 
 
-def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
-    """Return omega and its error bound (rad/s) at each value; None for a singular program."""
-    if method in PROGRAMS:
-        return [_program(problem, value, method) for value in values]
-    return [*_solved(problem.scene, [float(value.time) for value in values], method)]
-
-
 def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
     if method == "closed-form":
         return closed_form(scene) is not None
     if method == "quick":
-        return (
-            prepared_candidate(method, _TOLERANCES[method]).end(scene, times[0]).ended != "refused"
-        )
+        end = prepared_candidate(method, _TOLERANCES[method]).end(scene, times[0])
+        return end.ended != "refused"
     return method not in PROGRAMS or times[0] > 0.0
 
 
-def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Result]:
+def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
+    """Return omega and its error bound (rad/s) at each value; None for a singular program."""
+    if method in PROGRAMS:
+        return [_program(problem, value, method) for value in values]
+    scene, times = problem.scene, [float(value.time) for value in values]
     tolerance = _TOLERANCES.get(method, 0.0)
     if method == "quick":
         ends = [prepared_candidate(method, tolerance).end(scene, time) for time in times]
@@ -222,8 +211,7 @@ def _solved(scene: Scene, times: Sequence[float], method: str) -> Iterator[_Resu
     else:
         tolerance = max(tolerance, finest(method, scene, times[-1]))
         rows = method_candidate(method, tolerance).rows(scene, times).omega
-    for omega in rows:
-        yield omega, tolerance * _scale(scene, omega)
+    return [(omega, tolerance * _scale(scene, omega)) for omega in rows]
 
 
 def _program(problem: Problem, value: Value, program: str) -> _Result | None:
@@ -276,8 +264,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
     # NaN counts as the largest difference, although every comparison with NaN is false.
-    worst = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
-    distance, limit, note = worst
+    distance, limit, note = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     return name.bounded(distance, limit, _PUBLISHED, note)
 
 

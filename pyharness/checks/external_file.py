@@ -145,18 +145,9 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
             raise InputError(f"[[value]] time {value.time} is given twice; give each time once")
         values[float(value.time)] = value
     told = tuple(values.values())
-    return Problem(
-        name=name,
-        **texts,
-        unit=unit,
-        scene=replace(
-            scene,
-            omega=(first, second, third),
-            attitude=(scene.attitude or IDENTITY) if any(v.pointing for v in told) else None,
-        ),
-        values=told,
-        path=given,
-    )
+    attitude = (scene.attitude or IDENTITY) if any(value.pointing for value in told) else None
+    scene = replace(scene, omega=(first, second, third), attitude=attitude)
+    return Problem(name, **texts, unit=unit, scene=scene, values=told, path=given)
 
 
 def _value(entry: object, sequence: object) -> Value:

@@ -63,9 +63,8 @@ class Recorded:
     def run(self) -> Trajectory:
         """Return the trajectory, newly computed."""
         if self.source in PROGRAMS:
-            listing = (Listing.original if self.name.endswith("original") else Listing.corrected)(
-                self.source
-            )
+            is_original = self.name.endswith("original")
+            listing = (Listing.original if is_original else Listing.corrected)(self.source)
             return program_candidate(listing).rows(self.scene)
         return method_candidate(self.source, self.tolerance or 1.0).rows(self.scene)
 
@@ -158,10 +157,8 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
             _ = file["mathematics"]
             found[path.stem] = file
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(
-                f"'{path}': is not a golden record "
-                f"({' '.join(str(error).split()) or 'empty'}); {_ANEW}"
-            ) from None
+            told = " ".join(str(error).split()) or "empty"
+            raise InputError(f"'{path}': is not a golden record ({told}); {_ANEW}") from None
     return found
 
 
@@ -198,22 +195,18 @@ def _entry(each: Recorded, run: Trajectory) -> dict[str, Any]:
     n = len(rows)
     shown = sorted({step for step in (*_STEPS, n) if 1 <= step <= n})
     stop = run.stop
+    digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
+    if run.ier is not None:
+        digest.update(run.ier.astype("<i4").tobytes())
     return {
         "command": each.command,
         "ended": run.ended,
         "steps": run.steps,
         "evaluations": run.evaluations,
         "stop": "" if stop is None else f"{stop.step} {stop.variable} {stop.quotient.hex()}",
-        "digest": _digest(rows, run),
+        "digest": digest.hexdigest()[:32],
         "rows": [[str(step), *map(float.hex, rows[step - 1].tolist())] for step in shown],
     }
-
-
-def _digest(rows: Array, run: Trajectory) -> str:
-    digest = hashlib.sha256(np.where(np.isnan(rows), np.nan, rows).astype("<f8").tobytes())
-    if run.ier is not None:
-        digest.update(run.ier.astype("<i4").tobytes())
-    return digest.hexdigest()[:32]
 
 
 def _rows(entry: dict[str, Any]) -> Array:
@@ -234,9 +227,7 @@ def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
             away = ulps(before[:, first:last], after[:, first:last])
             if away:
                 parts.append(f"{name} by {away:.4g} ulp")
-    if not parts:
-        parts.append("between the rows that are shown")
-    return ", ".join(parts)
+    return ", ".join(parts) or "between the rows that are shown"
 
 
 def _text(name: str, entries: list[dict[str, Any]]) -> str:
@@ -249,10 +240,9 @@ def _text(name: str, entries: list[dict[str, Any]]) -> str:
     ]
     for entry in entries:
         lines += ["", "[[trajectory]]"]
-        for key, value in entry.items():
-            if key != "rows":
-                lines.append(f"{key} = {value}" if isinstance(value, int) else f'{key} = "{value}"')
-        lines.append("rows = [")
-        lines += ["  [" + ", ".join(f'"{x}"' for x in row) + "]," for row in entry["rows"]]
-        lines.append("]")
+        for key in _KEYS:
+            value = entry[key]
+            lines.append(f"{key} = {value}" if isinstance(value, int) else f'{key} = "{value}"')
+        rows = ["  [" + ", ".join(f'"{x}"' for x in row) + "]," for row in entry["rows"]]
+        lines += ["rows = [", *rows, "]"]
     return "\n".join(lines) + "\n"

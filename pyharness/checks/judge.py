@@ -48,17 +48,8 @@ def of_end(method: str, end: End) -> Answer:
     if end.is_refused:
         return Answer(refusal=f"{method}: {end.ended}")
     attitude = None if end.attitude is None else end.attitude[None, :]
-    rows, counts = end.omega[None, :], (end.steps, end.evaluations)
-    return Answer(rows, attitude, end.ended, *counts, is_whole=end.has_result)
-
-
-def of_rows(candidate: Candidate, scene: Scene, times: Sequence[float]) -> Answer:
-    """Return a candidate's answer at all `times` (s), with attitudes if the scene has one."""
-    run = candidate.rows(scene, list(times))
-    has_rows = run.has_all_rows and run.time.tolist() == list(times)
-    if has_rows and (run.attitude is None) == (scene.attitude is None):
-        return Answer(run.omega, run.attitude, run.ended)
-    return Answer(ended=f"{run.ended}, other rows than requested", is_whole=False)
+    found = end.omega[None, :], attitude, end.ended, end.steps, end.evaluations
+    return Answer(*found, is_whole=end.has_result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +71,20 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve`, with results at all `times` (s)."""
-    ask = method_candidate(method, tolerance)
-    return MethodRun(method, tolerance, scene, lambda: of_rows(ask, scene, times))
+    """Return a deferred run of a method by `solve`, with results at all `times` (s).
+
+    It has attitudes if the scene has one.
+    """
+    candidate = method_candidate(method, tolerance)
+
+    def ask() -> Answer:
+        run = candidate.rows(scene, list(times))
+        has_rows = run.has_all_rows and run.time.tolist() == list(times)
+        if has_rows and (run.attitude is None) == (scene.attitude is None):
+            return Answer(run.omega, run.attitude, run.ended)
+        return Answer(ended=f"{run.ended}, other rows than requested", is_whole=False)
+
+    return MethodRun(method, tolerance, scene, ask)
 
 
 def by_end(

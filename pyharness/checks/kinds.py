@@ -18,15 +18,15 @@ from pyharness.checks.schemes import schemes, stops
 
 def _external(chosen: Selection) -> Iterator[Check]:
     asked = problems() if chosen.problems is None else chosen.problems
-    for check in external_checks(asked, _THIN_EXTERNAL if chosen.thin else chosen.only):
-        if chosen.asks(check.id):
-            yield check
+    found = external_checks(asked, _THIN_EXTERNAL if chosen.thin else chosen.only)
+    return (check for check in found if chosen.asks(check.id))
 
 
 _THIN_EXTERNAL = [
     f"external/detest-b5/20/{name}" for name in ("reference", "taylor", "gauss-4", "runge-kutta")
 ]
 
+_RANDOM = (random_programs, random_methods, random_attitudes, random_torques)
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Fortran against the Python twin for every cell: all bits of the trajectory, the counters, and
     # the stop.
@@ -50,12 +50,7 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     "orders": orders,
     # Programs, methods and attitudes in scenes drawn from a seed, half of them of the difficult
     # kinds in `NASTY`; methods under torques that depend on omega or attitude.
-    "random": lambda chosen: chain(
-        random_programs(chosen),
-        random_methods(chosen),
-        random_attitudes(chosen),
-        random_torques(chosen),
-    ),
+    "random": lambda chosen: chain.from_iterable(each(chosen) for each in _RANDOM),
     # Methods and programs against published results that were not computed here.
     "external": _external,
     # Trajectories against the golden record of an earlier run.

@@ -12,11 +12,7 @@ import numpy as np
 
 from pyharness.checks.check import BITS, Attempt, Check, Name, Selection
 from pyharness.checks.compare.agreement import ulps
-from pyharness.checks.compare.candidates import (
-    attitude_candidate,
-    method_candidate,
-    prepared_candidate,
-)
+from pyharness.checks.compare.candidates import method_candidate, prepared_candidate
 from pyharness.checks.judge import (
     AS_STATED,
     MethodRun,
@@ -123,8 +119,9 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
     """Return a deferred call of a prepared solver to `time` (s), after another initial omega."""
-    prepare = attitude_candidate if scene.attitude else prepared_candidate
-    return by_end(method, prepare(method, tolerance, primed=True), tolerance, scene, time)
+    attitude = scene.attitude is not None
+    candidate = prepared_candidate(method, tolerance, primed=True, attitude=attitude)
+    return by_end(method, candidate, tolerance, scene, time)
 
 
 def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> Check:

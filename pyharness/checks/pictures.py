@@ -93,16 +93,10 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         axes.tick_params(axis="x", labelsize=6)
     grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
     series = {(mark.rank, mark.what): mark for mark in reversed(marks)}
-    handles = [
-        Line2D(
-            [],
-            [],
-            **series[each].style,
-            markersize=4.0,
-            label=" ".join(each).strip() or "no setting",
-        )
-        for each in dict.fromkeys((mark.rank, mark.what) for mark in marks)
-    ]
+    handles = []
+    for each in dict.fromkeys((mark.rank, mark.what) for mark in marks):
+        label = " ".join(each).strip() or "no setting"
+        handles.append(Line2D([], [], **series[each].style, markersize=4.0, label=label))
     inches = width * columns
     told = (
         f"{trial.name}: {trial.title}",
@@ -122,8 +116,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
 def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
     """Return each problem's horizontal position, leaving space for the name of its kind."""
     names = dict.fromkeys((mark.kind, mark.circumstance) for mark in marks)
-    places = {}
-    place = 0.0
+    places, place = {}, 0.0
     for kind in dict.fromkeys(kind for kind, _ in names):
         members = [each for each in names if each[0] == kind]
         spare = max(0.0, _PLACES_PER_LETTER * len(kind) - len(members))
@@ -138,23 +131,21 @@ def _places(marks: Sequence[_Mark]) -> dict[tuple[str, str], float]:
 def _panel(
     axes: "Axes", name: str, marks: Sequence[_Mark], places: dict[tuple[str, str], float]
 ) -> None:
-    def at(some: Sequence[_Mark]) -> list[float]:
-        return [places[mark.kind, mark.circumstance] for mark in some]
-
     for rank, what in dict.fromkeys((mark.rank, mark.what) for mark in marks):
         members = [mark for mark in marks if (mark.rank, mark.what) == (rank, what)]
         style = members[0].style
         for judged in (True, False):
             own = [mark for mark in members if (mark.check.limit is not None) == judged]
+            at = [places[mark.kind, mark.circumstance] for mark in own]
             axes.plot(
-                at(own), [_inside(mark.check.value) for mark in own], **style, markersize=3.0,
+                at, [_inside(mark.check.value) for mark in own], **style, markersize=3.0,
                 markerfacecolor=style["color"] if judged else "none", markeredgewidth=0.6,
             )  # fmt: skip
-        limited = [mark for mark in members if mark.check.limit is not None]
         for kind in dict.fromkeys(mark.kind for mark in members):
-            own = [mark for mark in limited if mark.kind == kind]
+            own = [mark for mark in members if mark.kind == kind and mark.check.limit is not None]
+            at = [places[mark.kind, mark.circumstance] for mark in own]
             axes.plot(
-                at(own), [_inside(mark.check.limit) for mark in own], color=style["color"],
+                at, [_inside(mark.check.limit) for mark in own], color=style["color"],
                 linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
             )  # fmt: skip
     axes.set_yscale("log")

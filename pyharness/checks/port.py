@@ -12,6 +12,7 @@ import statistics
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -77,16 +78,13 @@ class PortCheck(Check):
 
 def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[str]) -> list[Cell]:
     """Return the cells whose names begin with an element of `cells`; all if it is empty."""
-    return [
-        Cell(
-            cell_name(listing, case), of_cell("port", listing, case),
-            f"--cell {cell_name(listing, case)}", listing, case_scene(case),
-        )
-        for listing, case in all_cells()
-        if listing.program in programs
-        and case in cases
-        and selected(cell_name(listing, case), cells)
-    ]  # fmt: skip
+    found = []
+    for listing, case in all_cells():
+        name = cell_name(listing, case)
+        if listing.program in programs and case in cases and selected(name, cells):
+            of = of_cell("port", listing, case)
+            found.append(Cell(name, of, f"--cell {name}", listing, case_scene(case)))
+    return found
 
 
 def random_cells(
@@ -131,10 +129,8 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 def refuse_port(command: str) -> None:
     """Raise InputError if `command`, which does not answer as an integrator, is a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
-    refuse_other(
-        command, "--integrator", "--port", cell.request,
-        lambda answer: read_answer(answer, cell.scene.steps),
-    )  # fmt: skip
+    read = partial(read_answer, steps=cell.scene.steps)
+    refuse_other(command, "--integrator", "--port", cell.request, read)
 
 
 def replay_command(command: str, cell: Cell | None = None) -> str:

@@ -12,7 +12,6 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from pyharness.model.errors import InputError, printable
@@ -100,12 +99,7 @@ class PortProcess:
         os.set_blocking(self._errors.fileno(), False)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """End the port's process and all its child processes."""
         # A group whose processes have all ended is not found, which macOS reports as
         # PermissionError.

@@ -9,7 +9,7 @@ Torques that depend on omega or attitude are sums of recorded functions or of re
 reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from random import Random
@@ -70,7 +70,7 @@ _FINE = 1e-9
 _MORE_WORK = "allow more work"
 _EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
 
-Entrances = Mapping[str, Callable[[], MethodRun]]
+Entrances = dict[str, Callable[[], MethodRun]]
 
 
 def truth_of(drawn: Draw) -> Truth:
@@ -149,19 +149,19 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
             again = chosen.name_draw(number).replay
             yield replace(none.judged(may, f"{drawn.scene.name}: {refusal}"), again=again)
             continue
-        yield from _sampled(chosen, number, asked, truth, POLICY)
+        for subject, tried in asked.items():
+            yield Attempt(chosen.name_draw(number, subject), partial(sample, tried, truth, POLICY))
 
 
 def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of attitudes, if the true attitude is known despite rounding."""
-    tolerance_at = METHODS["taylor"].finest
     for number in range(0, chosen.draws, _EVERY_ATTITUDE):
         if not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
         scene = replace(drawn.scene, attitude=START)
         times = (_EARLIER * drawn.time, drawn.time)
-        tolerance = drawn.tolerance(tolerance_at)
+        tolerance = drawn.tolerance(METHODS["taylor"].finest)
         entrances: Entrances = {
             "attitude-auto": partial(run_of_solve, "auto", tolerance, scene, times),
             "attitude-taylor": partial(run_of_solve, "taylor", tolerance, scene, times),
@@ -174,12 +174,12 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             # The motion diverges, or is too fast or long for any true solution.
             continue
         if truth and allowed(truth, 0.0, 1.0) < 1.0:
-            yield from _sampled(chosen, number, asked, truth, IF_CALM)
+            for subject, tried in asked.items():
+                made = partial(sample, tried, truth, IF_CALM)
+                yield Attempt(chosen.name_draw(number, subject), made)
 
 
-def _requested(
-    is_asked: Callable[[str], bool], number: int, entrances: Entrances
-) -> dict[str, Callable[[], MethodRun]]:
+def _requested(is_asked: Callable[[str], bool], number: int, entrances: Entrances) -> Entrances:
     return {name: x for name, x in entrances.items() if is_asked(f"random/{number}/{name}")}
 
 
@@ -190,7 +190,7 @@ def _entrances(drawn: Draw, number: int, thin: bool) -> Entrances:
     if number // 2 % _EVERY_SLOW == 0 and not thin:
         names += [*SCIPY_METHODS, "reference"]
     times = (_EARLIER * drawn.time, drawn.time)
-    found: dict[str, Callable[[], MethodRun]] = {}
+    found: Entrances = {}
     for name in names:
         tolerance = drawn.tolerance(REGISTRY[name].finest)
         found[f"solve-{name}"] = partial(by_rows, name, tolerance, drawn.scene, times)
@@ -208,13 +208,6 @@ def _prepared(name: str, drawn: Draw) -> MethodRun:
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
     return MethodRun(name, tolerance, drawn.scene, ask)
-
-
-def _sampled(
-    chosen: Selection, number: int, entrances: Entrances, truth: Truth, policy: Policy
-) -> Iterator[Attempt]:
-    for subject, tried in entrances.items():
-        yield Attempt(chosen.name_draw(number, subject), partial(sample, tried, truth, policy))
 
 
 def sample(tried: Callable[[], MethodRun], truth: Truth, policy: Policy, name: Name) -> Sample:
@@ -263,7 +256,7 @@ def _torque_entrances(scene: Scene, time: float, source: Random, is_slow: bool) 
         finest = max(METHODS[name].finest, 0.0 if name in PREPARED_FOR_STATE else _FINE)
         return float(COARSEST * (finest / COARSEST) ** digits)
 
-    found: dict[str, Callable[[], MethodRun]] = {}
+    found: Entrances = {}
     for name in (*PREPARED_FOR_STATE, *slow):
         found[f"torque-solve-{name}"] = partial(by_rows, name, tolerance(name), scene, times)
     for name in PREPARED_FOR_STATE:

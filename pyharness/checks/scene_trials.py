@@ -11,13 +11,7 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import BITS, REFUSED, Attempt, Attempts, Check, Name
-from pyharness.checks.judge import (
-    MethodRun,
-    Truth,
-    by_rows,
-    judge,
-    reference_truth,
-)
+from pyharness.checks.judge import MethodRun, Truth, by_rows, judge, reference_truth
 from pyharness.checks.orders import in_few_steps, order_if_seen
 from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named

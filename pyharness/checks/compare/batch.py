@@ -1,7 +1,7 @@
 """Batches of scenes; arrays hold the quantities in which the scenes differ."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -67,6 +67,9 @@ class Batch:
     t_end: Array
     arrays: Mapping[str, Array]
     attitude: bool = False
+    # By number of samples.
+    _rows: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
+    _found: dict[int, list[Ensemble]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def omega0(self) -> Array:
@@ -171,10 +174,14 @@ class Batch:
         Raise InputError if a number is invalid.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
-        scene = self.scene
-        if not scene.torque.needs_attitude:
-            scene = replace(scene, attitude=None)
-        return scene_of_row(scene, own, i)
+        return scene_of_row(self._shared, own, i)
+
+    @cached_property
+    def _shared(self) -> Scene:
+        """Return `scene`, with an attitude only if the torque needs it."""
+        return (
+            self.scene if self.scene.torque.needs_attitude else replace(self.scene, attitude=None)
+        )
 
     @cached_property
     def _ends(self) -> Ensemble:
@@ -183,14 +190,6 @@ class Batch:
     @cached_property
     def _program(self) -> ProgramEnsemble:
         return self.run([self.scene.steps])
-
-    @cached_property
-    def _rows(self) -> dict[int, Array]:
-        return {}
-
-    @cached_property
-    def _found(self) -> dict[int, list[Ensemble]]:
-        return {}
 
     def _samples(self, samples: int) -> list[Ensemble]:
         if samples not in self._found:
@@ -218,12 +217,10 @@ class Batch:
         arrays: dict[str, Any] = {
             name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
         }
-        scene = self.scene
-        if not scene.torque.needs_attitude:
-            scene = replace(scene, attitude=None)
+        if not self.scene.torque.needs_attitude:
             arrays.pop("attitude0", None)
         arrays |= more
-        return solve_many(scene, t_end, method=method, tolerance=tolerance, **arrays)
+        return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **arrays)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)
@@ -254,8 +251,8 @@ class Batch:
         )
         for i in range(n):
             own = {name: array[i : i + 1] for name, array in self.arrays.items()}
+            scene = self.scene
             try:
-                scene = self.scene
                 if "torque_rate" in own:
                     rate = own.pop("torque_rate")[0]
                     scene = replace(scene, torque=replace(scene.law, rate=rate))
@@ -270,11 +267,5 @@ class Batch:
     def _run(self, scene: Scene, arrays: Mapping[str, Array], at: list[int]) -> ProgramEnsemble:
         assert self.listing is not None
         options: dict[str, Any] = {"lipschitz": self.solver.lipschitz, **arrays}
-        return run_many(
-            replace(scene, attitude=None),
-            self.listing,
-            may_stop=self.solver.may_stop,
-            at=at,
-            effort=_EFFORT,
-            **options,
-        )
+        options |= {"may_stop": self.solver.may_stop, "at": at, "effort": _EFFORT}
+        return run_many(replace(scene, attitude=None), self.listing, **options)

@@ -14,19 +14,13 @@ from pyharness.model.records import (
     listing_record,
     scene_record,
 )
-from pyharness.model.report import (
-    Column,
-    Picture,
-    Report,
-    Table,
-    digits,
-    numbers,
-    short,
-    words,
-)
+from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short, words
 from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 from pyharness.thesis.programs import BINARY64
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _PROGRAMS_LEGEND = (
@@ -69,20 +63,9 @@ def comparison_report(comparison: Comparison) -> Report:
     tables = [[_programs(comparison)]] if comparison.programs else []
     tables.append([_methods(comparison)])
 
-    def draw() -> Picture:
-        from pyharness.checks.compare.report import comparison_picture
-
-        return comparison_picture(comparison)
-
     return Report(
         "compare",
-        text=[
-            [*scene, *reference, *motion],
-            [legend],
-            *tables,
-            *attitudes,
-            [*failures, *told],
-        ],
+        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, [*failures, *told]],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],
@@ -158,9 +141,10 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
     columns = (
         *words("attitude listing"), Column("angle", short, unit="rad"), Column("L in space", short),
     )  # fmt: skip
-    found = [
+    found: list[tuple[str, str | None, Accuracy]] = [
         (each.listing.program, each.listing.label, each.accuracy) for each in comparison.programs
-    ] + [(each.method, None, each.accuracy) for each in comparison.methods if each.accuracy]
+    ]
+    found += [(each.method, None, each.accuracy) for each in comparison.methods if each.accuracy]
     rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found]
     return [[Table(columns, rows)]]
 
@@ -205,9 +189,7 @@ def _end(run: Trajectory, limit: float | None) -> str:
 
 
 def _count(ulps: float | None) -> str:
-    if ulps is None:
-        return "-"
-    return f"{ulps:.0f}" if ulps < 1000 else short(ulps)
+    return short(ulps) if ulps is None or ulps >= 1000 else f"{ulps:.0f}"
 
 
 def _record(comparison: Comparison) -> dict[str, Any]:
@@ -268,9 +250,6 @@ def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
     }
 
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 # Dashes and widths distinguish the lines without colour.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
@@ -296,12 +275,10 @@ class _Curve(NamedTuple):
 
 
 def _curves(comparison: Comparison) -> list[_Curve]:
-    if comparison.programs:
-        return [
-            _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
-            for each in comparison.programs
-        ]
     return [
+        _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
+        for each in comparison.programs
+    ] or [
         _Curve(each.method, "", each.trajectory, each.accuracy)
         for each in comparison.methods
         if each.trajectory is not None and each.accuracy is not None

@@ -79,10 +79,9 @@ def _law(scene: Scene, t: Any) -> list[Any]:
     found = []
     for axis in range(3):
         value = law.constant[axis] + law.rate[axis] * t
-        for amplitude, frequency in law.sines:
-            value = value + amplitude[axis] * np.sin(frequency * t)
-        for amplitude, frequency in law.cosines:
-            value = value + amplitude[axis] * np.cos(frequency * t)
+        for waves, function in ((law.sines, np.sin), (law.cosines, np.cos)):
+            for amplitude, frequency in waves:
+                value = value + amplitude[axis] * function(frequency * t)
         found.append(value)
     return found
 

@@ -94,9 +94,8 @@ def judge_integrator(
     """Return the results of all checks of an integrator, started by `command`.
 
     ``again(name)`` returns the command that repeats the checks in a scene. ``told`` receives the
-    number of finished problems and the name of the next. `due` is the required order.
-    An invalid answer ends the checks. Raise InputError if the
-    command is empty.
+    number of finished problems and the name of the next. `due` is the required order. An invalid
+    answer ends the checks. Raise InputError if the command is empty.
     """
     found = Verdict(command, again)
     where = "start"
@@ -146,10 +145,10 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
             low |= {(each.part, problem.name) for each in judged.convergences if each.converges}
     if named:
         explained.add("long")
-    names = [check.name for check in found.checks if not check.passed]
+    failed = [check.name for check in found.checks if not check.passed]
     where = [
         each.circumstance or each.subject
-        for each in names
+        for each in failed
         if each.subject != "fault" and (each.subject, each.circumstance) not in low
     ]
     return tuple(dict.fromkeys(each for each in where if each not in explained))

@@ -114,7 +114,6 @@ def integrator_picture(found: Verdict) -> Picture:
     figure = Figure(figsize=(11.0, 4.2), dpi=110, layout="constrained")
     panels: list[Axes] = list(figure.subplots(1, 3))
     rows: list[list[Any]] = []
-    what = "tolerance" if found.control == "tolerance" else "step size"
     for part, axes in zip(PARTS, panels, strict=False):
         for judged in found.judged:
             each = judged.order_of(part)
@@ -129,7 +128,7 @@ def integrator_picture(found: Verdict) -> Picture:
             rows += [[judged.problem.name, part, x, error] for x, error in pairs]
         unit = "relative" if part == "omega" else "rad"
         axes.set_title(f"error of {part}, {unit}", fontsize=10)
-        axes.set_xlabel(what if found.control == "tolerance" else f"{what}, s")
+        axes.set_xlabel("tolerance" if found.control == "tolerance" else "step size, s")
         axes.grid(True, alpha=0.3)
         if axes.lines:
             axes.legend(fontsize=7)

@@ -19,18 +19,13 @@ from types import ModuleType
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
-import numpy as np
-
 from pyharness import thesis
 from pyharness.engine.registry import METHODS
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
-
-COMPILED = "pyharness.thesis.compiled.run"
-PROGRAM = "pyharness.thesis.programs.Program.run"  # in either language
 
 Fault = Callable[[float], AbstractContextManager[Any]]
 """A function from the size of a fault to a context in which the fault is present.
@@ -100,38 +95,6 @@ def change_attribute(name: str, change: Change) -> Change:
     return changed
 
 
-def plus(found: Any, size: float) -> Any:
-    """Return a number plus `size`, or plus its integer part if the number is an integer."""
-    return found + (int(size) if isinstance(found, int) else size)
-
-
-def off(found: Any, size: float) -> Any:
-    """Return omega, or a result with it, each component enlarged by `size` times the largest."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, omega=off(found.omega, size))
-    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
-
-
-def bit_off(found: Any, size: float) -> Any:
-    """Return an array, or a result with omega, with the largest element times 1 + `size`."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, omega=bit_off(found.omega, size))
-    wrong = found.copy()
-    wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
-    return wrong
-
-
-def third_off(found: Array, size: float) -> Array:
-    """Return vectors whose third component is multiplied by 1 - `size`."""
-    wrong: Array = found * [1.0, 1.0, 1.0 - size]
-    return wrong
-
-
-def swapped(found: Array, size: float) -> Array:
-    """Return vectors with the first two components exchanged, if the size is not 0."""
-    return found[:, [1, 0, 2]] if size else found
-
-
 class TwinFault(NamedTuple):
     """A fault in a twin, the Python port of a program: a row of `data/plants.toml`."""
 
@@ -196,9 +159,6 @@ def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> M
             assert text.count(right) == 1, f"{right!r} stands {text.count(right)} times in {file}"
             text = text.replace(right, wrong)
         path.write_text(text)
-    sys.path.insert(0, str(folder))
-    try:
+    with patch.object(sys, "path", [str(folder), *sys.path]):
         importlib.invalidate_caches()
         return importlib.import_module(f"{package}.{program.replace('-', '_')}")
-    finally:
-        sys.path.remove(str(folder))

@@ -20,20 +20,13 @@ from pyharness.checks.check import Selection
 from pyharness.checks.external_file import Problem
 from pyharness.checks.kinds import verify
 from pyharness.checks.plants.faults import (
-    COMPILED,
-    PROGRAM,
     Change,
     Fault,
-    bit_off,
     change_attribute,
     change_result,
     changing,
     in_method,
     instead,
-    off,
-    plus,
-    swapped,
-    third_off,
     twin,
 )
 from pyharness.checks.plants.outcome import Outcome, control
@@ -45,6 +38,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import Program
 
+_COMPILED = "pyharness.thesis.compiled.run"
+_PROGRAM = "pyharness.thesis.programs.Program.run"  # in either language
+
 
 @dataclass(frozen=True)
 class Plant:
@@ -55,6 +51,38 @@ class Plant:
     planted: Fault
     size: float
     kinds: tuple[str, ...]
+
+
+def _plus(found: Any, size: float) -> Any:
+    """Return a number plus `size`, or plus its integer part if the number is an integer."""
+    return found + (int(size) if isinstance(found, int) else size)
+
+
+def _off(found: Any, size: float) -> Any:
+    """Return omega, or a result with it, each component enlarged by `size` times the largest."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=_off(found.omega, size))
+    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+
+
+def _bit_off(found: Any, size: float) -> Any:
+    """Return an array, or a result with omega, with the largest element times 1 + `size`."""
+    if not isinstance(found, np.ndarray):
+        return replace(found, omega=_bit_off(found.omega, size))
+    wrong = found.copy()
+    wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
+    return wrong
+
+
+def _third_off(found: Array, size: float) -> Array:
+    """Return vectors whose third component is multiplied by 1 - `size`."""
+    wrong: Array = found * [1.0, 1.0, 1.0 - size]
+    return wrong
+
+
+def _swapped(found: Array, size: float) -> Array:
+    """Return vectors with the first two components exchanged, if the size is not 0."""
+    return found[:, [1, 0, 2]] if size else found
 
 
 def _stale() -> Change:
@@ -184,7 +212,7 @@ def _digit_altered(known: Problem, size: float) -> Problem:
     return replace(known, values=(replace(value, omega=omega), *known.values[1:]))
 
 
-_VELOCITY, _COUNT = change_attribute("velocity", third_off), change_attribute("evaluations", plus)
+_VELOCITY, _COUNT = change_attribute("velocity", _third_off), change_attribute("evaluations", _plus)
 
 PLANTS = (
     Plant("sign-in-twin", "a sign in the third equation of a twin",
@@ -193,35 +221,35 @@ PLANTS = (
           twin("two-term", "sign"), 2.0, ("decks", "schemes")),
     Plant("sign-in-series", "a sign in what the Taylor kernel is given",
           change_result("pyharness.engine.taylor.series_kernel",
-             lambda found, size: (found[0], (third_off(found[1][0], size), *found[1][1:]))),
+             lambda found, size: (found[0], (_third_off(found[1][0], size), *found[1][1:]))),
           2.0, ("methods", "attitudes")),
     Plant("sign-in-reference", "a sign in the reference itself",
           change_result("pyharness.truth.reference.exact_coefficients",
              lambda found, size: [found[0], found[1], (1 - int(size)) * found[2]]),
           2.0, ("methods", "prepared")),
     Plant("axis-in-fortran", "two axes of the compiled programs change places",
-          change_result(COMPILED, change_attribute("omega", swapped)), 1.0, ("cells", "decks")),
+          change_result(_COMPILED, change_attribute("omega", _swapped)), 1.0, ("cells", "decks")),
     Plant("axis-in-method", "two axes of the closed form change places",
-          in_method("closed-form", changing(change_attribute("omega", swapped))),
+          in_method("closed-form", changing(change_attribute("omega", _swapped))),
           1.0, ("methods",)),
     Plant("wrong-card", "the compiled programs correct another card than the one named",
           _wrong_card, 1.0, ("cells", "words")),
     Plant("half-step-in-fortran", "the compiled programs take half a step",
-          instead(COMPILED, _shorter_compiled), 0.5, ("decks", "schemes")),
+          instead(_COMPILED, _shorter_compiled), 0.5, ("decks", "schemes")),
     Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",
-          instead(PROGRAM, _shorter_both), 0.5, ("schemes", "stops")),
+          instead(_PROGRAM, _shorter_both), 0.5, ("schemes", "stops")),
     Plant("ulp-in-fortran", "one unit in the last place of one result",
-          change_result(COMPILED, bit_off), 2.0**-52, ("cells",)),
+          change_result(_COMPILED, _bit_off), 2.0**-52, ("cells",)),
     Plant("velocity-in-fortran", "a sign in the velocity",
-          change_result(COMPILED, _VELOCITY), 2.0, ("decks", "schemes")),
+          change_result(_COMPILED, _VELOCITY), 2.0, ("decks", "schemes")),
     Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
-          change_result(PROGRAM, _VELOCITY), 2.0, ("schemes", "stops")),
+          change_result(_PROGRAM, _VELOCITY), 2.0, ("schemes", "stops")),
     Plant("coefficient-in-both", "a coefficient off by a part in 1e9, in both languages alike",
           twin("runge-kutta", "coefficient b"), 1e-9, ("schemes", "orders")),
     Plant("stop-in-both", "the stop test looks at another stage, in both languages alike",
           twin("runge-kutta", "stage of the stop test"), 1.0, ("stops",)),
     Plant("stale-fortran", "the result of the run before",
-          lambda size: change_result(COMPILED, _stale())(size), 1.0, ("stops", "cells")),
+          lambda size: change_result(_COMPILED, _stale())(size), 1.0, ("stops", "cells")),
     Plant("stale-method", "the Taylor method answers with the result before",
           lambda size: in_method("taylor", changing(_stale()))(size), 1.0, ("methods", "random")),
     Plant("stale-solver", "a prepared solver answers with the result before", _stale_solver,
@@ -229,16 +257,16 @@ PLANTS = (
     Plant("quick-refuses", "the solver for few digits refuses every scene",
           _prepared(_refuses), 1.0, ("prepared",)),
     Plant("label-in-fortran", "TIME shifted by half a step",
-          change_result(COMPILED, change_attribute("recorded_time", _earlier)),
+          change_result(_COMPILED, change_attribute("recorded_time", _earlier)),
           0.5, ("cells", "decks")),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
-          instead(PROGRAM, _label_both), 0.5, ("cells", "words")),
+          instead(_PROGRAM, _label_both), 0.5, ("cells", "words")),
     Plant("label-of-method", "a motion half a step late, energy and momentum conserved",
           in_method("closed-form", _shifted), 0.5, ("methods", "attitudes")),
     Plant("count-in-fortran", "one right-hand side too many in the count",
-          change_result(COMPILED, _COUNT), 1.0, ("cells",)),
+          change_result(_COMPILED, _COUNT), 1.0, ("cells",)),
     Plant("count-in-both", "the count of right-hand sides, in both languages alike",
-          change_result(PROGRAM, _COUNT), 1.0, ("cells", "words")),
+          change_result(_PROGRAM, _COUNT), 1.0, ("cells", "words")),
     Plant("prepared-steps", "prepared solvers in fixed steps are wrong by a hundredth",
           _prepared(_too_large), 1e-2, ("prepared",)),
     Plant("digit-of-the-print", "a digit of a published figure",
@@ -246,7 +274,7 @@ PLANTS = (
              lambda found, size: [_digit_altered(each, size) for each in found]),
           20.0, ("external",)),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
-          in_method("dop853", changing(off)), 1e-4, ("methods", "orders")),
+          in_method("dop853", changing(_off)), 1e-4, ("methods", "orders")),
 )  # fmt: skip
 
 

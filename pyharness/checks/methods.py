@@ -119,8 +119,7 @@ def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[fl
 
 def run_of_call(method: str, tolerance: float, scene: Scene, time: float) -> MethodRun:
     """Return a deferred call of a prepared solver to `time` (s), after another initial omega."""
-    attitude = scene.attitude is not None
-    candidate = prepared_candidate(method, tolerance, primed=True, attitude=attitude)
+    candidate = prepared_candidate(method, tolerance, primed=True, attitude=bool(scene.attitude))
     return by_end(method, candidate, tolerance, scene, time)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness.checks.pictures import regions_picture
+from pyharness.checks.stress_report import regions_picture
 from pyharness.checks.theory import collocation_matrices
 from pyharness.checks.theory.amplification import (
     amplification,

@@ -267,8 +267,7 @@ def compare_programs(
         order = measured_order(scene, program, listing, truth) if judged else None
         if attitude:
             run = replace(run, attitude=attitude_from_rows(scene, run.time, run.omega))
-        timing = [partial(candidates[0].rows, scene)]
-        (seconds,) = timed(timing, _TIMING_SECONDS, _TIMING_BATCHES)
+        (seconds,) = timed([partial(candidates[0].rows, scene)], _TIMING_SECONDS, _TIMING_BATCHES)
         ulp = distance(run, *other) if other else None
         found = tuple(differences(run, *other)) if other else ()
         good, per_step = accuracy(scene, run, truth), seconds / max(run.steps, 1)

@@ -4,7 +4,8 @@ import argparse
 import shlex
 
 from pyharness.checks.check import Check, requested_suites
-from pyharness.checks.stress import SCENE_TRIALS, TRIALS, Trial, stress, stress_report, trial, worst
+from pyharness.checks.stress import SCENE_TRIALS, TRIALS, Trial, stress, trial, worst
+from pyharness.checks.stress_report import stress_report
 from pyharness.cli import options as shared
 from pyharness.model.errors import InputError, unknown
 

@@ -1,25 +1,38 @@
-"""Pictures of the checks: trials, Brouwer's law, and regions of linear stability."""
+"""The report of `stress`: for each trial a description, a table by method, and a picture.
+
+There are pictures of values and limits, of Brouwer's law, and of regions of linear stability.
+"""
 
 import re
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pyharness.checks.check import Check
+from pyharness.checks.check import Check, severity
+from pyharness.checks.report import basis_note, checks_report, listed_singly, marks, verdict
 from pyharness.checks.stress import Trial
-from pyharness.checks.theory.amplification import Regions
-from pyharness.checks.theory.brouwer import LAWS
 from pyharness.model.errors import InputError
-from pyharness.model.report import Column, Picture, Table, digits, numbers
+from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short, words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from pyharness.checks.theory.amplification import Regions
     from pyharness.checks.trials.length import Drift
 
+_HEADS = (
+    *words("method"), Column("checks"), Column("failed"), Column("bounded"),
+    Column("ratio", short, name="share"), Column("value", short), Column("limit", short),
+    *words("basis"), Column("worst at", left=True, fit="cut"),
+)  # fmt: skip
+_NOTE = (
+    "bounded: number of checks with a bound; the others only describe. ratio: value over limit of "
+    "the worst check, with its value, limit and basis (without a bound: the largest value)."
+)
 _FLOOR = 1e-18  # smaller values, and 0, are drawn at this value
 _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
@@ -27,6 +40,52 @@ _MARKERS = {"error": "o", "drift": "v"}
 _COLUMNS = 2
 _PLACES_PER_LETTER = 0.6
 _COARSE = 1e-6
+
+
+def stress_report(trials: Sequence[Trial], checks: Sequence[Check]) -> Report:
+    """Return the report of `stress`: failures, then a table and a picture for each trial."""
+    text: list[Any] = [listed_singly(checks), [_NOTE, *basis_note(checks)]]
+    for each in trials:
+        own = [check for check in checks if check.suite == each.name]
+        if own:
+            text.append([f"{each.name}: {each.title}", f"  bound: {each.bound}"])
+            text.append([_table(own)])
+    report = checks_report("stress", checks, [*text, [verdict(checks)]])
+    pictures = {each.name: partial(_picture, each, checks) for each in trials}
+    return report._replace(pictures=pictures)
+
+
+def _table(checks: Sequence[Check]) -> Table:
+    groups: dict[str, list[Check]] = {}
+    for check in checks:
+        groups.setdefault(check.name.subject, []).append(check)
+    rows = []
+    for name, members in groups.items():
+        judged = [check for check in members if check.limit is not None]
+        failed = sum(not check.passed for check in members)
+        worst = max(judged, key=severity) if judged else max(members, key=_size)
+        share = severity(worst)[1] if judged else None
+        where = worst.name.place or None
+        numbers = [len(members), failed, len(judged), share, worst.value, worst.limit]
+        rows.append([name, *numbers, marks([worst]), where])
+    return Table(_HEADS, rows)
+
+
+def _picture(trial: Trial, checks: Sequence[Check]) -> Picture:
+    if trial.name == "regions":
+        from pyharness.checks.theory.amplification import regions
+
+        return regions_picture(regions())
+    if trial.name == "length":
+        from pyharness.checks.trials.length import curves
+
+        return length_picture(list(curves()))
+    return stress_picture(trial, checks)
+
+
+def _size(check: Check) -> float:
+    value = check.value
+    return -1.0 if value is None else value if value == value else float("inf")
 
 
 class _Mark(NamedTuple):
@@ -177,6 +236,8 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     """Return the errors of energy and phase against the number of steps, for each motion."""
     from matplotlib.figure import Figure
 
+    from pyharness.checks.theory.brouwer import LAWS
+
     motions = list(dict.fromkeys(each.motion for each in found))
     figure = Figure(figsize=(10.0, 8.0), dpi=100, layout="constrained")
     axes = figure.subplots(len(_SHOWN), len(motions), squeeze=False, sharex=True, sharey="row")
@@ -228,7 +289,7 @@ _OF_REGIONS: tuple[dict[str, Any], ...] = (
 _LEAST = 1e-13
 
 
-def regions_picture(found: Regions) -> Picture:
+def regions_picture(found: "Regions") -> Picture:
     """Return a picture of the stability regions in the plane of z, step size times eigenvalue."""
     from matplotlib.figure import Figure
 

@@ -17,7 +17,7 @@ import pyharness
 from docs.gallery import build
 from docs.gallery.build import PAGES, answer, examples, page, question
 from docs.gallery.execution import OUTPUT, PICTURE, PYTHON, executed, is_current, shown_output
-from pyharness.edition.notebooks import notebook
+from pyharness.edition.documents import notebook
 from tests.conftest import Printed
 
 _PUBLIC = {f"pyharness.{name}" for name in ("events", "torques")}

@@ -6,7 +6,6 @@ Readers without JavaScript see a picture, and a Python program with its output.
 import contextlib
 import io
 from fractions import Fraction
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -45,7 +44,6 @@ _COLOURS = ("#1040a0", "#b02018", "#107040")
 _STYLES = ("-", "--", "-.")
 
 
-@cache
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 

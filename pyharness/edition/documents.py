@@ -1,17 +1,21 @@
-"""The Markdown documents of `docs` as pages of the web site.
+"""The Markdown documents of `docs` as pages of the web site, and as Jupyter notebooks.
 
 `folder` is the folder of the documents, `name` a path in it.
 """
 
+import base64
+import hashlib
 import posixpath
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from pyharness.edition.markdown import Document, document
-from pyharness.edition.notebooks import has_examples, notebook
 from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
+from pyharness.views.render import json_text
 
 # Suffixes of pictures, and of all files that the site copies with the documents.
 _PICTURES = (".png", ".svg")
@@ -27,6 +31,13 @@ _LINKED = (
     "explanation/about-the-text.md",
     "explanation/methods.md",
 )
+# An example with its output, or a picture in the folder of the document.
+_PART = re.compile(
+    r"```python\n(?P<code>.*?)```(?:\n*```output\n(?P<output>.*?)```)?"
+    r"|!\[[^]]*\]\((?P<picture>[^)/]+\.(?P<form>svg|png))\)",
+    re.DOTALL,
+)
+_LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 
 
 def documents_folder(given: str | None = None) -> Path:
@@ -53,10 +64,9 @@ def documents(folder: Path) -> Iterator[tuple[str, Document]]:
     """Yield path and rendered text of each document, except those for contributors."""
     for file in sorted(folder.rglob("*.md")):
         name = file.relative_to(folder).as_posix()
-        if not _is_on_site(name):
-            continue
-        text = file.read_text(encoding="utf-8")
-        yield page_of(name), document(text, partial(_link, folder, name))
+        if not name.startswith(_OFF_SITE):
+            text = file.read_text(encoding="utf-8")
+            yield page_of(name), document(text, partial(_link, folder, name))
 
 
 def page_of(name: str) -> str:
@@ -66,17 +76,18 @@ def page_of(name: str) -> str:
 
 def files(folder: Path) -> dict[str, bytes]:
     """Return the documents' pictures, tables and schemas, by path in the site."""
+    names = {file.relative_to(folder).as_posix(): file for file in sorted(folder.rglob("*"))}
     return {
-        f"docs/{file.relative_to(folder).as_posix()}": file.read_bytes()
-        for file in sorted(folder.rglob("*"))
-        if file.name.endswith(_BESIDE) and _is_on_site(file.relative_to(folder).as_posix())
+        f"docs/{name}": file.read_bytes()
+        for name, file in names.items()
+        if name.endswith(_BESIDE) and not name.startswith(_OFF_SITE)
     }
 
 
 def with_notebooks(folder: Path) -> list[Path]:
     """Return the documents with Python examples, which also become notebooks."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
-    return [path for path in files if has_examples(path.read_text(encoding="utf-8"))]
+    return [path for path in files if "```python\n" in path.read_text(encoding="utf-8")]
 
 
 def notebooks(folder: Path) -> dict[str, bytes]:
@@ -90,25 +101,61 @@ def notebooks(folder: Path) -> dict[str, bytes]:
     return found
 
 
+def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
+    """Return a document as a notebook, JSON in format 4.5.
+
+    `pictures` has contents by file name. Links to documents become plain text, because a notebook
+    may be in any folder.
+    """
+    cells: list[dict[str, Any]] = []
+
+    def add(kind: str, source: str, **more: Any) -> None:
+        cells.append(
+            {
+                "cell_type": kind,
+                "id": hashlib.sha256(f"{len(cells)} {source}".encode()).hexdigest()[:8],
+                "metadata": {},
+                "source": source.splitlines(keepends=True),
+                **more,
+            }
+        )
+
+    start = 0
+    for found in (*_PART.finditer(text), None):
+        prose = text[start : found.start() if found else None].strip()
+        if prose:
+            add("markdown", _LINK.sub(r"\1", prose))
+        if found is None:
+            break
+        start = found.end()
+        if found["code"] is not None:
+            printed = (found["output"] or "").splitlines(keepends=True)
+            stream = {"name": "stdout", "output_type": "stream", "text": printed}
+            outputs = [stream] if printed else []
+            add("code", found["code"].rstrip("\n"), execution_count=None, outputs=outputs)
+        elif cells and cells[-1]["cell_type"] == "code" and found["picture"] in pictures:
+            cells[-1]["outputs"].append(_display(found["form"], pictures[found["picture"]]))
+    metadata = {
+        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+        "language_info": {"name": "python"},
+    }
+    record = {"cells": cells, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}
+    return json_text(record).encode()
+
+
+def _display(form: str, content: bytes) -> dict[str, Any]:
+    data = content.decode() if form == "svg" else base64.b64encode(content).decode()
+    kind = "image/svg+xml" if form == "svg" else "image/png"
+    return {"data": {kind: data}, "metadata": {}, "output_type": "display_data"}
+
+
 def _link(folder: Path, name: str, target: str) -> str | None:
     """Return a document's link as a link in the site, or None if the site lacks the target."""
     path, hash_, anchor = target.partition("#")
     if "://" in target or not path:
         return target
-    here = posixpath.dirname(name)
-    if not _exists(folder, posixpath.normpath(posixpath.join(here, path))):
+    place = posixpath.normpath(posixpath.join(posixpath.dirname(name), path))
+    is_outside = place.startswith(("..", _OFF_SITE)) or not place.endswith((".md", *_BESIDE))
+    if is_outside or not (folder / place).exists():
         return None
     return f"{path.removesuffix('.md')}.html{hash_}{anchor}" if path.endswith(".md") else path
-
-
-def _exists(folder: Path, name: str) -> bool:
-    return (
-        name.endswith((".md", *_BESIDE))
-        and not name.startswith("..")
-        and _is_on_site(name)
-        and (folder / name).exists()
-    )
-
-
-def _is_on_site(name: str) -> bool:
-    return not name.startswith(_OFF_SITE)

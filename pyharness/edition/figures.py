@@ -1,48 +1,18 @@
 """Figures 6 to 12 of the thesis for the web site, drawn from computed curves.
 
-Another picture shows Figure 7 with the limit of omega of its original program as the step size goes
-to 0.
+Figures are given by file name without suffix.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from markupsafe import Markup
 
+from pyharness.edition.ledger import SentenceVerdicts
 from pyharness.edition.markdown import inline
-from pyharness.history.claims.sentences import sentences
-from pyharness.history.figures import (
-    FigureFinding,
-    figure_picture,
-    findings,
-    together_picture,
-)
+from pyharness.history.figures import FigureFinding, figure_picture, together_picture
 from pyharness.model.facts import facts
 from pyharness.views.pictures import saved
-
-
-class Drawn(NamedTuple):
-    """A figure, drawn with original or corrected programs.
-
-    `finding` has the curves; `files` are the SVG and the CSV, by name.
-    """
-
-    finding: FigureFinding
-    files: dict[str, bytes]
-
-
-def draw_figures() -> dict[str, Drawn]:
-    """Return all figures, by file name without suffix."""
-    return {
-        each.plan.stem: Drawn(each, saved(figure_picture(each), f"{each.plan.stem}.svg"))
-        for each in findings()
-    }
-
-
-def together(figures: Mapping[str, Drawn]) -> dict[str, bytes]:
-    """Return Figure 7, original, corrected and with its limit, as SVG and CSV."""
-    original, corrected = (figures[name].finding for name in ("figure-07", "figure-07-corrected"))
-    return saved(together_picture(original, corrected), "figure-07-together.svg")
 
 
 class Printed(NamedTuple):
@@ -57,7 +27,7 @@ class Printed(NamedTuple):
     where: str
     says: list[tuple[Markup, str]]
     ours: Markup
-    drawn: dict[str, Drawn]
+    drawn: dict[str, FigureFinding]
 
     @property
     def anchor(self) -> str:
@@ -65,20 +35,33 @@ class Printed(NamedTuple):
         return "" if self.drawn else f"figure-{self.number:02d}"
 
 
-def printed(figures: Mapping[str, Drawn]) -> list[Printed]:
-    """Return the thesis's figures in order, with our drawings from `figures`."""
+def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
+    """Return the figures, and Figure 7 with its limit, as SVG and CSV.
+
+    Figure 7 with its limit shows the original and the corrected programs, and the limit of omega of
+    the original one as the step size goes to 0.
+    """
+    together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
+    files = saved(together, "figure-07-together.svg")
+    for stem, each in figures.items():
+        files |= saved(figure_picture(each), f"{stem}.svg")
+    return files
+
+
+def printed(
+    figures: Mapping[str, FigureFinding], told: Sequence[SentenceVerdicts]
+) -> list[Printed]:
+    """Return the thesis's figures in order, with our drawings and its sentences on them."""
     found = []
     for each in facts("figures")["printed"]:
         ours = {
-            stem: drawing
-            for stem, drawing in figures.items()
-            if drawing.finding.plan.number == each["number"]
+            stem: figure for stem, figure in figures.items() if figure.plan.number == each["number"]
         }
-        cases = {f"V.2, Case {drawing.finding.plan.case}" for drawing in ours.values()}
+        cases = {f"V.2, Case {figure.plan.case}" for figure in ours.values()}
         says = [
-            (inline(sentence.text), f"sentence-{number}")
-            for number, sentence in enumerate(sentences(), 1)
-            if sentence.where in cases
+            (inline(other.sentence.text), other.anchor)
+            for other in told
+            if other.sentence.where in cases
         ]
         if "says" in each:
             says = [(inline(each["says"]), "")]

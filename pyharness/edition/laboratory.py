@@ -4,7 +4,6 @@ Readers without JavaScript see one run.
 """
 
 import re
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,6 @@ _KINDS = {
 _SHOWN = 3
 
 
-@cache
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 

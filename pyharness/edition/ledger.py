@@ -1,10 +1,11 @@
-"""The data of the pages on claims, sentences and apparatus.
+"""The data of the pages on claims, thesis and apparatus.
 
 A claim is a statement of the thesis that we test. A judgement has our verdicts on it, for original
-and corrected programs; `judged` has the judgements of all claims.
+and corrected programs; `judged` has the judgements of all claims, `told` those of all sentences.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -31,25 +32,37 @@ class SentenceVerdicts(NamedTuple):
     judged: list[Judgement]
     anchor: str
 
+
+class Formula(NamedTuple):
+    """A displayed formula of the thesis.
+
+    `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
+    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is its apparatus
+    entry, or empty.
+    """
+
+    number: str
+    where: str
+    lines: list[Markup]
+    what: Markup
+    cards: dict[str, str]
+    entry: str
+
     @property
-    def statements(self) -> str:
-        """Return the statements of the sentence's claims, joined."""
-        return " ".join(each.claim["statement"] for each in self.judged)
+    def title(self) -> str:
+        """Return a title, as in ``Equation 34a, III.1`` or ``Equations 13-15, II.2``."""
+        if not self.number:
+            return f"Without a number, {self.where}"
+        return f"Equation{'s' if '-' in self.number else ''} {self.number}, {self.where}"
 
 
 def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
     """Return the numbers of claims about results, original and corrected, by verdict."""
-    judged = [each for each in judged if each.claim["kind"] == "result"]
-    found: dict[str, tuple[int, int]] = {}
-    for each in judged:
-        for verdict in (each.original.verdict, each.corrected.verdict):
-            found[verdict] = (0, 0)
-    for verdict in found:
-        found[verdict] = (
-            sum(each.original.verdict == verdict for each in judged),
-            sum(each.corrected.verdict == verdict for each in judged),
-        )
-    return found
+    results = [each for each in judged if each.claim["kind"] == "result"]
+    pairs = [(each.original.verdict, each.corrected.verdict) for each in results]
+    original, corrected = map(Counter, zip(*pairs, strict=True))
+    verdicts = dict.fromkeys(verdict for pair in pairs for verdict in pair)
+    return {verdict: (original[verdict], corrected[verdict]) for verdict in verdicts}
 
 
 def kinds(judged: Sequence[Judgement]) -> Markup:
@@ -64,77 +77,74 @@ def account() -> dict[str, Markup]:
     return {name: inline(text) for name, text in texts.items()}
 
 
-class ClaimStory(NamedTuple):
-    """A claim on the claims page.
+def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
+    """Return the data of the claims page: tables, stories and evidence, mostly as HTML.
 
-    `story` is HTML in three sentences. `sentences` are pairs of place and anchor on the page of the
-    thesis. `laboratory` is a state of the laboratory that shows the claim, or empty.
+    `groups` has, by kind in the order of `KINDS`, each claim with its story and its sentences.
     """
-
-    judgement: Judgement
-    story: Story
-    sentences: list[tuple[str, str]]
-    laboratory: str
-
-
-def claim_stories(judged: Sequence[Judgement]) -> dict[str, list[ClaimStory]]:
-    """Return the claims with their stories, by kind in the order of `KINDS`."""
-    found: dict[str, list[ClaimStory]] = {kind: [] for kind in KINDS}
-    for each in judged:
-        making = [
-            (sentence, f"sentence-{number}")
-            for number, sentence in enumerate(sentences(), 1)
-            if each.claim["id"] in sentence.claims
-        ]
-        states = [sentence.laboratory for sentence, _ in making if sentence.laboratory]
-        found[each.claim["kind"]].append(
-            ClaimStory(
-                each, Story(*map(inline, story(each))),
-                [(sentence.where, anchor) for sentence, anchor in making], (states or [""])[0],
-            )
-        )  # fmt: skip
-    return found
-
-
-def context(judged: Sequence[Judgement]) -> dict[str, Any]:
-    """Return the data of the claims page: tables, stories and evidence, mostly as HTML."""
     table = claims_report(judged).data
     assert table is not None
     links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
+    groups: dict[str, list[Any]] = {kind: [] for kind in KINDS}
+    for each in judged:
+        making = [other for other in told if each.claim["id"] in other.sentence.claims]
+        groups[each.claim["kind"]].append((each, Story(*map(inline, story(each))), making))
     return {
         "table": Markup(html.table(table, "all claims", links)),
         "kinds": kinds(judged),
         "about": KINDS,
-        "groups": claim_stories(judged),
+        "groups": groups,
         "evidence": Markup(html.sections(evidence_report(list(evidence())).text)),
     }
 
 
-def thesis_counts(sections: Mapping[str, Sequence[SentenceVerdicts]]) -> Markup:
-    """Return an HTML table of sentences and claims by section.
+def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
+    """Return the thesis's sentences with verdicts, in order."""
+    by_name = {each.claim["id"]: each for each in judged}
+    return [
+        SentenceVerdicts(each, [by_name[name] for name in each.claims], f"sentence-{number}")
+        for number, each in enumerate(sentences(), 1)
+    ]
 
-    `sections` is the result of `thesis`. Only claims about results count as reproduced.
+
+def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
+    """Return the data of the page of the thesis: sentences and formulas by section, and a table.
+
+    The table counts sentences and claims; only claims about results count as reproduced.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
         Column("results claimed"), Column("reproduced as printed"),
         Column("reproduced as corrected"),
     ]  # fmt: skip
+    sections: dict[str, list[SentenceVerdicts]] = {}
+    for each in told:
+        sections.setdefault(each.sentence.where.partition(",")[0], []).append(each)
     rows = []
-    for section, told in sections.items():
-        results = {
-            each.claim["id"]: each
-            for sentence in told
-            for each in sentence.judged
-            if each.claim["kind"] == "result"
-        }.values()
+    for section, found in sections.items():
+        claimed = {each.claim["id"]: each for sentence in found for each in sentence.judged}
+        results = [each for each in claimed.values() if each.claim["kind"] == "result"]
         reproduced = [
             sum(getattr(each, state).verdict == REPRODUCED for each in results)
             for state in ("original", "corrected")
         ]
-        makes = sum(bool(sentence.judged) for sentence in told)
-        rows.append([section, len(told), makes, len(results), *reproduced])
-    return Markup(html.table(Table(columns, rows), "sentences and claims by section"))
+        makes = sum(bool(sentence.judged) for sentence in found)
+        rows.append([section, len(found), makes, len(results), *reproduced])
+    table = html.table(Table(columns, rows), "sentences and claims by section")
+    return {"sections": sections, "table": Markup(table), "formulas": formulas()}
+
+
+def formulas() -> dict[str, list[Formula]]:
+    """Return the displayed formulas of sections II to IV, by section."""
+    found: dict[str, list[Formula]] = {}
+    for row in facts("formulas")["formula"]:
+        lines = [inline(f"${tex}$") for tex in row["tex"].strip().split("\n")]
+        formula = Formula(
+            row.get("number", ""), row["where"], lines, inline(row["what"]),
+            row.get("cards", {}), row.get("entry", ""),
+        )  # fmt: skip
+        found.setdefault(row["where"].partition(".")[0], []).append(formula)
+    return found
 
 
 def apparatus() -> list[tuple[dict[str, Any], Markup]]:
@@ -148,17 +158,4 @@ def apparatus() -> list[tuple[dict[str, Any], Markup]]:
         # The page shows the cards as links.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
         found.append((entry, Markup(html.sections(report.text[1:]))))
-    return found
-
-
-def thesis(judged: Iterable[Judgement]) -> dict[str, list[SentenceVerdicts]]:
-    """Return the thesis's sentences with verdicts, by section in order."""
-    by_name = {each.claim["id"]: each for each in judged}
-    found: dict[str, list[SentenceVerdicts]] = {}
-    for number, each in enumerate(sentences(), 1):
-        section = each.where.partition(",")[0]
-        judged_by = [by_name[name] for name in each.claims]
-        found.setdefault(section, []).append(
-            SentenceVerdicts(each, judged_by, f"sentence-{number}")
-        )
     return found

@@ -1,4 +1,4 @@
-"""The data of the page that compares the cards of the three decks.
+"""The data of the page that compares the cards of the three decks, and explains disagreements.
 
 Within an operation of `data/cards/collation.toml`, cards are aligned by the similarity of their
 statements.
@@ -11,6 +11,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from pyharness.edition.decks import Run
+from pyharness.history.origins import Disagreement
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import deck_collation
 from pyharness.thesis.cards import Card, deck, numbers
@@ -66,6 +67,13 @@ class Operation(NamedTuple):
 def operations() -> list[Operation]:
     """Return all operations that have cards, without comments."""
     return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
+
+
+def thesis_on(disagreement: Disagreement) -> str:
+    """Return the equations and the place in the thesis of a disagreement."""
+    given = ", ".join(disagreement.equations)
+    noun = "equations" if "," in given or "-" in given else "equation"
+    return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))
 
 
 def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:

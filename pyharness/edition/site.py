@@ -9,7 +9,9 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from pyharness.edition import (
     api,
@@ -17,20 +19,19 @@ from pyharness.edition import (
     decks,
     documents,
     figures,
-    formulas,
     laboratory,
     ledger,
-    origins,
     parallel_decks,
     story,
 )
 from pyharness.edition.bundle import bundle
 from pyharness.edition.citation import bibtex, linked_data
-from pyharness.edition.markdown import inline
+from pyharness.edition.markdown import inline, slug
 from pyharness.edition.report import MARK, listed
 from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
+from pyharness.history.figures import FigureFinding, findings
 from pyharness.history.identifiers import DATA, data_identifier
 from pyharness.history.origins import disagreements
 from pyharness.history.tei import tei_document
@@ -44,9 +45,6 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck
 from pyharness.views.render import json_text
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
 # The menu: title and path of each section's pages. A section's entry links its first page.
 MENU = {
     "Story": (("Story", "index.html"),),
@@ -58,10 +56,7 @@ MENU = {
         ("Comparison", "listing/collation.html"),
         ("Apparatus", "apparatus.html"),
     ),
-    "Laboratory": (
-        ("The programs", "laboratory.html"),
-        ("A body that tumbles", "body.html"),
-    ),
+    "Laboratory": (("The programs", "laboratory.html"), ("A body that tumbles", "body.html")),
     "Thesis and claims": (
         ("Thesis", "thesis.html"),
         ("Claims", "claims.html"),
@@ -106,11 +101,8 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     """
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
-    drawn = figures.draw_figures()
-    pictures = figures.together(drawn)
-    for each in drawn.values():
-        pictures |= each.files
-    content = {f"figures/{name}": file for name, file in pictures.items()}
+    drawn = {each.plan.stem: each for each in findings()}
+    content = {f"figures/{name}": file for name, file in figures.draw_figures(drawn).items()}
     places: list[Found] = []
     for page in _pages(drawn, docs, progress):
         content[page.path] = _rendered(page)
@@ -120,7 +112,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     return content
 
 
-def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -> Iterator[Page]:
+def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -> Iterator[Page]:
     progress(1, 5, "claims")
     judged = judgements()
     context = {
@@ -139,28 +131,23 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     yield from _listing()
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
     yield Page("body.html", "A body that tumbles", "body.html", body.context())
-    sentences = ledger.thesis(judged)
+    told = ledger.thesis(judged)
+    found = []
+    for each in told:
+        claimed = " ".join(judgement.claim["statement"] for judgement in each.judged)
+        text = f"{each.sentence.text}: {each.sentence.why or claimed}"
+        href = f"thesis.html#{each.anchor}"
+        found.append(Found(href, each.sentence.where, "sentence", text))
+    context = ledger.thesis_context(told)
+    yield Page("thesis.html", "The thesis, executable", "thesis.html", context, found)
+    found = [
+        Found(f"figures.html#{stem}", f"{plan.title}, {plan.set}", "figure", plan.caption)
+        for stem, plan in ((stem, each.plan) for stem, each in drawn.items())
+    ]
+    context = {"figures": figures.printed(drawn, told)}
+    yield Page("figures.html", "Figures", "figures.html", context, found)
     yield Page(
-        "thesis.html", "The thesis, executable", "thesis.html",
-        {"sections": sentences, "formulas": formulas.formulas(),
-         "table": ledger.thesis_counts(sentences)},
-        [
-            Found(f"thesis.html#{told.anchor}", told.sentence.where, "sentence",
-                  f"{told.sentence.text}: {told.sentence.why or told.statements}")
-            for section in sentences.values()
-            for told in section
-        ],
-    )  # fmt: skip
-    yield Page(
-        "figures.html", "Figures", "figures.html", {"figures": figures.printed(drawn)},
-        [
-            Found(f"figures.html#{stem}", f"{each.finding.plan.title}, {each.finding.plan.set}",
-                  "figure", each.finding.plan.caption)
-            for stem, each in drawn.items()
-        ],
-    )  # fmt: skip
-    yield Page(
-        "claims.html", "Claims", "claims.html", ledger.context(judged),
+        "claims.html", "Claims", "claims.html", ledger.claims_context(judged, told),
         [
             Found(f"claims.html#{each.claim['id']}", each.claim["id"], "claim",
                   f"{each.claim['quote']}: {each.claim['statement']}")
@@ -171,7 +158,7 @@ def _pages(drawn: Mapping[str, figures.Drawn], docs: Path, progress: Progress) -
     entries = ledger.apparatus()
     yield Page(
         "apparatus.html", "Apparatus", "apparatus.html",
-        {"entries": entries, "origins_of": origins.origins_of},
+        {"entries": entries, "disagreements": disagreements()},
         [
             Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
                   ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
@@ -207,8 +194,8 @@ def _listing() -> Iterator[Page]:
         )
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
                {"programs": decks.TITLES, "operations": parallel_decks.operations(),
-                "origins_of": origins.origins_of_step, "disagreements": disagreements(),
-                "anchor_of": origins.anchor_of, "thesis_on": origins.thesis_on})  # fmt: skip
+                "disagreements": disagreements(),
+                "thesis_on": parallel_decks.thesis_on})  # fmt: skip
     counts = {
         program: (title, len(deck(program).cards), len(decks.sheets(program)))
         for program, title in decks.TITLES.items()
@@ -220,17 +207,14 @@ def _listing() -> Iterator[Page]:
 def _documents(docs: Path) -> Iterator[Page]:
     with_notebooks = documents.with_notebooks(docs)
     notebooks = {documents.page_of(f.relative_to(docs).as_posix()): f.stem for f in with_notebooks}
+    listed_pages = {path for section in MENU.values() for _, path in section}
     for path, each in documents.documents(docs):
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
         ]
         context = {"document": each, "notebook": notebooks.get(path)}
         yield Page(path, each.title, "document.html", context, found,
-                   menu=path if path in _listed() else "docs/index.html")  # fmt: skip
-
-
-def _listed() -> set[str]:
-    return {path for section in MENU.values() for _, path in section}
+                   menu=path if path in listed_pages else "docs/index.html")  # fmt: skip
 
 
 def _rendered(page: Page) -> bytes:
@@ -259,13 +243,13 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
-    content["assets/story.js"] = bundle(web / "story" / "story.js").encode()
-    content["assets/story-data.js"] = script("storyData", story.context()["data"])
-    content["assets/laboratory.js"] = bundle(web / "laboratory" / "laboratory.js").encode()
-    content["assets/laboratory-data.js"] = script("laboratoryData", laboratory.context()["data"])
-    content["assets/about.js"] = bundle(web / "about" / "about.js").encode()
-    content["assets/body.js"] = bundle(web / "body" / "body.js").encode()
-    content["assets/body-data.js"] = script("bodyData", body.data())
+    for name, data in (
+        ("story", story.data()), ("laboratory", laboratory.data()), ("about", None),
+        ("body", body.data()),
+    ):  # fmt: skip
+        content[f"assets/{name}.js"] = bundle(web / name / f"{name}.js").encode()
+        if data is not None:
+            content[f"assets/{name}-data.js"] = script(f"{name}Data", data)
     content |= {f"figures/{name}": file for name, file in body.files().items()}
     content["assets/search-data.js"] = script("searchData", [each._asdict() for each in places])
     content["listing/edition.xml"] = tei_document()
@@ -286,9 +270,7 @@ def vendor() -> list[dict[str, Any]]:
 
 
 @cache
-def _templates() -> "Environment":
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
+def _templates() -> Environment:
     templates = Environment(
         loader=FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
@@ -298,5 +280,6 @@ def _templates() -> "Environment":
     )
     templates.filters["number"] = written
     templates.filters["prose"] = prose
+    templates.filters["slug"] = slug
     templates.globals["inline"] = inline
     return templates

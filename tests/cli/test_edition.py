@@ -11,8 +11,7 @@ import pytest
 
 from pyharness.cli.main import main
 from pyharness.edition import site
-from pyharness.edition.libraries import LIBRARIES
-from pyharness.edition.report import MARK
+from pyharness.edition.report import LIBRARIES, MARK
 from tests.sweep.sweeps import files
 
 Capture = pytest.CaptureFixture[str]

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from pyharness.edition.formulas import formulas
+from pyharness.edition.ledger import formulas
 from pyharness.history.ablation import entries, entry
 from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS

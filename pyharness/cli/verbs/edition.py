@@ -21,7 +21,7 @@ EXAMPLE = "edition --out pages"
 def run(options: argparse.Namespace) -> int:
     """Write the web site or the data package, and print a list of files."""
     from pyharness.cli.output import check_tree, write_tree
-    from pyharness.edition.report import MARK, edition_report, package_report
+    from pyharness.edition.report import MARK, check_libraries, edition_report, package_report
 
     if options.data is not None:
         from pyharness.edition.crate import PACKAGE_MARK
@@ -33,8 +33,6 @@ def run(options: argparse.Namespace) -> int:
         content = data_package(shared.progress)
         report = package_report(folder, content)
     elif options.out is not None:
-        from pyharness.edition.libraries import check_libraries
-
         folder, option = options.out, "--out"
         check_tree(folder, MARK, option)
         check_libraries()

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from docstring_parser import DocstringStyle, parse
 from markupsafe import Markup
 
 import pyharness
@@ -42,8 +43,6 @@ def entries() -> list[Entry]:
 
 
 def _entry(name: str, of: Any, of_class: str = "") -> Entry:
-    from docstring_parser import DocstringStyle, parse
-
     told = parse(inspect.getdoc(of) or "", DocstringStyle.NUMPYDOC)
     groups: dict[str, list[Item]] = {}
 
@@ -71,10 +70,10 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:
     # A class inherits some of its methods from base classes of this package.
-    ours = (base for base in of.__mro__ if base.__module__.startswith(pyharness.__name__))
     named: dict[str, Any] = {}
-    for base in ours:
-        named = {**named, **{name: x for name, x in vars(base).items() if name not in named}}
+    for base in of.__mro__:
+        if base.__module__.startswith(pyharness.__name__):
+            named |= {name: value for name, value in vars(base).items() if name not in named}
     for name, value in named.items():
         told = value.fget if isinstance(value, property) else value
         if not name.startswith("_") and inspect.isfunction(told) and inspect.getdoc(told):

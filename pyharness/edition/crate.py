@@ -52,30 +52,7 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
     Entities are items of one list, and refer to each other by identifier.
     """
     described, thesis = codemeta(), thesis_record()
-    files = [
-        *(
-            {
-                "@id": each.path,
-                "@type": "File",
-                "name": each.title,
-                "description": each.description,
-                "encodingFormat": each.media_type,
-                "contentSize": str(len(each.content)),
-                "identifier": content_identifier(each.content),
-            }
-            for each in parts
-        ),
-        *(
-            {
-                "@id": each.path,
-                "@type": "File",
-                "name": each.title,
-                "encodingFormat": each.media_type,
-            }
-            for each in KEPT
-            if each.path != CRATE
-        ),
-    ]
+    files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
     people = [
         *({"@id": f"#author-{number}", **each}
           for number, each in enumerate(described["author"], 1)),
@@ -127,6 +104,19 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
         _value("#data", "Software Heritage identifier of the edition's data", data_identifier()),
     ]
     return {"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph}
+
+
+def _file(part: Part) -> dict[str, str]:
+    record = {"@id": part.path, "@type": "File", "name": part.title}
+    if part in KEPT:
+        return {**record, "encodingFormat": part.media_type}
+    return {
+        **record,
+        "description": part.description,
+        "encodingFormat": part.media_type,
+        "contentSize": str(len(part.content)),
+        "identifier": content_identifier(part.content),
+    }
 
 
 def _references(entities: Sequence[dict[str, Any]], prefix: str) -> Any:

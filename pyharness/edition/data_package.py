@@ -4,19 +4,19 @@ The package is an RO-Crate. Its files contain neither times nor paths of the mac
 runs write the same bytes.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from hashlib import sha256
-from typing import Any
 
 from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, crate_record
 from pyharness.edition.machine_bundle import machine_parts
+from pyharness.edition.made_pages import table
 from pyharness.edition.package_runs import run_parts
 from pyharness.history.ablation import entries
 from pyharness.history.apparatus_report import apparatus_report
 from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import claims_report
-from pyharness.history.figures import FigurePlan, curve_numbers, findings
+from pyharness.history.figures import curve_numbers, findings
 from pyharness.history.identifiers import (
     card_identifier,
     content_identifier,
@@ -45,7 +45,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
     content = {each.path: each.content for each in parts}
-    content[CRATE] = _indented(crate_record(parts))
+    content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
     mark = {
         "schema": SCHEMAS["data package"],
@@ -55,8 +55,10 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
         # The manifest has this file's checksum, so that its identifier is not known here.
         "files": {**listed, MANIFEST: None},
     }
-    content[PACKAGE_MARK] = _indented(mark)
-    content[MANIFEST] = _manifest(content)
+    content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
+    # The form that `sha256sum -c` reads.
+    lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
+    content[MANIFEST] = "".join(lines).encode()
     return dict(sorted(content.items()))
 
 
@@ -101,8 +103,8 @@ def _list_files(progress: Progress) -> Iterator[Part]:
     for each in findings():
         yield Part(
             f"figures/{each.plan.stem}.csv", f"{each.plan.title}, {each.plan.set} programs",
-            f"{_caption(each.plan)} time and recorded_time in s, omega in rad/s. recorded_time is "
-            "the variable TIME of the program.",
+            f"{each.plan.caption.removesuffix('.')}. time and recorded_time in s, omega in rad/s. "
+            "recorded_time is the variable TIME of the program.",
             _CSV, csv_text(curve_numbers(each)).encode(),
         )  # fmt: skip
     progress(3, 5, "runs")
@@ -137,35 +139,17 @@ def _cards(program: str) -> bytes:
     return csv_text(numbers(_COLUMNS, rows)).encode()
 
 
-def _caption(plan: FigurePlan) -> str:
-    return plan.caption if plan.caption.endswith(".") else f"{plan.caption}."
-
-
 def _readme(parts: list[Part]) -> Part:
     described = codemeta()
-    rows = [
-        *((each.path, each.title) for each in parts),
-        *((each.path, each.title) for each in KEPT),
-    ]
     lines = [
         f"# {data_name()}", "", data_description(), "",
         f"Version {described['version']}, text {text_digest()}. Licence: {described['license']}. "
         "`citation.bib` has the citation.", "",
-        "| file | content |", "| --- | --- |", *(f"| {path} | {title} |" for path, title in rows),
-        "", f"`{CRATE}` describes the columns of each table.", "",
+        table("file | content", [[each.path, each.title] for each in (*parts, *KEPT)]),
+        f"`{CRATE}` describes the columns of each table.", "",
         f"Check the files with: `sha256sum -c {MANIFEST}`", "",
     ]  # fmt: skip
     return Part(
         "README.md", "What the package contains", "A list of all files.", "text/markdown",
         "\n".join(lines).encode(),
     )  # fmt: skip
-
-
-def _manifest(content: Mapping[str, bytes]) -> bytes:
-    """Return checksums in the form that `sha256sum -c` reads."""
-    lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
-    return "".join(lines).encode()
-
-
-def _indented(record: dict[str, Any]) -> bytes:
-    return json_text(record, indent=2).encode()

@@ -4,6 +4,8 @@ The port is in modern Fortran, the twin in Python. A note is a numbered entry of
 apparatus; `entry` and `switch` are identifiers of entries.
 """
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -144,17 +146,11 @@ def card_views(program: str) -> list[CardView]:
     """Return a view of each card of a program."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
-    cards = list(found.cards.values())
     views = []
-    for card, after in zip(cards, [*cards[1:], None], strict=True):
+    for card, after in zip(found.cards.values(), [*found.cards, math.inf][1:], strict=True):
         about = [each for each in every if card.number in numbers(each.cards)]
         about.sort(key=lambda each: _ORDER.index(each.kind))
-        inserted = [
-            (number, text)
-            for number, text in corrected.items()
-            if card.number < number and (after is None or number < after.number)
-            and number not in found.cards
-        ]  # fmt: skip
+        inserted = [pair for pair in corrected.items() if card.number < pair[0] < after]
         text = corrected.get(card.number)
         views.append(
             CardView(
@@ -172,7 +168,10 @@ def card_views(program: str) -> list[CardView]:
                         for name in changed.get(number, ())
                     )),
                 ),
-                [_port_line(each) for each in found.port.get(card.number, ())],
+                [
+                    PortLine(place, *(switch_at(place) or (None, True)))
+                    for place in found.port.get(card.number, ())
+                ],
                 found.twin.get(card.number, []),
                 about,
                 [
@@ -181,7 +180,7 @@ def card_views(program: str) -> list[CardView]:
                     for cards_range in each.cards.split(", ")
                     if numbers(cards_range)[0] == card.number
                 ],
-                _kinds([each.kind for each in about]),
+                list(dict.fromkeys(each.kind for each in about)),
                 found.absent.get(card.number),
                 found.otherwise.get(card.number),
                 parallels(card),
@@ -192,11 +191,8 @@ def card_views(program: str) -> list[CardView]:
 
 def kinds_of(views: Iterable[CardView]) -> dict[str, int]:
     """Return the number of cards with an entry of each kind, by precedence."""
-    counts = dict.fromkeys(_ORDER, 0)
-    for view in views:
-        for kind in view.kinds:
-            counts[kind] += 1
-    return {kind: count for kind, count in counts.items() if count}
+    counts = Counter(kind for view in views for kind in view.kinds)
+    return {kind: counts[kind] for kind in _ORDER if counts[kind]}
 
 
 def _card(card: Card) -> list[Run]:
@@ -233,12 +229,3 @@ def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
         found += [Run(line[begin : begin + blanks])] if blanks else []
         found.append(Run(line[begin + blanks : at], run.entry))
     return found
-
-
-def _port_line(place: Place) -> PortLine:
-    name, active = switch_at(place) or (None, True)
-    return PortLine(place, name, active)
-
-
-def _kinds(found: Iterable[str]) -> list[str]:
-    return sorted(set(found), key=_ORDER.index)

@@ -15,7 +15,6 @@ from pyharness.model.report import short
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import ending, heading
-from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.cards import deck, numbers
 from pyharness.thesis.printer import formats_of, page
 from pyharness.thesis.programs import run_program
@@ -134,8 +133,10 @@ def _first() -> dict[str, Any]:
     program = DEFAULTS["program"]
     run = run_program(scene, Listing.original(program), "python")
     truth = reference(scene, scene.times()).omega
-    error = np.abs(run.omega - truth[: run.steps])
+    error = np.abs(run.omega - truth[: run.steps]).max(axis=1)
     told = ending(run)
+    assert run.velocity is not None
+    values = np.column_stack([run.time, run.omega, run.velocity, run.recorded_time]).tolist()
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
     return {
         "state": DEFAULTS,
@@ -145,14 +146,7 @@ def _first() -> dict[str, Any]:
         ),
         "ending": told[0].upper() + told[1:],
         "error": short(float(error.max())),
-        "rows": [_row(run, number, float(error[number].max())) for number in numbers],
+        # The Runge-Kutta program has no IER.
+        "rows": [[str(n + 1), *map(repr, values[n]), "", short(float(error[n]))] for n in numbers],
         "page": page(scene, program, run),
     }
-
-
-def _row(run: Trajectory, number: int, error: float) -> list[str]:
-    assert run.velocity is not None
-    values = [run.time[number], *run.omega[number], *run.velocity[number]]
-    values.append(run.recorded_time[number])
-    # The Runge-Kutta program has no IER.
-    return [str(number + 1), *(repr(float(x)) for x in values), "", short(error)]

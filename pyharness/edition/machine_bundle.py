@@ -5,6 +5,7 @@ conclusions from each outcome.
 """
 
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,20 @@ def machine_parts() -> Iterator[Part]:
     """Yield the files of the folder."""
     texts: dict[str, str] = {}
     rows: list[list[Any]] = []
+    # The machine's arithmetics are the first.
+    words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
     for program, case in facts("cases")["published"].items():
         steps = case_scene(case).steps, card_steps(program)
-        for (listing, word), text in _pages(program, case).items():
-            name = _stored(texts, _name(program, case, listing, word), text)
-            rows.append([program, case, listing, word, *steps, name])
+        first_with: dict[str, str] = {}
+        for (title, listing), word in product(listings_of(program).items(), words):
+            text = our_page(listing, case, card_steps(program), word)
+            name = _name(program, case, title, word)
+            first = first_with.setdefault(text, name)
+            # Equal pages are stored once, but predictions for the machine under their own names.
+            if title != "original" or word not in _MACHINE:
+                name = first
+            texts[name] = text
+            rows.append([program, case, title, word, *steps, name])
     for name, text in texts.items():
         program, case, listing, word = next(row[:4] for row in rows if row[-1] == name)
         yield Part(
@@ -81,32 +91,9 @@ def outcomes_table() -> str:
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
 
-def _pages(program: str, case: int) -> dict[tuple[str, str], str]:
-    """Return a program's pages by listing and arithmetic, the machine's first."""
-    words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
-    return {
-        (name, word): our_page(listing, case, card_steps(program), word)
-        for name, listing in listings_of(program).items()
-        for word in words
-    }
-
-
 def _name(program: str, case: int, listing: str, word: str) -> str:
     form = "" if listing == "original" else f"{listing.replace(' ', '-')}-"
     return f"{program}-case-{case}-{form}{word}.txt"
-
-
-def _stored(texts: dict[str, str], name: str, text: str) -> str:
-    """Return the name under which a page is stored: its own, or an equal page's.
-
-    Pages in the machine's arithmetics are always stored under their own names.
-    """
-    program = name.partition("-case-")[0]
-    same = [known for known in texts if known.startswith(program) and texts[known] == text]
-    if same and not name.removeprefix(program)[len("-case-N-") :].startswith("cdc48"):
-        return same[0]
-    texts[name] = text
-    return name
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
@@ -130,8 +117,8 @@ def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]
     for name, text in texts.items():
         _, printed = printed_page.split_page(printed_page.printed_numbers(text))
         words: dict[str, list[str]] = {}
-        for _, _, listing, word, *_, page in rows:
-            if texts[page] == text and page.partition("-case-")[0] == name.partition("-case-")[0]:
+        for program, _, listing, word, *_, page in rows:
+            if texts[page] == text and name.startswith(f"{program}-case-"):
                 words.setdefault(listing, []).append(f"`{word}`")
         by = "; ".join(f"{listing} in {', '.join(found)}" for listing, found in words.items())
         yield [f"`{name}`", str(len(printed)), by]

@@ -8,13 +8,13 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from latex2mathml.converter import convert
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
 from markupsafe import Markup, escape
-
-if TYPE_CHECKING:
-    from markdown_it import MarkdownIt
-    from markdown_it.token import Token
+from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 
 class Part(NamedTuple):
@@ -55,7 +55,7 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
     # The empty cell in a table's corner is not a column head.
     html = html.replace("<th></th>", "<td></td>")
-    return Document(_strip_markup(title), Markup(html), list(_split(tokens)))
+    return Document(_strip_markup(title), Markup(html), _split(tokens))
 
 
 def inline(text: str) -> Markup:
@@ -65,16 +65,11 @@ def inline(text: str) -> Markup:
 
 def formula(tex: str, display: bool = False) -> Markup:
     """Return LaTeX as MathML, as a separate line if `display`."""
-    from latex2mathml.converter import convert
-
     return Markup(convert(tex, display="block" if display else "inline"))
 
 
 @cache
-def _parser() -> "MarkdownIt":
-    from markdown_it import MarkdownIt
-    from mdit_py_plugins.dollarmath import dollarmath_plugin
-
+def _parser() -> MarkdownIt:
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.use(
         dollarmath_plugin,
@@ -96,11 +91,11 @@ def _parser() -> "MarkdownIt":
 _OPEN = '<div class="wide" role="group" tabindex="0" aria-label="table">'
 
 
-def _block(tokens: Sequence["Token"], index: int, *_: Any) -> str:
+def _block(tokens: Sequence[Token], index: int, *_: Any) -> str:
     return f'<div class="formula">{formula(tokens[index].content.strip(), display=True)}</div>\n'
 
 
-def _code(tokens: Sequence["Token"], index: int, *_: Any) -> str:
+def _code(tokens: Sequence[Token], index: int, *_: Any) -> str:
     token = tokens[index]
     language = escape(token.info or "text")
     text = escape(token.content)
@@ -110,13 +105,13 @@ def _code(tokens: Sequence["Token"], index: int, *_: Any) -> str:
     )
 
 
-def _walk(tokens: Sequence["Token"]) -> Iterator["Token"]:
+def _walk(tokens: Sequence[Token]) -> Iterator[Token]:
     for token in tokens:
         yield token
         yield from _walk(token.children or [])
 
 
-def _anchor(tokens: Sequence["Token"]) -> None:
+def _anchor(tokens: Sequence[Token]) -> None:
     """Add GitHub's anchors to the headings."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
@@ -135,18 +130,11 @@ def _strip_markup(text: str) -> str:
     return re.sub(r"[`*$\\]", "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text))
 
 
-def _split(tokens: Sequence["Token"]) -> Iterator[Part]:
-    anchor, title = "", ""
-    text: list[str] = []
-    for index, token in enumerate(tokens):
-        if token.type == "heading_open":
-            if title:
-                yield Part(anchor, title, " ".join(text))
-            anchor, title, text = (
-                str(token.attrs["id"]),
-                _strip_markup(tokens[index + 1].content),
-                [],
-            )
-        elif token.type in ("inline", "fence") and tokens[index - 1].type != "heading_open":
-            text.append(_strip_markup(token.content))
-    yield Part(anchor, title, " ".join(text))
+def _split(tokens: Sequence[Token]) -> list[Part]:
+    found: list[tuple[str, str, list[str]]] = []
+    for before, token in pairwise(tokens):
+        if before.type == "heading_open":
+            found.append((str(before.attrs["id"]), _strip_markup(token.content), []))
+        elif token.type in ("inline", "fence"):
+            found[-1][2].append(_strip_markup(token.content))
+    return [Part(anchor, title, " ".join(text)) for anchor, title, text in found]

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from pyharness.edition.crate import Part
 from pyharness.history.ablation import case_truth
 from pyharness.model.facts import facts_folder
@@ -82,14 +84,11 @@ def _ends() -> Iterator[list[Any]]:
 
 
 def _rows(case: int) -> Iterator[list[Any]]:
-    truth = case_truth(case)
-    yield from _of_curve("reference", "", truth)
+    curves: dict[tuple[str, str], Any] = {("reference", ""): case_truth(case)}
     for (program, name), listing in _listings().items():
         if case == FAULTS_CASE or name in ("original", "corrected"):
-            yield from _of_curve(program, name, _run(case, listing))
-
-
-def _of_curve(program: str, listing: str, curve: Any) -> Iterator[list[Any]]:
-    states = zip(curve.time.tolist(), curve.omega.tolist(), curve.velocity.tolist(), strict=True)
-    for step, (time, omega, velocity) in enumerate(states, 1):
-        yield [program, listing, step, time, *omega, *velocity]
+            curves[program, name] = _run(case, listing)
+    for names, curve in curves.items():
+        states = np.column_stack([curve.time, curve.omega, curve.velocity]).tolist()
+        for step, state in enumerate(states, 1):
+            yield [*names, step, *state]

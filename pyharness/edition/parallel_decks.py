@@ -16,12 +16,13 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import deck_collation
 from pyharness.thesis.cards import Card, deck, numbers
 
-# Parts of a statement: a relation such as .GT., a power, a name, a number, or any other character.
-_PART = re.compile(r"\.[A-Z]+\.|\*\*|[A-Z][A-Z0-9]*|\d+\.?\d*|\.\d+|\S")
+# Parts of a statement, by kind; an operator may be a relation such as .GT., or a power.
+_PART = re.compile(
+    r"(?P<operator>\.[A-Z]+\.|\*\*|[-+*/=]|\.(?!\d))|(?P<name>[A-Z][A-Z0-9]*)"
+    r"|(?P<number>\d+\.?\d*|\.\d+)|(?P<punctuation>\S)"
+)
 # Cards with a smaller ratio of equal parts are not aligned.
 _ALIKE = 0.5
-
-
 _LABEL = "statement number"
 KINDS = (_LABEL, "name", "number", "operator", "punctuation")
 """The kinds of differences between two statements, in the order of display."""
@@ -89,13 +90,11 @@ def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict
 
     The alignment keeps the order and has the largest sum of similarities.
     """
-
-    def likeness(row: dict[str, Card], card: Card) -> float:
-        return max(_likeness(each, card) for each in row.values())
-
     # best[i][j]: the largest sum for the rows from i on and the cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
-    pairs = [[likeness(row, card) for card in cards] for row in rows]
+    pairs = [
+        [max(_likeness(each, card) for each in row.values()) for card in cards] for row in rows
+    ]
     for i in reversed(range(len(rows))):
         for j in reversed(range(len(cards))):
             both = pairs[i][j] + best[i + 1][j + 1] if pairs[i][j] >= _ALIKE else 0.0
@@ -143,19 +142,14 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
 
 def _split_card(card: Card) -> list[_Part]:
     """Return a card's statement number and parts, without continuation marks."""
-    found = [] if card.continues else _PART.finditer(card.text[:5])
-    labels = [_Part(each.start(), each[0], _LABEL) for each in found]
-    return labels + [
-        _Part(each.start(), each[0], _kind(each[0])) for each in _PART.finditer(card.text, 6)
+    labels = [] if card.continues else _PART.finditer(card.text[:5])
+    return [
+        *(_Part(each.start(), each[0], _LABEL) for each in labels),
+        *(
+            _Part(each.start(), each[0], str(each.lastgroup))
+            for each in _PART.finditer(card.text, 6)
+        ),
     ]
-
-
-def _kind(text: str) -> str:
-    if text[0].isalpha():
-        return "name"
-    if text[-1].isdigit() or text[0].isdigit():
-        return "number"
-    return "operator" if text[0] in "+-*/=." else "punctuation"
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:

@@ -38,11 +38,9 @@ from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
-from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
-from pyharness.thesis.cards import deck
 from pyharness.views.render import json_text
 
 # The menu: title and path of each section's pages. A section's entry links its first page.
@@ -176,9 +174,11 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
 
 
 def _listing() -> Iterator[Page]:
-    for program in PROGRAMS:
+    counts = {}
+    for program, title in decks.TITLES.items():
         pages = decks.sheets(program)
         views = [each for page in pages for each in page.cards]
+        counts[program] = title, len(views), len(pages)
         path = f"listing/{program}.html"
         context = {
             "program": program, "programs": decks.TITLES, "sheets": pages, "cards": views,
@@ -189,17 +189,11 @@ def _listing() -> Iterator[Page]:
                   "".join(run.text for run in each.card).strip())
             for each in views
         ]  # fmt: skip
-        yield Page(
-            path, f"{decks.TITLES[program]}: the program as printed", "deck.html", context, found
-        )
+        yield Page(path, f"{title}: the program as printed", "deck.html", context, found)
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
                {"programs": decks.TITLES, "operations": parallel_decks.operations(),
                 "disagreements": disagreements(),
                 "thesis_on": parallel_decks.thesis_on})  # fmt: skip
-    counts = {
-        program: (title, len(deck(program).cards), len(decks.sheets(program)))
-        for program, title in decks.TITLES.items()
-    }
     context = {"decks": counts, "scan": facts("cards/scan")}
     yield Page("listing/index.html", "The three programs", "listing.html", context)
 

@@ -5,7 +5,7 @@ value.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -30,6 +30,7 @@ RACE_CASES = (2, 3, 4, 5, 6, 7)
 BOX = (40, 10, 350, 196)
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
+Range = tuple[float, float]
 
 
 class Curve(NamedTuple):
@@ -48,8 +49,8 @@ class Chart(NamedTuple):
 
     name: str
     axes: tuple[str, str]
-    x: tuple[float, float]
-    y: tuple[float, float]
+    x: Range
+    y: Range
     x_ticks: list[tuple[str, str]]
     y_ticks: list[tuple[str, str]]
     curves: list[Curve]
@@ -59,8 +60,9 @@ class Chart(NamedTuple):
 
 def data() -> dict[str, Any]:
     """Return the values that the script needs to run the programs."""
+    cases = sorted({*BLIND_CASES, *RACE_CASES})
     return {
-        "scenes": {number: requested_scene(case_scene(number)) for number in _cases()},
+        "scenes": {number: requested_scene(case_scene(number)) for number in cases},
         "original": {name: list(switches(name)) for name in PROGRAMS},
         "letters": LETTERS,
         "lipschitz": facts("cases")["deck"]["lipschitz"],
@@ -71,6 +73,8 @@ def data() -> dict[str, Any]:
 def context() -> dict[str, Any]:
     """Return the story's charts and numbers, from original and corrected runs of 100 steps."""
     stopped = _run(2, "runge-kutta")
+    assert stopped.velocity is not None
+    velocity = stopped.velocity[:, 1].tolist()
     endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
     limit = limit_solution("runge-kutta", scene, scene.times(), _truth(2))
@@ -80,8 +84,8 @@ def context() -> dict[str, Any]:
     charts = [
         _chart_of_case("claim", 2, by_letter, (-1.2, 1.5)),
         _chart_of_case("stop", 2, {"runge-kutta": stopped}, (-1.2, 1.5), in_steps=True),
-        _velocity_chart(stopped),
-        _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), _powers(0, 5), is_log=True),
+        _velocity_chart([0.0, *velocity]),
+        _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), is_log=True),
         half_speed._replace(curves=[*half_speed.curves, curve]),
         *(
             _chart_of_case(f"blind-{n}", n, {"runge-kutta": _run(n, "runge-kutta")}, _span(n))
@@ -99,8 +103,8 @@ def context() -> dict[str, Any]:
         "letters": LETTERS,
         "step_sizes": STEP_SIZES,
         "stopped": stopped,
-        "peak": _second_velocity(stopped)[-2],
-        "after": _second_velocity(stopped)[-1],
+        "peak": velocity[-2],
+        "after": velocity[-1],
         "collocation_error": _first_error(2, "two-term"),
         "stop_error": _first_error(2, "runge-kutta"),
         "corrected_error": _first_error(2, "runge-kutta", "corrected"),
@@ -116,10 +120,6 @@ def context() -> dict[str, Any]:
         "case_7": ratios[7],
         "data": data(),
     }
-
-
-def _cases() -> list[int]:
-    return sorted({*BLIND_CASES, *RACE_CASES})
 
 
 @cache
@@ -162,7 +162,7 @@ def _ratios(case: int) -> dict[str, float]:
     return {name: error / least for name, error in errors.items()}
 
 
-def _span(case: int) -> tuple[float, float]:
+def _span(case: int) -> Range:
     """Return a range for a case's true omega1 (rad/s), with a margin."""
     values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
@@ -171,18 +171,14 @@ def _span(case: int) -> tuple[float, float]:
 
 
 def _chart_of_case(
-    name: str,
-    case: int,
-    runs: Mapping[str, Trajectory],
-    y: tuple[float, float],
-    in_steps: bool = False,
+    name: str, case: int, runs: Mapping[str, Trajectory], y: Range, in_steps: bool = False
 ) -> Chart:
     """Return a chart of the true omega1 over time or steps, with runs by program."""
     scene = case_scene(case)
     times = [0.0, *scene.times()]
     x = list(range(len(times))) if in_steps else times
     axis = "step" if in_steps else "time, s"
-    found = _chart(name, (axis, "ω₁, rad/s"), (0.0, float(x[-1])), y, _even(*y))
+    found = _chart(name, (axis, "ω₁, rad/s"), (0.0, float(x[-1])), y)
     curves = [_curve(found, "solution", x, [scene.omega[0], *_truth(case).omega[:, 0]])]
     for program, run in runs.items():
         omega = [scene.omega[0], *run.omega[:, 0]]
@@ -190,40 +186,28 @@ def _chart_of_case(
     return found._replace(curves=curves)
 
 
-def _velocity_chart(run: Trajectory) -> Chart:
-    velocity = [0.0, *_second_velocity(run)]
-    found = _chart("velocity", ("step", "V2, m/s"), (0, 100), (-0.03, 0.03), _even(-0.03, 0.03))
+def _velocity_chart(velocity: list[float]) -> Chart:
+    found = _chart("velocity", ("step", "V2, m/s"), (0, 100), (-0.03, 0.03))
     return found._replace(curves=[_curve(found, "runge-kutta", range(len(velocity)), velocity)])
-
-
-def _second_velocity(run: Trajectory) -> list[float]:
-    assert run.velocity is not None
-    return [float(row[1]) for row in run.velocity]
 
 
 def _race_chart(listing: str) -> Chart:
     axes = ("case", "largest error, rad/s")
-    found = _chart(f"race-{listing}", axes, (1.5, 7.5), (-8, 2), _powers(-8, 2), is_log=True)
+    found = _chart(f"race-{listing}", axes, (1.5, 7.5), (-8, 2), is_log=True)
     curves = [
         _curve(found, name, RACE_CASES, [_largest_error(n, name, listing) for n in RACE_CASES])
         for name in PROGRAMS
     ]
-    ticks = [(_written(_across(found, n)), str(n)) for n in RACE_CASES]
+    ticks = [(f"{_across(found, n):.1f}", str(n)) for n in RACE_CASES]
     return found._replace(x_ticks=ticks, curves=curves, is_marked=True)
 
 
-def _chart(
-    name: str,
-    axes: tuple[str, str],
-    x: tuple[float, float],
-    y: tuple[float, float],
-    y_ticks: Sequence[tuple[float, str]],
-    is_log: bool = False,
-) -> Chart:
+def _chart(name: str, axes: tuple[str, str], x: Range, y: Range, is_log: bool = False) -> Chart:
     empty = Chart(name, axes, x, y, [], [], [], is_log)
-    x_ticks = [(_written(_across(empty, value)), label) for value, label in _even(*x)]
-    at = [(_written(_up(empty, 10.0**tick if is_log else tick)), label) for tick, label in y_ticks]
-    return empty._replace(x_ticks=x_ticks, y_ticks=at)
+    x_ticks = [(f"{_across(empty, value):.1f}", label) for value, label in _even(*x)]
+    ticks = _powers(*y) if is_log else _even(*y)
+    y_ticks = [(f"{_up(empty, value):.1f}", label) for value, label in ticks]
+    return empty._replace(x_ticks=x_ticks, y_ticks=y_ticks)
 
 
 def _even(low: float, high: float) -> list[tuple[float, str]]:
@@ -235,8 +219,9 @@ def _even(low: float, high: float) -> list[tuple[float, str]]:
     return [(n * step, f"{n * step:.6g}") for n in range(first, last + 1)]
 
 
-def _powers(low: int, high: int) -> list[tuple[float, str]]:
-    return [(n, power_of_ten(n) if n else "1") for n in range(low, high + 1) if n % _LOG_STEP == 0]
+def _powers(low: float, high: float) -> list[tuple[float, str]]:
+    exponents = range(math.ceil(low / _LOG_STEP) * _LOG_STEP, math.floor(high) + 1, _LOG_STEP)
+    return [(10.0**n, power_of_ten(n) if n else "1") for n in exponents]
 
 
 def _across(chart: Chart, x: float) -> float:
@@ -255,12 +240,8 @@ def _up(chart: Chart, y: float) -> float:
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
     """Return a curve as SVG points, as chart.js does."""
     points = (
-        f"{_written(_across(chart, a))},{_written(_up(chart, b))}"
+        f"{_across(chart, a):.1f},{_up(chart, b):.1f}"
         for a, b in zip(x, y, strict=True)
         if not chart.is_logarithmic or b > 0.0
     )
     return Curve(name, " ".join(points))
-
-
-def _written(place: float) -> str:
-    return f"{place:.1f}"

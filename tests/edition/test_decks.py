@@ -46,6 +46,7 @@ def test_a_note_is_shown_once_for_its_range_of_cards(program: str) -> None:
         assert {each.entry["id"] for each in view.notes} == set(find(program, view.number).entries)
         kinds = [each.kind for each in view.notes]
         assert kinds == sorted(kinds, key=decks._ORDER.index)
+        assert view.kinds == sorted(set(kinds), key=decks._ORDER.index)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

@@ -1,4 +1,4 @@
-"""Batches: scenes of a sweep that are solved in one call with the same settings.
+"""Batches: scenes of a sweep that are solved in one call with the same settings; chunks of them.
 
 `scene` has the values that all share; `own` maps each field that varies in the batch to n values.
 """
@@ -16,12 +16,36 @@ from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.sweep.fields import ATTITUDE, CHOICES, CONSTANTS, number_field
-from pyharness.sweep.reductions import needs_attitudes
+from pyharness.sweep.fields import CHOICES, CONSTANTS, number_field
+from pyharness.sweep.reductions import empty, needs_attitudes, reduced
 from pyharness.sweep.state_torques import follows_body, with_numbers
-from pyharness.sweep.sweep import Indices, Sweep, groups, value_columns
+from pyharness.sweep.sweep import Arrays, Indices, Sweep, groups, points, value_columns
 
 Columns = dict[str, Array]
+
+
+def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
+    """Solve chunk number `chunk`, from 0, in any executor.
+
+    Arrays have the shape of the chunk, and another dimension for several components.
+    """
+    box = sweep.box(chunk)
+    shape = tuple(part.stop - part.start for part in box)
+    found = solve_points(sweep, points(box))
+    return {name: each.reshape(*shape, *each.shape[1:]) for name, each in found.items()}
+
+
+def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
+    """Solve the scenes that `where` selects, an index array per dimension.
+
+    The first dimension of the results runs over the scenes.
+    """
+    n = len(where[0])
+    found = {asked.name: empty(asked, n) for asked in sweep.reductions}
+    for members, batch in batches(sweep, where):
+        for asked in sweep.reductions:
+            found[asked.name][members] = reduced(asked, batch)
+    return found
 
 
 def listing_of(program: str, listing: str, reading: str) -> Listing:
@@ -42,16 +66,14 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 
 def looped_fields(sweep: Sweep) -> list[str]:
     """Return the varied fields whose values must be equal in all scenes of a batch."""
-    fields = [axis.field for axis in sweep.axes]
-    found = [
+    of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
+    return [
         name
-        for name in fields
+        for name in (axis.field for axis in sweep.axes if axis.field not in of_arrays)
         if name in CHOICES
         or number_field(name).looped
         or (name.startswith("body.") and follows_body(sweep.scene))
     ]
-    of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
-    return [name for name in found if name not in of_arrays]
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
@@ -80,66 +102,48 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         for name in list(shared)
         if name.startswith(CONSTANTS)
     }
-    is_refused = False
     if constants or bodies:
         moments = values[0].tolist() if bodies and values is not None else None
         try:
             scene = with_numbers(scene, constants, moments)
         except InputError:
-            is_refused = True
+            # Until the time NaN, all methods fail, and each scene reports it.
+            own["t_end"] = np.full(n, np.nan)
     solver = replace(sweep.solver, **shared)
     listing = None
     if solver.program is not None:
         listing = listing_of(solver.program, solver.listing, solver.reading)
-    if "t_end" in own:
-        t_end = own["t_end"]
-    else:
-        sizes = own.get("step_size", np.full(n, scene.step_size))
-        t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
-    if is_refused:
-        # Until the time NaN, all methods fail, and each scene reports it.
-        t_end = np.full(n, np.nan)
+    sizes = own.get("step_size", np.full(n, scene.step_size))
+    t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
+    t_end = own.get("t_end", t_end)
     found = {
         "omega0": _omega(scene, own, values if body == "moments" else None, n),
-        "attitude0": _attitude(scene, own, n),
-        **_law_arrays(scene, own, n),
+        "attitude0": _components("attitude", scene.attitude or IDENTITY, own, n, first=0),
         **{name: own.get(name) for name in OF_PROGRAMS},
         body: values,
     }
+    if not isinstance(scene.torque, StateTorque):
+        found["torque_constant"] = _components("torque.constant", scene.law.constant, own, n)
+        found["torque_rate"] = _components("torque.rate", scene.law.rate, own, n)
     arrays = {name: array for name, array in found.items() if array is not None}
     return Batch(scene, solver, listing, t_end, arrays, needs_attitudes(sweep.reductions))
 
 
-def _law_arrays(scene: Scene, own: Columns, n: int) -> dict[str, Array | None]:
-    """Return the arrays of a torque law's varied terms; {} if the torque depends on the state."""
-    if isinstance(scene.torque, StateTorque):
-        return {}
-    return {
-        "torque_constant": _three("torque.constant", scene.law.constant, own, n),
-        "torque_rate": _three("torque.rate", scene.law.rate, own, n),
-    }
-
-
-def _attitude(scene: Scene, own: Columns, n: int) -> Array | None:
-    if not any(name in own for name in ATTITUDE):
-        return None
-    base = scene.attitude or IDENTITY
-    columns = [own.get(name, np.full(n, base[i])) for i, name in enumerate(ATTITUDE)]
-    return np.stack(columns, axis=1)
-
-
-def _three(name: str, base: tuple[float, ...], own: Columns, n: int) -> Array | None:
-    fields = [f"{name}.{axis}" for axis in (1, 2, 3)]
+def _components(
+    name: str, base: tuple[float, ...], own: Columns, n: int, first: int = 1
+) -> Array | None:
+    """Return the fields ``name.first`` and so on, a row per scene; None if none of them varies."""
+    fields = {f"{name}.{number}": value for number, value in enumerate(base, first)}
     if not any(field in own for field in fields):
         return None
-    columns = [own.get(field, np.full(n, base[axis])) for axis, field in enumerate(fields)]
+    columns = [own.get(field, np.full(n, value)) for field, value in fields.items()]
     return np.stack(columns, axis=1)
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     """Return "moments" (kg m2) or "coefficients", and their values (n, 3); or "" and None."""
     if scene.coefficients is not None:
-        found = _three("body.coefficients", scene.coefficients, own, n)
+        found = _components("body.coefficients", scene.coefficients, own, n)
         return ("coefficients", found) if found is not None else ("", None)
     assert scene.moments is not None
     first, second, third = scene.moments
@@ -155,27 +159,29 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
-    found = _three("body.moments", scene.moments, own, n)
+    found = _components("body.moments", scene.moments, own, n)
     return ("moments", found) if found is not None else ("", None)
 
 
 def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
-    cartesian = _three("omega", scene.omega, own, n)
+    cartesian = _components("omega", scene.omega, own, n)
     if cartesian is not None:
         return cartesian
     start = np.array(scene.omega)
     length = float(np.linalg.norm(start))
     magnitude = own.get("omega.magnitude", np.full(n, length))
+    zero = np.zeros(n)
     if "tilt" in own or "azimuth" in own:
-        zero = np.zeros(n)
         unit = _tilted(scene, moments, own.get("tilt", zero), own.get("azimuth", zero))
-        return magnitude[:, None] * unit
-    if "height" in own or "longitude" in own:
-        unit = _on_sphere(own.get("height", np.zeros(n)), own.get("longitude", np.zeros(n)))
-        return magnitude[:, None] * unit
-    if "omega.magnitude" in own:
-        return magnitude[:, None] * (start / length)
-    return np.tile(start, (n, 1))
+    elif "height" in own or "longitude" in own:
+        height, longitude = own.get("height", zero), own.get("longitude", zero)
+        across = np.sqrt(1.0 - height * height)
+        unit = np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)
+    elif "omega.magnitude" in own:
+        unit = start / length
+    else:
+        return np.tile(start, (n, 1))
+    return magnitude[:, None] * unit
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
@@ -191,9 +197,3 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
     for rank, column in enumerate((sine * np.cos(azimuth), np.cos(tilt), sine * np.sin(azimuth))):
         np.put_along_axis(found, order[:, rank : rank + 1], column[:, None], axis=1)
     return found
-
-
-def _on_sphere(height: Array, longitude: Array) -> Array:
-    """Return unit vectors (n, 3) by third component and longitude (rad)."""
-    across = np.sqrt(1.0 - height * height)
-    return np.stack([across * np.cos(longitude), across * np.sin(longitude), height], axis=1)

@@ -1,4 +1,7 @@
-"""Executors, which compute the chunks of a sweep here or elsewhere, with equal results."""
+"""Executors, which compute the chunks of a sweep here or elsewhere, with equal results.
+
+Child processes ignore Ctrl-C, and end with this process.
+"""
 
 import asyncio
 import contextlib
@@ -6,19 +9,21 @@ import logging
 import multiprocessing
 import os
 import re
+import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from importlib import import_module
+from multiprocessing import connection, resource_tracker
 from typing import Any, NamedTuple
 
 from pyharness.model.distribution import install_command
 from pyharness.model.errors import InputError
-from pyharness.sweep.children import deaf_children, end_with_parent
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Arrays, Sweep
 
 EXECUTORS = ("here", "processes", "dask")
@@ -55,12 +60,16 @@ def engine(
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
-    elif executor == "processes":
-        count = workers or _processors()
+        return
+    count = workers or _processors()
+    if executor == "processes":
         yield Engine(count, partial(_by_processes, count))
-    else:
-        with _client(workers or _processors(), address) as client:
-            yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
+        return
+    dask: Any = import_module("distributed")
+    # Dask's log of workers is meant for the administrators of a cluster.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with _local_cluster(dask, count) if address is None else _connected(dask, address) as client:
+        yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
 
 
 def _processors() -> int:
@@ -120,25 +129,52 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             process.kill()
 
 
+@contextlib.contextmanager
+def deaf_children() -> Iterator[None]:
+    """Block Ctrl-C in all processes and threads that are started within this context.
+
+    A terminal sends SIGINT to all its processes, but only the parent should react. The calling
+    thread receives the signal when the context ends.
+    """
+    # Children inherit a blocked signal. Python would start the resource tracker with the first
+    # child, and then unblock the signal.
+    warning = "ignore:resource_tracker"
+    # The tracker would warn of leftover semaphores.
+    sys.warnoptions.append(warning)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(warning)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with_parent() -> None:
+    """Start a thread that ends this process when its parent ends, for whatever reason.
+
+    Without a parent in `multiprocessing`, no thread is started.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        # The sentinel is a pipe, whose other end the system closes at the parent's end.
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def check_dask() -> None:
     """Raise InputError if Dask is not installed."""
     try:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(f"--executor dask needs dask: {install_command('sweep')}") from None
-
-
-@contextlib.contextmanager
-def _client(workers: int, address: str | None) -> Iterator[Any]:
-    dask: Any = import_module("distributed")
-    # Dask's log of workers is meant for the administrators of a cluster.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    if address is not None:
-        with _connected(dask, address) as client:
-            yield client
-        return
-    with _local_cluster(dask, workers) as client:
-        yield client
 
 
 @contextlib.contextmanager

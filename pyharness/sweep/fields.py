@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 # Fields whose values are names, with the allowed values.
 CHOICES = {
@@ -35,35 +36,31 @@ CONSTANTS = "torque.constants."
 ATTITUDE = tuple(f"attitude.{number}" for number in range(4))
 
 
-def _above_zero(value: float) -> bool:
-    return value > 0.0
+_ABOVE_ZERO: tuple[str, Callable[[float], bool]] = ("a number above 0", lambda value: value > 0.0)
+_FROM_ZERO: tuple[str, Callable[[float], bool]] = ("a number from 0", lambda value: value >= 0.0)
 
 
 def _from_zero_to_one(value: float) -> bool:
     return 0.0 < value <= 1.0
 
 
-def _three(name: str, units: str, title: str, positive: bool = False) -> dict[str, Field]:
-    if positive:
-        taken = Field(units, title, "a number above 0", _above_zero)
-    else:
-        taken = Field(units, title)
-    return {f"{name}.{number}": taken for number in (1, 2, 3)}
+def _three(name: str, *about: Any) -> dict[str, Field]:
+    return {f"{name}.{number}": Field(*about) for number in (1, 2, 3)}
 
 
 NUMBERS = {
     **_three("omega", "rad/s", "initial angular velocity"),
-    "omega.magnitude": Field("rad/s", "its length", "a number from 0", lambda value: value >= 0.0),
+    "omega.magnitude": Field("rad/s", "its length", *_FROM_ZERO),
     "tilt": Field("rad", "its angle from the axis of the middle moment"),
     "azimuth": Field("rad", "its angle about that axis, from the axis of the least moment"),
     "height": Field(
         "1", "its third component over its length", "-1 to 1", lambda v: -1.0 <= v <= 1.0
     ),
     "longitude": Field("rad", "its angle about the third axis, from the first"),
-    **_three("body.moments", "kg m2", "moments", positive=True),
+    **_three("body.moments", "kg m2", "moments", *_ABOVE_ZERO),
     **_three("body.coefficients", "1", "coefficients A, B, C"),
-    "body.ratio.1": Field("1", "I1 over I3", "a number above 0", _above_zero),
-    "body.ratio.2": Field("1", "I2 over I3", "a number above 0", _above_zero),
+    "body.ratio.1": Field("1", "I1 over I3", *_ABOVE_ZERO),
+    "body.ratio.2": Field("1", "I2 over I3", *_ABOVE_ZERO),
     "body.square.1": Field(
         "1", "middle second moment over largest", "0 to 1, not 0", _from_zero_to_one
     ),
@@ -75,11 +72,9 @@ NUMBERS = {
     **{name: Field("1", "initial attitude, a quaternion, scalar first") for name in ATTITUDE},
     "t_end": Field("s", "time of the end"),
     "tolerance": Field("1", "tolerance", "above 0, to 1", _from_zero_to_one, looped=True),
-    "step_size": Field("s", "step", "a number above 0", _above_zero, looped=True),
+    "step_size": Field("s", "step", *_ABOVE_ZERO, looped=True),
     "steps": Field("1", "steps", "1 and above", lambda v: v >= 1.0, looped=True, whole=True),
-    "lipschitz": Field(
-        "1/s", "constant of the stop test", "a number from 0", lambda v: v >= 0.0, looped=True
-    ),
+    "lipschitz": Field("1/s", "constant of the stop test", *_FROM_ZERO, looped=True),
 }
 # Pairs of groups of fields, by the beginnings of their names, that exclude each other, mostly
 # because they describe the same quantity.

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pyharness.model.report import format_bytes, format_count, format_duration
-from pyharness.sweep.batches import looped_fields
-from pyharness.sweep.chunk import solve_chunk, solve_points
+from pyharness.sweep.batches import looped_fields, solve_chunk, solve_points
 from pyharness.sweep.executors import Engine
 from pyharness.sweep.reductions import empty
 from pyharness.sweep.store import scratch

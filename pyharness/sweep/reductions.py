@@ -1,6 +1,10 @@
-"""Reductions: the quantities that a sweep can store for each scene."""
+"""Reductions: the quantities that a sweep can store for each scene.
 
-import importlib
+The parameter `samples` is the number of times at which states are read; `of` names a principal axis
+by the rank of its moment.
+"""
+
+import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,21 +14,15 @@ from numpy.typing import NDArray
 
 from pyharness.checks.compare.batch import Batch
 from pyharness.checks.theory.flips import flip_times
+from pyharness.model.attitude import product
 from pyharness.model.codes import Statuses
 from pyharness.model.extension import ENDS
 from pyharness.model.trajectory import STOP_VARIABLES, Array
-from pyharness.sweep.attitude_reductions import (
-    axis_flips,
-    end_attitude,
-    largest_tilt,
-    pointing_error,
-    tilted_time,
-)
 from pyharness.sweep.sweep import ReductionSpec
 
 Found = NDArray[Any]
-# Value in integer arrays of scenes that are not computed yet.
-_NOT_YET = -1
+# Principal axes in ascending order of their moments.
+RANKS = ("least", "middle", "largest")
 
 
 @dataclass(frozen=True)
@@ -38,8 +36,8 @@ class Reduction:
     """
 
     title: str
-    units: str
     compute: Callable[[Batch, Mapping[str, Any]], Found]
+    units: str = "1"
     dtype: str = "f8"
     labels: tuple[str, ...] = ()
     dimension: str = ""
@@ -51,7 +49,7 @@ class Reduction:
     @property
     def fill(self) -> Any:
         """Return the value of scenes not computed yet: NaN, or -1 in an integer array."""
-        return np.nan if self.dtype == "f8" else _NOT_YET
+        return np.nan if self.dtype == "f8" else -1
 
 
 def _end(batch: Batch, _: Mapping[str, Any]) -> Found:
@@ -74,8 +72,7 @@ def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
         truth = batch.by_method(given["against"], given["tolerance"], part)
         largest = np.fmax(largest, np.abs(truth).max(axis=1))
         worst = np.maximum(worst, np.abs(rows[:, i] - truth).max(axis=1))
-    found: Found = worst / largest
-    return found
+    return np.asarray(worst / largest)
 
 
 def _stop_step(batch: Batch, _: Mapping[str, Any]) -> Found:
@@ -104,19 +101,12 @@ def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
-    room, _, name = given["function"].partition(":")
-    judge = getattr(importlib.import_module(room), name)
-    return np.asarray(judge(batch))
+    return np.asarray(pkgutil.resolve_name(given["function"])(batch))
 
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
-    # The arc cosine of the scalar product would lose half of the digits of a small angle.
-    angles: Found = 2.0 * np.arctan2(
-        np.linalg.norm(rows - start, axis=2), np.linalg.norm(rows + start, axis=2)
-    )
-    largest: Found = angles.max(axis=1)
-    return largest
+    return np.asarray(_angles(rows, start).max(axis=1))
 
 
 def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -126,8 +116,7 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     component = np.take_along_axis(rows, column[:, None, None], axis=2)[:, :, 0]
     below = component < 0.0
     changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
-    count: Found = changes.sum(axis=1)
-    return count
+    return np.asarray(changes.sum(axis=1))
 
 
 def _flip_time(batch: Batch, _: Mapping[str, Any]) -> Found:
@@ -141,13 +130,87 @@ def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
     moved = start + offset / np.sqrt(3.0)
     before = np.linalg.norm(moved - start, axis=1)
     after = np.linalg.norm(batch.from_start(moved).omega - batch.omega, axis=1)
-    rate: Found = np.log(after / before) / np.abs(batch.t_end)
-    return rate
+    return np.asarray(np.log(after / before) / np.abs(batch.t_end))
 
 
 def _unit(vectors: Array) -> Array:
-    found: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return found
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _angles(ours: Array, theirs: Array) -> Array:
+    """Return the angles (rad) between unit vectors."""
+    # The arc cosine of the scalar product would lose half of the digits of a small angle.
+    across, along = (np.linalg.norm(each, axis=-1) for each in (ours - theirs, ours + theirs))
+    return np.asarray(2.0 * np.arctan2(across, along))
+
+
+def _end_attitude(batch: Batch, _: Mapping[str, Any]) -> Found:
+    """Return the attitudes at the end, shape (n, 4)."""
+    return _in_space(batch)
+
+
+def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
+    """Return the largest angles (rad) between an axis and its initial direction, shape (n,)."""
+    return np.asarray(_tilts(batch, given).max(axis=1))
+
+
+def _tilted_time(batch: Batch, given: Mapping[str, Any]) -> Found:
+    """Return how long (s) an axis is tilted by more than `above` (rad), shape (n,).
+
+    Each sample counts for the time since the sample before.
+    """
+    angles = _tilts(batch, given)
+    share = (angles > given["above"]).mean(axis=1)
+    return np.where(np.isfinite(angles).all(axis=1), share * np.abs(batch.t_end), np.nan)
+
+
+def _axis_flips(batch: Batch, given: Mapping[str, Any]) -> Found:
+    """Return how often an axis's tilt passes a right angle between samples, shape (n,)."""
+    along, across = _tilt_squares(batch, given)
+    is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
+    return np.asarray((is_over[:, 1:] != is_over[:, :-1]).sum(axis=1))
+
+
+def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
+    """Return the final angles (rad) between an axis and a direction in space, shape (n,).
+
+    The direction is `towards` or, if empty, the axis's initial one.
+    """
+    if not given["towards"]:
+        return _axis_tilt(batch, {**given, "samples": 1})
+    target = np.array(given["towards"])
+    target = target / np.abs(target).max()
+    target = target / np.linalg.norm(target)
+    attitudes = _in_space(batch)
+    unit = _is_own(batch, given, len(attitudes)).astype(float)
+    w, x, y, z = attitudes.T
+    _, *vector = product(product((w, x, y, z), (0.0, *unit.T)), (w, -x, -y, -z))
+    return _angles(np.stack(vector, axis=1), target)
+
+
+def _in_space(batch: Batch) -> Found:
+    turn = batch.attitudes(1)[:, 0]
+    return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
+
+
+def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
+    along, across = _tilt_squares(batch, given)
+    return np.asarray(2.0 * np.arctan2(np.sqrt(across), np.sqrt(along)))
+
+
+def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Return the squared cosine and sine of half an axis's angle from its initial direction."""
+    squares = batch.attitudes(given["samples"]) ** 2
+    is_own = _is_own(batch, given, len(squares))[:, None, :]
+    along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
+    across = np.where(is_own, 0.0, squares[:, :, 1:]).sum(axis=2)
+    return along, across
+
+
+def _is_own(batch: Batch, given: Mapping[str, Any], n: int) -> NDArray[np.bool_]:
+    """Return whether each principal axis of n bodies has the rank `of`, shape (n, 3)."""
+    axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
+    return np.asarray(np.arange(3) == np.broadcast_to(axis, (n,))[:, None])
 
 
 _SAMPLES = {"samples": 100}
@@ -155,36 +218,32 @@ _OF_AXES: dict[str, Any] = {"only": "method", "needs": ("moments", "attitude")}
 _STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
-        "angular velocity at the end", "rad/s", _end, labels=("1", "2", "3"), dimension="component"
+        "angular velocity at the end", _end, "rad/s", labels=("1", "2", "3"), dimension="component"
     ),
-    "status": Reduction("how it ended", "1", _status, "i1", flags=_STATUSES),
+    "status": Reduction("how it ended", _status, dtype="i1", flags=_STATUSES),
     "error": Reduction(
         "largest error of a component against a method, over the largest component",
-        "1",
         _error,
         parameters={"against": "auto", "tolerance": 1e-14, "samples": 1},
     ),
     "stop-step": Reduction(
         "step at which the stop test ended it; 0: it did not",
-        "1",
         _stop_step,
-        "i4",
+        dtype="i4",
         only="program",
     ),
     "stop-variable": Reduction(
         "variable that ended it",
-        "1",
         _stop_variable,
-        "i1",
+        dtype="i1",
         only="program",
         flags={0: "none", **dict(enumerate(STOP_VARIABLES, 1))},
     ),
     "overflow-time": Reduction(
-        "time of the first step without a finite result", "s", _overflow_time, only="program"
+        "time of the first step without a finite result", _overflow_time, "s", only="program"
     ),
     "drift": Reduction(
         "largest change of energy and of squared angular momentum, relative",
-        "1",
         _drift,
         labels=("energy", "momentum"),
         dimension="invariant",
@@ -193,22 +252,20 @@ REDUCTIONS = {
     ),
     "claim": Reduction(
         "whether a claim holds; 2: it says nothing of the scene; 3: it holds in part",
-        "1",
         _claim,
-        "i1",
+        dtype="i1",
         parameters={"id": ""},
         flags={0: "fails", 1: "holds", 2: "silent", 3: "in part"},
     ),
     "largest-tilt": Reduction(
         "largest angle of the angular velocity from where it was",
-        "rad",
         _largest_tilt,
+        "rad",
         parameters=_SAMPLES,
     ),
     "attitude": Reduction(
         "attitude at the end, a quaternion from the body to space, scalar first",
-        "1",
-        end_attitude,
+        _end_attitude,
         labels=("0", "1", "2", "3"),
         dimension="quaternion",
         only="method",
@@ -216,51 +273,49 @@ REDUCTIONS = {
     ),
     "axis-tilt": Reduction(
         "largest angle in space of a body's axis from where it was",
+        _axis_tilt,
         "rad",
-        largest_tilt,
         parameters={**_SAMPLES, "of": "middle"},
         **_OF_AXES,
     ),
     "tilted-time": Reduction(
         "time during which the angle in space of a body's axis from where it was exceeds a limit",
+        _tilted_time,
         "s",
-        tilted_time,
         parameters={**_SAMPLES, "of": "middle", "above": 0.5},
         **_OF_AXES,
     ),
     "axis-flips": Reduction(
         "times that the angle in space of a body's axis from where it was passes a right angle",
-        "1",
-        axis_flips,
-        "i4",
+        _axis_flips,
+        dtype="i4",
         parameters={**_SAMPLES, "of": "middle"},
         **_OF_AXES,
     ),
     "pointing-error": Reduction(
         "angle of a body's axis from a direction in space at the end",
+        _pointing_error,
         "rad",
-        pointing_error,
         parameters={"of": "largest", "towards": ()},
         **_OF_AXES,
     ),
     "flips": Reduction(
         "changes of sign of the component about the middle axis",
-        "1",
         _flips,
-        "i4",
+        dtype="i4",
         needs=("moments",),
         parameters=_SAMPLES,
     ),
     "flip-time": Reduction(
         "time between changes of sign of the component about the middle axis",
-        "s",
         _flip_time,
+        "s",
         needs=("moments", "no torque"),
     ),
     "growth": Reduction(
         "logarithm of the error amplification, over the time",
-        "1/s",
         _growth,
+        "1/s",
         parameters={"offset": 1e-6},
     ),
 }

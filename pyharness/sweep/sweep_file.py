@@ -2,6 +2,7 @@
 
 import hashlib
 import itertools
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.checks.compare.batch import Solver
-from pyharness.engine.registry import REGISTRY, requested_tolerance
+from pyharness.engine.registry import METHODS, REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
 from pyharness.engine.solver import PREPARED
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -22,14 +23,13 @@ from pyharness.model.scene_file import (
     read_file,
     toml_of,
 )
-from pyharness.model.values import boolean, finite, integer, number
+from pyharness.model.values import boolean, finite, integer, number, three
 from pyharness.sweep.axes import Axis, axis_of
 from pyharness.sweep.batches import listing_of
 from pyharness.sweep.fields import ATTITUDE, CHOICES, RIVALS
-from pyharness.sweep.reduction_spec import reduction_spec_of
-from pyharness.sweep.reductions import REDUCTIONS, needs_attitudes
+from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
 from pyharness.sweep.state_torques import check_state_axis, check_state_solver
-from pyharness.sweep.sweep import Sweep
+from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _SOLVE = (
@@ -39,6 +39,7 @@ _SOLVE = (
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
+_MOST_SAMPLES = 10_000
 _LONGEST_NAME = 240  # bytes; most file systems take 255
 # Methods that propagate the attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
@@ -79,7 +80,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str
     entries = data.get("reductions", ["end", "status"])
     if not isinstance(entries, list) or not entries:
         raise InputError(f"reductions is {kind_of(entries)}; allowed: a list, not empty")
-    reductions = tuple(reduction_spec_of(each, claims) for each in entries)
+    reductions = tuple(_reduction(each, claims) for each in entries)
     chunk = integer("chunk", data.get("chunk", CHUNK))
     if not 1 <= chunk <= _MOST_IN_CHUNK:
         raise InputError(f"chunk is {chunk}; allowed: 1 to {_MOST_IN_CHUNK} scenes")
@@ -157,6 +158,53 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
         lipschitz=lipschitz,
         may_stop=boolean("[solve] may_stop", given.get("may_stop", True)),
     )
+
+
+def _reduction(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
+    """Return the reduction of an entry, a name or a table; raise InputError if it is invalid.
+
+    `claims` maps each claim to the function that checks it, as in ``package.module:name``.
+    """
+    table = {"name": entry} if isinstance(entry, str) else entry
+    if not isinstance(table, dict) or "name" not in table:
+        raise InputError("reductions: allowed: names, and tables with name and parameters")
+    name = table["name"]
+    if not isinstance(name, str) or name not in REDUCTIONS:
+        raise unknown("reduction", name, REDUCTIONS, "reductions")
+    where, defaults = f"reductions: {name}", REDUCTIONS[name].parameters
+    for key in table:
+        if key not in ("name", "as", *defaults):
+            raise unknown("parameter", key, ("as", *defaults), where)
+    given = {key: table.get(key, default) for key, default in defaults.items()}
+    if (
+        "samples" in given
+        and not 1 <= integer(f"{where} samples", given["samples"]) <= _MOST_SAMPLES
+    ):
+        raise InputError(f"{where} samples {given['samples']}; allowed: 1 to {_MOST_SAMPLES}")
+    if "offset" in given and not 0.0 < number(f"{where} offset", given["offset"]) <= 1.0:
+        raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
+    if "of" in given and given["of"] not in RANKS:
+        raise unknown("axis", given["of"], RANKS, f"{where} of")
+    if "above" in given and not 0.0 <= number(f"{where} above", given["above"]) <= math.pi:
+        raise InputError(f"{where} above {given['above']:g}; allowed: 0 to pi, rad")
+    if "towards" in table:
+        given["towards"] = three(f"{where} towards", table["towards"])
+        if not any(given["towards"]):
+            raise InputError(f"{where} towards: allowed: three finite numbers, not all 0")
+    if "against" in given:
+        if not isinstance(given["against"], str) or given["against"] not in METHODS:
+            raise unknown("method", given["against"], METHODS, f"{where} against")
+        if not 0.0 < number(f"{where} tolerance", given["tolerance"]) <= 1.0:
+            raise InputError(f"{where} tolerance {given['tolerance']:g}; allowed: above 0, to 1")
+    function, title = "", name
+    if "id" in given:
+        if not isinstance(given["id"], str) or given["id"] not in claims:
+            raise unknown("claim", given["id"], claims or ["none"], f"{where} id")
+        function, title = claims[given["id"]], f"claim-{given['id']}"
+    title = table.get("as", title)
+    if not isinstance(title, str) or not title.replace("-", "").replace("_", "").isalnum():
+        raise InputError(f"{where} as: allowed: a name of letters, digits and '-'")
+    return ReductionSpec(title, name, tuple(given.items()), function)
 
 
 def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:

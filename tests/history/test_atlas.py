@@ -11,7 +11,7 @@ from pyharness import InputError
 from pyharness.cli.main import main
 from pyharness.history.claims.atlas import atlas_of, bits, shares, sum_of_points
 from pyharness.history.claims.over_starts import FAILS, FUNCTIONS, HOLDS, IN_PART, JUDGED
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep_file import read_sweep
 from tests.conftest import Printed
 

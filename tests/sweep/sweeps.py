@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Arrays, Sweep, points
 
 BASE = """

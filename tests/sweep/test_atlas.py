@@ -15,7 +15,7 @@ from pyharness.checks.theory.flips import flip_times
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.forecast import places_of_a_chunk
 from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep, spread

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.sweep.chunk import solve_points
+from pyharness.sweep.batches import solve_points
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.sweeps import TILT, axis, every, text, written
 

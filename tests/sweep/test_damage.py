@@ -15,7 +15,7 @@ from pyharness.cli.main import main
 from pyharness.model.errors import InputError
 from pyharness.model.schema import SCHEMAS
 from pyharness.sweep import run, store_layout
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep

@@ -15,7 +15,7 @@ import pytest
 
 from pyharness.model.errors import InputError
 from pyharness.sweep import executors
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
 from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep

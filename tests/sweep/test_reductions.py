@@ -14,8 +14,7 @@ from pyharness.model.codes import Statuses
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import STOP_VARIABLES
-from pyharness.sweep.batches import batches, listing_of
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import batches, listing_of, solve_chunk
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.sweep import Sweep, points
 from pyharness.sweep.sweep_file import read_sweep

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from pyharness import InputError, Scene, read_scene, solve, torques
 from pyharness.model.codes import Statuses
-from pyharness.sweep.batches import batches
-from pyharness.sweep.chunk import solve_points
+from pyharness.sweep.batches import batches, solve_points
 from pyharness.sweep.executors import EXECUTORS
 from pyharness.sweep.forecast import places_of_a_chunk
 from pyharness.sweep.run import swept

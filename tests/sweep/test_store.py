@@ -20,7 +20,7 @@ import pytest
 from pyharness.model.errors import InputError
 from pyharness.sweep import run, store, store_layout
 from pyharness.sweep.axes import MOST_VALUES
-from pyharness.sweep.chunk import solve_chunk
+from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
 from pyharness.sweep.forecast import forecast
 from pyharness.sweep.run import check_size, run_sweep

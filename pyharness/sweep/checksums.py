@@ -5,12 +5,13 @@ sweep and the part of the store, so that an exchanged file fails; the others hav
 In this module, `folder` is the store's, and `name` a path in it.
 """
 
+import contextlib
 import errno
 import hashlib
 import os
 import shutil
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,52 +60,45 @@ def check_files(
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
     """Return a file's content; raise DamageError if it is missing, large or not regular."""
-    handle = _opened(folder, name, limit)
-    try:
-        with open(handle, "rb") as file:
-            return file.read(limit)
-    except OSError as error:
-        raise DamageError(f"'{name}': {error.strerror or error}") from None
+    with _opened(folder, name, limit) as handle, open(handle, "rb", closefd=False) as file:
+        return file.read(limit)
 
 
 def _digest(folder: Path, name: str, limit: int) -> str:
     digest = hashlib.sha256()
-    try:
-        with open(_opened(folder, name, limit), "rb", buffering=0) as file:
-            # The end of a file that grows might never be reached.
-            for _ in range(limit // _PIECE + 2):
-                piece = file.read(_PIECE)
-                if not piece:
-                    break
-                digest.update(piece)
-    except OSError as error:
-        raise DamageError(f"'{name}': {error.strerror or error}") from None
+    with _opened(folder, name, limit) as handle:
+        # The end of a file that grows might never be reached.
+        for _ in range(limit // _PIECE + 2):
+            digest.update(os.read(handle, _PIECE))
     return digest.hexdigest()
 
 
-def _opened(folder: Path, name: str, limit: int) -> int:
-    """Return a file's descriptor; raise DamageError if it is missing, large or not regular."""
+@contextlib.contextmanager
+def _opened(folder: Path, name: str, limit: int) -> Iterator[int]:
+    """Yield a file's descriptor; raise DamageError if it is missing, large or not regular."""
+    handle = None
     try:
         # Without O_NONBLOCK, opening a pipe waits for a writer.
         handle = os.open(folder / name, os.O_RDONLY | os.O_NONBLOCK)
+        status = os.fstat(handle)
+        if stat.S_ISDIR(status.st_mode):
+            raise DamageError(f"'{name}' is a folder")
+        if not stat.S_ISREG(status.st_mode):
+            raise DamageError(f"'{name}' is no ordinary file")
+        if status.st_size > limit:
+            raise DamageError(
+                f"'{name}' has {status.st_size} bytes, and can't have more than {limit}"
+            )
+        yield handle
     except FileNotFoundError:
         raise DamageError(f"'{name}' is missing") from None
     except PermissionError:
         raise  # the user can correct the permissions, and the content need not be damaged
     except OSError as error:
         raise DamageError(f"'{name}': {error.strerror or error}") from None
-    status = os.fstat(handle)
-    reason = ""
-    if stat.S_ISDIR(status.st_mode):
-        reason = "is a folder"
-    elif not stat.S_ISREG(status.st_mode):
-        reason = "is no ordinary file"
-    elif status.st_size > limit:
-        reason = f"has {status.st_size} bytes, and can't have more than {limit}"
-    if reason:
-        os.close(handle)
-        raise DamageError(f"'{name}' {reason}")
-    return handle
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 def exists(folder: Path, name: str) -> bool:
@@ -143,13 +137,9 @@ def place_checksums(
         content = checksum_text(label, part, folder, names, limit)
     except DamageError as damage:
         raise OSError(errno.EIO, f"{damage}, though it was written now") from None
-    _write_whole(folder, checksums, content)
-
-
-def _write_whole(folder: Path, name: str, content: bytes) -> None:
-    """Write a file by renaming a temporary one, so that it is never incomplete."""
-    path = folder / name
+    path = folder / checksums
     path.parent.mkdir(parents=True, exist_ok=True)
+    # Renaming a temporary file means that the file is never incomplete.
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")
     try:
         new.write_bytes(content)

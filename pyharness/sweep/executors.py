@@ -13,7 +13,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
@@ -27,7 +27,7 @@ from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.sweep import Arrays, Sweep
 
 EXECUTORS = ("here", "processes", "dask")
-Results = Iterator[tuple[int, Arrays]]
+Results = Generator[tuple[int, Arrays], None, None]
 
 # Deaths of processes, without a completed chunk in between, at which the sweep ends.
 _ATTEMPTS = 3

@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from pyharness.model.report import format_bytes, format_count, format_duration
 from pyharness.sweep.batches import looped_fields, solve_chunk, solve_points
 from pyharness.sweep.executors import Engine
 from pyharness.sweep.reductions import empty
-from pyharness.sweep.store import scratch
+from pyharness.sweep.store import Store
+from pyharness.sweep.store_layout import filled
 from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 
 # Numbers of scenes in the samples, which are evenly spread over the grid; the smallest is measured
@@ -61,7 +63,8 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
     """
     times = []
     try:
-        with scratch(sweep, path) as store:
+        with filled(sweep, Path(path)) as folder:
+            store = Store(sweep, folder)
             for chunk in range(min(_FILES, sweep.n_chunks)):
                 part = _pattern(sweep, chunk)
                 begin = time.perf_counter()
@@ -87,8 +90,9 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
     for asked in sweep.reductions:
         values = empty(asked, math.prod(shape))
         values[...] = draw.integers(0, 100, values.shape)
-        scaled = values * 0.1 if values.dtype.kind == "f" else values
-        found[asked.name] = scaled.reshape(*shape, *values.shape[1:])
+        if values.dtype.kind == "f":
+            values *= 0.1
+        found[asked.name] = values.reshape(*shape, *values.shape[1:])
     return found
 
 

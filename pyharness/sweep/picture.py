@@ -4,7 +4,8 @@ The panels differ in the values along the remaining dimensions.
 """
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,14 @@ _COLUMNS = 3  # of panels
 _ORDERS = 3.0
 
 
+class _Scale(NamedTuple):
+    """The ends of a scale for all panels."""
+
+    least: float
+    largest: float
+    is_logarithmic: bool
+
+
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
     """Return the reduction `name`, by default the first without codes of outcomes, else the first.
 
@@ -49,32 +58,32 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """
     from matplotlib.figure import Figure
 
-    sweep = store.sweep
-    axis_of = {axis.dimension: axis for axis in reversed(sweep.axes)}
-    long = [d for d, axis in axis_of.items() if axis.count > 1 and not axis.is_choice]
-    ordered = [d for d in sweep.dimensions if d in long]
+    axis_of = {axis.dimension: axis for axis in reversed(store.sweep.axes)}
+    dimensions = store.sweep.dimensions
+    ordered = [d for d in dimensions if axis_of[d].count > 1 and not axis_of[d].is_choice]
     # Random values have no order, and are shown as dots.
     shown = [d for d in ordered if not _is_drawn(axis_of[d])][-2:] or ordered[-1:]
-    panels = _panels(store, asked, axis_of, shown)
+    most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
+    places = {d: _thinned(axis_of[d].count, most) for d in shown}
+    axes = [axis_of[d] for d in shown]
+    values = [axis.coordinates()[each] for axis, each in zip(axes, places.values(), strict=True)]
+    panels = _panels(store, asked, axis_of, places)
     rows = -(-len(panels) // _COLUMNS)
     figure = Figure(
         figsize=(4.0 * min(len(panels), _COLUMNS) + 1.0, 3.4 * rows + 0.8), layout="constrained"
     )
-    values = [panel for _, _, panel in panels]
-    logarithmic = _spans_orders(values)
+    scale = _scale([panel for _, panel in panels])
     numbers: list[tuple[Any, ...]] = []
     last = None
     plots = figure.subplots(rows, min(len(panels), _COLUMNS), squeeze=False).ravel()
-    for plot, (told, places, panel) in zip(plots, panels, strict=False):
+    for plot, (told, panel) in zip(plots, panels, strict=False):
         plot.set_title(told, fontsize=9)
         if len(shown) == 2:
-            last = _map(plot, axis_of, shown, places, panel, _limits(values), logarithmic)
+            last = _map(plot, axes, values, panel, scale)
         else:
-            _dots(plot, axis_of, shown, places, panel, logarithmic)
-        for at in itertools.product(*(range(len(each)) for each in places)):
-            here = [_as_number(axis_of[d].coordinates()[p[i]]) for d, p, i in
-                    zip(shown, places, at, strict=True)]  # fmt: skip
-            numbers.append((told, *here, _as_number(panel[at])))
+            _dots(plot, axes, values, panel, scale.is_logarithmic)
+        pairs = zip(itertools.product(*values), panel.ravel().tolist(), strict=True)
+        numbers += [(told, *map(float, here), value) for here, value in pairs]
     for plot in plots[len(panels) :]:
         plot.set_axis_off()
     reduction = REDUCTIONS[asked.reduction]
@@ -84,57 +93,45 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     else:
         for plot in plots[: len(panels)]:
             plot.set_ylabel(label, fontsize=8)
-    heads = [Column(axis_of[d].field, unit=units_of(axis_of[d].field)) for d in shown]
+    heads = [Column(axis.field, unit=units_of(axis.field)) for axis in axes]
     columns = [Column("panel", left=True), *heads, Column(asked.name, unit=reduction.units)]
-    return Picture(figure, Table(columns, numbers), [sweep.name, reduction.title])
-
-
-Panel = tuple[str, list[Array], Array]
+    return Picture(figure, Table(columns, numbers), [store.sweep.name, reduction.title])
 
 
 def _panels(
-    store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], shown: list[str]
-) -> list[Panel]:
-    """Return title (values along other dimensions, component), indices and values of each panel."""
-    reduction = REDUCTIONS[asked.reduction]
-    most = _MOST_PLACES if len(shown) == 2 else _MOST_DOTS
-    places = [_thinned(axis_of[d].count, most) for d in shown]
-    others = [d for d in store.sweep.dimensions if d not in shown]
-    choices: list[list[int]] = []
+    store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
+) -> list[tuple[str, Array]]:
+    """Return title (values along other dimensions, component) and values of each panel."""
+    choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
-    for dimension in others:
-        few = _thinned(axis_of[dimension].count, max(1, room)).tolist()
-        room //= len(few)
-        choices.append(few)
-    labels: list[tuple[int | None, str]] = [*enumerate(reduction.labels)] or [(None, "")]
-    labels = labels[: max(1, room)]
+    for dimension in (d for d in store.sweep.dimensions if d not in places):
+        choices[dimension] = _thinned(axis_of[dimension].count, max(1, room)).tolist()
+        room //= len(choices[dimension])
+    components = REDUCTIONS[asked.reduction].labels
+    labels: list[tuple[int | None, str]] = [*enumerate(components)] or [(None, "")]
     found = []
-    for still in itertools.product(*choices):
-        at = dict(zip(others, still, strict=True))
-        for number, label in labels:
+    for still in itertools.product(*choices.values()):
+        at = dict(zip(choices, still, strict=True))
+        for number, label in labels[: max(1, room)]:
             index: list[Any] = [at.get(d, slice(None)) for d in store.sweep.dimensions]
             index += [] if number is None else [number]
             values = np.asarray(store.array(asked.name)[tuple(index)], dtype=np.float64)
-            for position, each in enumerate(places):
-                values = np.take(values, each, axis=position)
-            order = [d for d in store.sweep.dimensions if d in shown]
-            assert order == shown
             told = [_label_of(axis_of[d], i) for d, i in at.items()] + ([label] if label else [])
-            found.append((", ".join(told), places, values))
+            found.append((", ".join(told), values[np.ix_(*places.values())]))
     return found
 
 
 def _map(
-    plot: "Axes", axis_of: dict[str, Axis], shown: list[str], places: list[Array], values: Array,
-    limits: tuple[float, float], logarithmic: bool,
-) -> Any:  # fmt: skip
+    plot: "Axes", axes: Sequence[Axis], values: Sequence[Any], panel: Array, scale: _Scale
+) -> Any:
     from matplotlib.colors import LogNorm, Normalize
 
-    down, across = (axis_of[d] for d in shown)
-    x, y = across.coordinates()[places[1]], down.coordinates()[places[0]]
-    norm = LogNorm(*limits) if logarithmic else Normalize(*limits)
-    seen = np.ma.masked_invalid(np.where(values > 0.0, values, np.nan) if logarithmic else values)
+    logarithmic = scale.is_logarithmic
+    norm = (LogNorm if logarithmic else Normalize)(scale.least, scale.largest)
+    seen = np.ma.masked_invalid(np.where(panel > 0.0, panel, np.nan) if logarithmic else panel)
+    y, x = values
     drawn = plot.pcolormesh(x, y, seen, norm=norm, shading="nearest", rasterized=True)
+    down, across = axes
     for axis, set_label, set_scale in (
         (across, plot.set_xlabel, plot.set_xscale),
         (down, plot.set_ylabel, plot.set_yscale),
@@ -145,15 +142,14 @@ def _map(
 
 
 def _dots(
-    plot: "Axes", axis_of: dict[str, Axis], shown: list[str], places: list[Array], values: Array,
-    logarithmic: bool,
-) -> None:  # fmt: skip
-    if not shown:
-        plot.plot([0.0], [float(values)], "o", color="#1040a0")
+    plot: "Axes", axes: Sequence[Axis], values: Sequence[Any], panel: Array, logarithmic: bool
+) -> None:
+    if not axes:
+        plot.plot([0.0], [float(panel)], "o", color="#1040a0")
         return
-    axis = axis_of[shown[0]]
+    (axis,) = axes
     style = "." if _is_drawn(axis) or axis.how == "listed" else "-"
-    plot.plot(axis.coordinates()[places[0]], values, style, color="#1040a0", markersize=3.0)
+    plot.plot(values[0], panel, style, color="#1040a0", markersize=3.0)
     plot.set_xlabel(_label(axis.field, units_of(axis.field)), fontsize=8)
     plot.set_xscale("log" if axis.how.startswith("log") else "linear")
     plot.set_yscale("log" if logarithmic else "linear")
@@ -168,24 +164,16 @@ def _thinned(count: int, most: int) -> Any:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
-def _spans_orders(values: list[Array]) -> bool:
+def _scale(values: Sequence[Array]) -> _Scale:
     every = np.concatenate([each.ravel() for each in values])
     every = every[np.isfinite(every)]
     above = every[every > 0.0]
-    if not len(above) or (every < 0.0).any():
-        return False
-    return bool(np.log10(above.max() / above.min()) > _ORDERS)
-
-
-def _limits(values: list[Array]) -> tuple[float, float]:
-    every = np.concatenate([each.ravel() for each in values])
-    every = every[np.isfinite(every)]
-    if _spans_orders(values):
-        every = every[every > 0.0]
-    if not len(every):
-        return 0.0, 1.0
-    least, largest = float(every.min()), float(every.max())
-    return least, largest if largest > least else least + 1.0
+    is_logarithmic = bool(
+        len(above) and (every >= 0.0).all() and np.log10(above.max() / above.min()) > _ORDERS
+    )
+    every = above if is_logarithmic else every
+    least, largest = (float(every.min()), float(every.max())) if len(every) else (0.0, 1.0)
+    return _Scale(least, largest if largest > least else least + 1.0, is_logarithmic)
 
 
 def _label_of(axis: Axis, index: int) -> str:
@@ -195,7 +183,3 @@ def _label_of(axis: Axis, index: int) -> str:
 
 def _label(name: str, units: str) -> str:
     return f"{name} ({units})" if units not in ("", "1") else name
-
-
-def _as_number(value: Any) -> Any:
-    return value if isinstance(value, str) else float(value)

@@ -6,12 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.model.report import Column, Report, Table, digits, format_duration, words
+from pyharness.sweep.axes import Axis
 from pyharness.sweep.fields import units_of
 from pyharness.sweep.forecast import format_estimate
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.run import Outcome
 from pyharness.sweep.store import Store
-from pyharness.sweep.sweep import ReductionSpec, Sweep
+from pyharness.sweep.sweep import ReductionSpec
 
 _NUMBER = digits(".6g")
 _AXES = (
@@ -67,18 +68,12 @@ def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[in
         largest = np.maximum(largest, np.where(finite, values, -np.inf).max(axis=0))
     if reduction.flags:
         return [], flags
+    units = "" if reduction.units == "1" else reduction.units
+    mean = total / np.maximum(count, 1)
+    numbers = zip(least.tolist(), mean.tolist(), largest.tolist(), strict=True)
     return [
-        Found(
-            asked.name,
-            label,
-            int(count[i]),
-            int(none[i]),
-            float(least[i]) if count[i] else None,
-            float(total[i] / count[i]) if count[i] else None,
-            float(largest[i]) if count[i] else None,
-            "" if reduction.units == "1" else reduction.units,
-        )
-        for i, label in enumerate(labels)
+        Found._make([asked.name, label, int(n), int(gaps), *(three if n else [None] * 3), units])
+        for label, n, gaps, three in zip(labels, count, none, numbers, strict=True)
     ], flags
 
 
@@ -95,7 +90,7 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     text: list[list[Any]] = [[f"{sweep.name}: {_did(outcome)}; store {path}"]]
     if outcome.estimate is not None:
         text[0].append(f"estimated: {format_estimate(outcome.estimate)}")
-    axes = [_axis_row(sweep, i) for i in range(len(sweep.axes))]
+    axes = [_axis_row(axis) for axis in sweep.axes]
     text.append([Table(_AXES, axes)])
     if found:
         text.append([Table(_FOUND, found)])
@@ -133,8 +128,7 @@ def _did(outcome: Outcome) -> str:
     return f"{outcome.computed} chunks in {format_duration(outcome.seconds)}{repaired}{there}"
 
 
-def _axis_row(sweep: Sweep, number: int) -> tuple[Any, ...]:
-    axis = sweep.axes[number]
+def _axis_row(axis: Axis) -> tuple[Any, ...]:
     least = largest = None
     if not axis.is_choice:
         values = axis.coordinates()

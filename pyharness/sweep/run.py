@@ -38,25 +38,16 @@ class Outcome:
     repaired: int = 0
 
 
-def bytes_per_scene(sweep: Sweep) -> int:
-    """Return the uncompressed bytes of the results of one scene."""
-    return sum(empty(asked, 1).nbytes for asked in sweep.reductions)
-
-
-def _bytes_per_chunk(sweep: Sweep, block: int) -> int:
-    """Return the bytes of a chunk's files and checksums, in whole blocks of the disk."""
-    scenes = math.prod(sweep.chunk_shape)
-    sizes = [empty(asked, 1).nbytes * scenes for asked in sweep.reductions]
-    return block * sum(-(-size // block) for size in (*sizes, 1))
-
-
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
     """Return the bytes of the missing chunks on disk, and of all workers in memory.
 
     Raise InputError if the disk or half of the memory is too small, or for too many chunks.
     """
     disk = os.statvfs(Path(path).absolute().parent)
-    n_bytes = missing * _bytes_per_chunk(sweep, disk.f_frsize)
+    scenes = math.prod(sweep.chunk_shape)
+    sizes = [scenes * empty(asked, 1).nbytes for asked in sweep.reductions]
+    # A chunk has a file for each reduction and one of checksums, in whole blocks of the disk.
+    n_bytes = missing * sum(-(-size // disk.f_frsize) for size in (*sizes, 1)) * disk.f_frsize
     shown = f"{format_count(sweep.n_scenes)} scenes in {format_count(sweep.n_chunks)} chunks"
     free = disk.f_bavail * disk.f_frsize
     if n_bytes > free:
@@ -77,7 +68,7 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
             "chunk, or put axes of names first"
         )
     coordinates = 8 * sum(axis.count for axis in sweep.axes)
-    needed = workers * (coordinates + math.prod(sweep.chunk_shape) * _scene_memory(sweep))
+    needed = workers * (coordinates + scenes * _scene_memory(sweep))
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > memory // 2:
         raise InputError(
@@ -91,7 +82,8 @@ def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int
 def _scene_memory(sweep: Sweep) -> int:
     samples = sum(int(dict(asked.parameters).get("samples", 1)) for asked in sweep.reductions)
     state = 8 * (7 if needs_attitudes(sweep.reductions) else 3)
-    return _COPIES * (bytes_per_scene(sweep) + 8 * len(sweep.axes)) + 3 * state * samples
+    results = sum(empty(asked, 1).nbytes for asked in sweep.reductions)
+    return _COPIES * (results + 8 * len(sweep.axes)) + 3 * state * samples
 
 
 @contextlib.contextmanager
@@ -134,26 +126,8 @@ def swept(
         yield store, outcome
 
 
-def run_sweep(
-    sweep: Sweep,
-    path: str,
-    executor: str = "here",
-    workers: int | None = None,
-    address: str | None = None,
-    before: Callable[[Estimate], None] = lambda estimate: None,
-    progress: bool | Progress = False,
-    repair: bool = False,
-) -> Outcome:
-    """Compute the missing chunks of a sweep as `swept` does, and return the outcome."""
-    with swept(sweep, path, executor, workers, address, before, progress, repair) as (_, outcome):
-        return outcome
-
-
 def _completed(
-    store: Store,
-    own: Engine,
-    before: Callable[[Estimate], None],
-    progress: Progress,
+    store: Store, own: Engine, before: Callable[[Estimate], None], progress: Progress
 ) -> Outcome:
     sweep = store.sweep
     missing = [chunk for chunk, done in enumerate(store.done()) if not done]
@@ -165,14 +139,9 @@ def _completed(
     estimate = Estimate(sweep.n_scenes, sweep.n_chunks, len(missing), *size, seconds)
     before(estimate)
     begin = time.monotonic()
-    results = own.computed(sweep, missing)
-    try:
+    # Closing the generator ends processes and connections now, and not at garbage collection.
+    with contextlib.closing(own.computed(sweep, missing)) as results:
         for n, (chunk, found) in enumerate(results, 1):
             store.write(chunk, found)
             progress(n, len(missing), "chunks")
-    finally:
-        # Closing the iterator ends processes and connections now, and not at garbage collection.
-        close = getattr(results, "close", None)
-        if close is not None:
-            close()
     return Outcome(estimate, n_before, len(missing), time.monotonic() - begin, store.repaired)

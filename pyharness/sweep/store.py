@@ -133,13 +133,11 @@ class Store:
         return "/".join([CHECKSUMS, "c", *map(str, self.sweep.position_of(chunk))])
 
     def _files(self, chunk: int) -> list[str]:
-        found = []
-        for asked in self.sweep.reductions:
-            more = (0,) if REDUCTIONS[asked.reduction].labels else ()
-            found.append(
-                "/".join([asked.name, "c", *map(str, (*self.sweep.position_of(chunk), *more))])
-            )
-        return found
+        position = "/".join(map(str, self.sweep.position_of(chunk)))
+        return [
+            f"{asked.name}/c/{position}{'/0' if REDUCTIONS[asked.reduction].labels else ''}"
+            for asked in self.sweep.reductions
+        ]
 
 
 @contextlib.contextmanager
@@ -250,10 +248,3 @@ def _make(sweep: Sweep, folder: Path) -> None:
                 sweep, str(folder)
             ):
                 raise
-
-
-@contextlib.contextmanager
-def scratch(sweep: Sweep, path: str) -> Iterator[Store]:
-    """Yield a temporary store beside `path`, for measurements of the disk."""
-    with filled(sweep, Path(path)) as new:
-        yield Store(sweep, new)

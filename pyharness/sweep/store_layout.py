@@ -20,7 +20,7 @@ from pyharness.sweep.axes import MOST_VALUES
 from pyharness.sweep.checksums import DamageError, Label, place_checksums, read_bounded
 from pyharness.sweep.fields import units_of
 from pyharness.sweep.reductions import REDUCTIONS, empty
-from pyharness.sweep.sweep import Sweep
+from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 CHECKSUMS = "checksums"  # the group of the checksums; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"
@@ -59,11 +59,7 @@ def labels(folder: Path) -> list[Label]:
 
 def metadata_files(sweep: Sweep) -> list[str]:
     """Return the paths of the files without results: metadata, axes and labels."""
-    labels = {
-        reduction.dimension
-        for reduction in (REDUCTIONS[asked.reduction] for asked in sweep.reductions)
-        if reduction.labels
-    }
+    labels = {REDUCTIONS[asked.reduction].dimension for asked in sweep.reductions} - {""}
     values = [*(axis.field for axis in sweep.axes), *sorted(labels)]
     described = ["", CHECKSUMS, *values, *(asked.name for asked in sweep.reductions)]
     return [
@@ -112,8 +108,7 @@ def _fill(sweep: Sweep, folder: Path) -> None:
 
 def _fill_group(group: Any, sweep: Sweep) -> None:
     group.create_group(
-        CHECKSUMS,
-        attributes={"long_name": "SHA-256 of each file, as `sha256sum --check` reads it"},
+        CHECKSUMS, attributes={"long_name": "SHA-256 of each file, as `sha256sum --check` reads it"}
     )
     for axis in sweep.axes:
         values = axis.coordinates()
@@ -127,13 +122,13 @@ def _fill_group(group: Any, sweep: Sweep) -> None:
         )
         array[:] = values
     for asked in sweep.reductions:
-        _make_array(group, sweep, asked.name, asked.reduction)
+        _make_array(group, sweep, asked)
 
 
-def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> None:
+def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
     from zarr.codecs import ZstdCodec
 
-    reduction = REDUCTIONS[reduction_name]
+    reduction = REDUCTIONS[asked.reduction]
     shape, chunk, dimensions = sweep.shape, sweep.chunk_shape, list(sweep.dimensions)
     if reduction.labels:
         shape, chunk = (*shape, len(reduction.labels)), (*chunk, len(reduction.labels))
@@ -154,7 +149,7 @@ def _make_array(group: Any, sweep: Sweep, name: str, reduction_name: str) -> Non
             each.replace(" ", "_") for each in reduction.flags.values()
         )
     group.create_array(
-        name,
+        asked.name,
         shape=shape,
         chunks=chunk,
         # Fixed, because a chunk that is computed again must have the same bytes, and another

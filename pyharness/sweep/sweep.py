@@ -4,7 +4,6 @@ A sweep solves a grid of scenes. A reduction is a quantity that is stored for ea
 a block of the grid, solved and stored at once, and numbered from 0.
 """
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -121,9 +120,8 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
     # A grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
     count = min(count, total)
-    flat = [i * (total - 1) // max(1, count - 1) for i in range(count)]
+    rest = [i * (total - 1) // max(1, count - 1) for i in range(count)]
     found: list[list[int]] = []
-    rest = flat
     for length in reversed(sweep.shape):
         found.append([each % length for each in rest])
         rest = [each // length for each in rest]
@@ -149,9 +147,5 @@ def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any
     rows, member_of = np.unique(codes, axis=1, return_inverse=True)
     order = np.argsort(member_of.ravel(), kind="stable")
     cuts = np.cumsum(np.bincount(member_of.ravel()))
-    starts = itertools.chain([0], cuts[:-1].tolist())
     values = [tuple(u[code] for (u, _), code in zip(numbered, row, strict=True)) for row in rows.T]
-    return [
-        (order[start:stop], value)
-        for start, stop, value in zip(starts, cuts.tolist(), values, strict=True)
-    ]
+    return list(zip(np.split(order, cuts[:-1]), values, strict=True))

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, run_many, solve_many, subset
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep_file import read_sweep
 from pyharness.torques import damping
-from tests.sweep.sweeps import SQUARE, text, written
+from tests.sweep.sweeps import SQUARE, run_sweep, text, written
 
 BRICK = Scene("brick", (0.3, 1.1, -0.7), moments=(3.0, 2.0, 1.2))
 STARTS = np.random.default_rng(5).uniform(-1.0, 1.0, (700, 3))
@@ -69,4 +68,4 @@ def test_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_sweep(read_sweep(file), str(tmp_path / "store"), progress=True)
     assert "3/3" in capsys.readouterr().err
     with pytest.raises(InputError, match="progress"):
-        run_sweep(read_sweep(file), str(tmp_path / "other"), progress=1)  # type: ignore[arg-type]
+        run_sweep(read_sweep(file), str(tmp_path / "other"), progress=1)

@@ -25,11 +25,10 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene, scene_text
 from pyharness.model.schema import SCHEMAS, check_schema
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep_file import read_sweep
 from pyharness.thesis.vectors import OURS, answers
 from tests.ports import engine
-from tests.sweep.sweeps import TILT, files, text, written
+from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
 ROOT = Path(__file__).parent.parent.parent
 EXTERNAL = ROOT / "pyharness" / "data" / "external" / "nasa-brick.toml"

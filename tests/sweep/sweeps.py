@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pyharness.sweep.batches import solve_chunk
+from pyharness.sweep.run import Outcome, swept
 from pyharness.sweep.sweep import Arrays, Sweep, points
 
 BASE = """
@@ -67,6 +68,12 @@ def written(folder: Path, content: str, name: str = "sweep.toml") -> str:
     """Write a sweep file and return its path."""
     (folder / name).write_text(content)
     return str(folder / name)
+
+
+def run_sweep(sweep: Sweep, path: str, *choices: Any, **more: Any) -> Outcome:
+    """Compute the missing chunks of a sweep, and return the outcome."""
+    with swept(sweep, path, *choices, **more) as (_, outcome):
+        return outcome
 
 
 def files(store: Path) -> dict[str, bytes]:

@@ -17,10 +17,9 @@ from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.forecast import places_of_a_chunk
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep
-from tests.sweep.sweeps import written
+from tests.sweep.sweeps import run_sweep, written
 
 ATLAS = Path(__file__).parent.parent.parent / "docs/atlas"
 

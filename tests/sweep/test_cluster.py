@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep_file import read_sweep
-from tests.sweep.sweeps import files
+from tests.sweep.sweeps import files, run_sweep
 
 pytest.importorskip("distributed")
 xarray = pytest.importorskip("xarray")

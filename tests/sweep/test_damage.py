@@ -16,10 +16,9 @@ from pyharness.model.errors import InputError
 from pyharness.model.schema import SCHEMAS
 from pyharness.sweep import run, store_layout
 from pyharness.sweep.batches import solve_chunk
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
-from tests.sweep.sweeps import TILT, files, text, written
+from tests.sweep.sweeps import TILT, files, run_sweep, text, written
 
 SWEEP = text(
     TILT.replace("count = 6", "count = 40"),

@@ -17,10 +17,9 @@ from pyharness.model.errors import InputError
 from pyharness.sweep import executors
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
-from pyharness.sweep.run import run_sweep
 from pyharness.sweep.sweep import Sweep
 from pyharness.sweep.sweep_file import read_sweep
-from tests.sweep.sweeps import PROGRAM, files, quick_and_slow, written
+from tests.sweep.sweeps import PROGRAM, files, quick_and_slow, run_sweep, written
 
 Patch = pytest.MonkeyPatch
 distributed = pytest.importorskip("distributed")

@@ -23,11 +23,11 @@ from pyharness.sweep.axes import MOST_VALUES
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
 from pyharness.sweep.forecast import forecast
-from pyharness.sweep.run import check_size, run_sweep
+from pyharness.sweep.run import check_size
 from pyharness.sweep.store import opened
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.killed import ATTITUDE, OMEGA, kill_and_resume
-from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, files, text, written
+from tests.sweep.sweeps import PROGRAM, SQUARE, TILT, files, run_sweep, text, written
 
 Patch = pytest.MonkeyPatch
 

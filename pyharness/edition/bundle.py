@@ -6,7 +6,6 @@ of import and export are supported.
 """
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 _IMPORT = re.compile(
@@ -39,7 +38,9 @@ def _add(
     `importing` is the chain of modules that import it; `exports` collects the exported names.
     """
     text = path.read_text(encoding="utf-8")
-    for found in _IMPORT.finditer(text):
+
+    def declare(found: re.Match[str]) -> str:
+        """Return the declaration of constants that replaces an import."""
         needed = (path.parent / found["path"]).resolve()
         if needed in (*importing, path):
             raise _error(path, text, found.start(), f"{needed.name} imports this module too")
@@ -47,13 +48,19 @@ def _add(
             raise _error(path, text, found.start(), f"there is no {found['path']}")
         if needed not in exports:
             _add(needed, (*importing, path), exports, parts)
-        for name, _ in _names(found):
+        constants = []
+        for each in filter(None, map(str.strip, (found["names"] or "").split(","))):
+            name, _, alias = each.partition(" as ")
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
+            constants.append(f"{name}: {alias or name}")
+        # Replacements keep the number of lines, which error messages report.
+        lines = "\n" * found[0].count("\n")
+        left = found["all"] or f"{{ {', '.join(constants)} }}"
+        return f"const {left} = module{list(exports).index(needed)};{lines}"
+
     names = [found["name"] for found in _EXPORT.finditer(text)]
-    # Replacements keep the number of lines, which error messages report.
-    body = _IMPORT.sub(lambda found: _as_constant(found, path, list(exports)), text)
-    body = _EXPORT.sub("", body)
+    body = _EXPORT.sub("", _IMPORT.sub(declare, text))
     unknown = _UNKNOWN.search(body)
     if unknown is not None:
         shown = unknown[0].strip()
@@ -68,22 +75,6 @@ def _add(
         "})();",
         "",
     ]
-
-
-def _names(found: re.Match[str]) -> Iterator[tuple[str, str]]:
-    """Yield the exported and the local name of each imported name."""
-    for each in (found["names"] or "").split(","):
-        name, _, alias = each.strip().partition(" as ")
-        if name:
-            yield name, alias or name
-
-
-def _as_constant(found: re.Match[str], path: Path, modules: list[Path]) -> str:
-    """Return the declaration of constants that replaces an import."""
-    number = modules.index((path.parent / found["path"]).resolve())
-    renamed = ", ".join(f"{name}: {here}" for name, here in _names(found))
-    lines = "\n" * found[0].count("\n")
-    return f"const {found['all'] or f'{{ {renamed} }}'} = module{number};{lines}"
 
 
 def _error(path: Path, text: str, start: int, what: str) -> ValueError:

@@ -4,35 +4,13 @@ Figures are given by file name without suffix.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
-
-from markupsafe import Markup
+from typing import Any
 
 from pyharness.edition.ledger import SentenceVerdicts
 from pyharness.edition.markdown import inline
 from pyharness.history.figures import FigureFinding, figure_picture, together_picture
 from pyharness.model.facts import facts
 from pyharness.views.pictures import saved
-
-
-class Printed(NamedTuple):
-    """A figure of the thesis, with our drawings of it by file name without suffix.
-
-    `says` has the thesis's sentences on the figure, each with its anchor, which is empty for
-    sections I to IV. `ours` is the text for a figure that is not drawn, else empty.
-    """
-
-    number: int
-    caption: str
-    where: str
-    says: list[tuple[Markup, str]]
-    ours: Markup
-    drawn: dict[str, FigureFinding]
-
-    @property
-    def anchor(self) -> str:
-        """Return the anchor of a figure that is not drawn, else ""."""
-        return "" if self.drawn else f"figure-{self.number:02d}"
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
@@ -50,14 +28,18 @@ def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
 
 def printed(
     figures: Mapping[str, FigureFinding], told: Sequence[SentenceVerdicts]
-) -> list[Printed]:
-    """Return the thesis's figures in order, with our drawings and its sentences on them."""
+) -> list[dict[str, Any]]:
+    """Return the thesis's figures in order, each with its number, caption and place.
+
+    `drawn` has our drawings. `says` has the thesis's sentences on the figure, each with its anchor,
+    which is empty for sections I to IV. `ours` is the text for a figure that is not drawn.
+    """
     found = []
     for each in facts("figures")["printed"]:
-        ours = {
+        drawn = {
             stem: figure for stem, figure in figures.items() if figure.plan.number == each["number"]
         }
-        cases = {f"V.2, Case {figure.plan.case}" for figure in ours.values()}
+        cases = {f"V.2, Case {figure.plan.case}" for figure in drawn.values()}
         says = [
             (inline(other.sentence.text), other.anchor)
             for other in told
@@ -65,10 +47,5 @@ def printed(
         ]
         if "says" in each:
             says = [(inline(each["says"]), "")]
-        found.append(
-            Printed(
-                each["number"], each["caption"], each["where"], says,
-                inline(each.get("ours", "")), ours,
-            )
-        )  # fmt: skip
+        found.append({**each, "says": says, "ours": inline(each.get("ours", "")), "drawn": drawn})
     return found

@@ -80,15 +80,13 @@ def _parser() -> MarkdownIt:
     renderer: Any = parser.renderer
     rules = renderer.rules
     # Elements wider than the page scroll separately, also by keyboard.
-    rules["table_open"] = lambda *_: f"{_OPEN}<table>\n"
+    opening = '<div class="wide" role="group" tabindex="0" aria-label="table"><table>\n'
+    rules["table_open"] = lambda *_: opening
     rules["table_close"] = lambda *_: "</table></div>\n"
     rules["math_block"] = _block
     for kind in ("fence", "code_block"):
         rules[kind] = _code
     return parser
-
-
-_OPEN = '<div class="wide" role="group" tabindex="0" aria-label="table">'
 
 
 def _block(tokens: Sequence[Token], index: int, *_: Any) -> str:

@@ -258,9 +258,8 @@ def script(name: str, value: Any) -> bytes:
 
 def vendor() -> list[dict[str, Any]]:
     """Return the entries of `vendor.toml`, which lists the third-party JavaScript."""
-    with open(shipped("web") / "vendor" / "vendor.toml", "rb") as file:
-        packages: list[dict[str, Any]] = tomllib.load(file)["package"]
-    return packages
+    text = (shipped("web") / "vendor" / "vendor.toml").read_text(encoding="utf-8")
+    return list(tomllib.loads(text)["package"])
 
 
 @cache

@@ -111,6 +111,13 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
     return np.clip(doubled, min(first, last), max(first, last))
 
 
+def check_name(what: str, name: object, allowed: Iterable[str], where: str = "") -> str:
+    """Return a name that a sweep file gives; raise InputError if it is not `allowed`."""
+    if not isinstance(name, str) or name not in allowed:
+        raise unknown(what, name, allowed, where)
+    return name
+
+
 def axis_of(table: object, number: int) -> Axis:
     """Return the axis of table [[axis]] `number`, from 1; raise InputError if it is invalid."""
     where = f"[[axis]] {number}"
@@ -163,20 +170,15 @@ def _spread(where: str, table: dict[str, Any], field: str, dimension: str) -> Ax
         raise InputError(f"{where}: count {shown}; allowed: 1 to {MOST_VALUES} on one axis")
     keys: tuple[str, ...] = ("from", "to")
     if "draw" in table:
-        how = table["draw"]
-        if not isinstance(how, str) or how not in DRAWS:
-            raise unknown("distribution", how, DRAWS, f"{where} draw")
+        how = check_name("distribution", table["draw"], DRAWS, f"{where} draw")
         _refuse(where, table, "draw", ("spacing",))
         keys = DRAWS[how]
         if "seed" not in table:
             raise InputError(f"{where}: seed is missing; give a whole number from 0")
     else:
-        how = table.get("spacing", "linear")
-        if not isinstance(how, str) or how not in SPACINGS:
-            raise unknown("spacing", how, SPACINGS, f"{where} spacing")
+        how = check_name("spacing", table.get("spacing", "linear"), SPACINGS, f"{where} spacing")
     used = {*keys, "seed"} if "draw" in table else {*keys}
-    spare = {"from", "to", "mean", "deviation", "seed"} - used
-    _refuse(where, table, how, sorted(spare))
+    _refuse(where, table, how, sorted({"from", "to", "mean", "deviation", "seed"} - used))
     for key in keys:
         if key not in table:
             raise InputError(f"{where}: {key} is missing; {how} takes {' and '.join(keys)}")

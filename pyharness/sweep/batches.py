@@ -141,10 +141,9 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments" (kg m2) or "coefficients", and their values (n, 3); or "" and None."""
+    """Return "moments" (kg m2) or "coefficients", and their values (n, 3), None if not varied."""
     if scene.coefficients is not None:
-        found = _components("body.coefficients", scene.coefficients, own, n)
-        return ("coefficients", found) if found is not None else ("", None)
+        return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     assert scene.moments is not None
     first, second, third = scene.moments
     if "body.ratio.1" in own or "body.ratio.2" in own:
@@ -159,8 +158,7 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
-    found = _components("body.moments", scene.moments, own, n)
-    return ("moments", found) if found is not None else ("", None)
+    return "moments", _components("body.moments", scene.moments, own, n)
 
 
 def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:

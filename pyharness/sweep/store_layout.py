@@ -74,17 +74,9 @@ def filled(sweep: Sweep, folder: Path) -> Iterator[Path]:
 
     Files that the caller has not moved are removed at the end.
     """
-    new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
-    try:
-        _fill(sweep, new)
-        yield new
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
-
-
-def _fill(sweep: Sweep, folder: Path) -> None:
     import zarr
 
+    new = folder.absolute().with_name(f".pyharness-{os.urandom(8).hex()}-new")
     fields = [axis.field for axis in sweep.axes if axis.field != axis.dimension]
     attributes: dict[str, Any] = {
         "schema": SCHEMAS["sweep store"],
@@ -96,14 +88,18 @@ def _fill(sweep: Sweep, folder: Path) -> None:
     }
     if fields:
         attributes["coordinates"] = " ".join(fields)
-    with zarr.config.set({"array.write_empty_chunks": True}):
-        _fill_group(zarr.create_group(folder, zarr_format=3, attributes=attributes), sweep)
-    with warnings.catch_warnings():
-        # xarray warns if consolidated metadata are missing, and Zarr if they are made.
-        warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
-        zarr.consolidate_metadata(folder)
-    files = metadata_files(sweep)
-    place_checksums(label(sweep), "metadata", folder, files, LARGEST_METADATA, METADATA)
+    try:
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            _fill_group(zarr.create_group(new, zarr_format=3, attributes=attributes), sweep)
+        with warnings.catch_warnings():
+            # xarray warns if consolidated metadata are missing, and Zarr if they are made.
+            warnings.filterwarnings("ignore", "Consolidated metadata", UserWarning)
+            zarr.consolidate_metadata(new)
+        files = metadata_files(sweep)
+        place_checksums(label(sweep), "metadata", new, files, LARGEST_METADATA, METADATA)
+        yield new
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
 
 
 def _fill_group(group: Any, sweep: Sweep) -> None:

@@ -24,7 +24,7 @@ from pyharness.model.scene_file import (
     toml_of,
 )
 from pyharness.model.values import boolean, finite, integer, number, three
-from pyharness.sweep.axes import Axis, axis_of
+from pyharness.sweep.axes import Axis, axis_of, check_name
 from pyharness.sweep.batches import listing_of
 from pyharness.sweep.fields import ATTITUDE, CHOICES, RIVALS
 from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
@@ -32,10 +32,8 @@ from pyharness.sweep.state_torques import check_state_axis, check_state_solver
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
-_SOLVE = (
-    *("method", "tolerance", "t_end"),
-    *("program", "listing", "reading", "lipschitz", "may_stop"),
-)
+_OF_METHODS = ("method", "tolerance", "t_end")
+_OF_PROGRAMS = ("listing", "reading", "lipschitz", "may_stop")
 CHUNK = 100_000
 _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
@@ -119,7 +117,7 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     if not isinstance(table, dict):
         raise InputError(f"solve is {kind_of(table)}; it must be a table [solve]")
-    check_keys(table, _SOLVE, "[solve]")
+    check_keys(table, (*_OF_METHODS, "program", *_OF_PROGRAMS), "[solve]")
     values = {axis.field: axis.values[0] for axis in axes if axis.is_choice}
     for field in values:
         if field in table:
@@ -130,29 +128,21 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
         if not isinstance(given.get(key, ""), str):
             raise InputError(f"[solve] {key} is {kind_of(given[key])}; it must be text")
     program = given.get("program")
-    if program is None:
-        for key in ("program", "listing", "reading", "lipschitz", "may_stop"):
-            if key in given or key in fields:
-                raise InputError(f"{key} has no meaning without a program; give [solve] program")
-        return Solver(
-            method=given.get("method", "auto"),
-            tolerance=number("[solve] tolerance", given["tolerance"])
-            if "tolerance" in given
-            else None,
-            t_end=finite("[solve] t_end", given["t_end"]) if "t_end" in given else None,
-        )
-    for key in ("method", "tolerance", "t_end"):
+    for key in _OF_METHODS if program is not None else _OF_PROGRAMS:
         if key in given or key in fields:
-            raise InputError(
-                f"{key} has no meaning with a program, which advances with the step size of "
-                "the scene; leave it out"
-            )
+            why = "without a program; give [solve] program"
+            if program is not None:
+                why = "with a program, which advances with the step size of the scene; leave it out"
+            raise InputError(f"{key} has no meaning {why}")
     lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
     if not lipschitz >= 0.0:
         raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")
+    tolerance, t_end = given.get("tolerance"), given.get("t_end")
     return Solver(
-        method=None,
+        method=given.get("method", "auto") if program is None else None,
         program=program,
+        tolerance=None if tolerance is None else number("[solve] tolerance", tolerance),
+        t_end=None if t_end is None else finite("[solve] t_end", t_end),
         listing=given.get("listing", "original"),
         reading=given.get("reading", "adopted"),
         lipschitz=lipschitz,
@@ -168,23 +158,19 @@ def _reduction(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:
         raise InputError("reductions: allowed: names, and tables with name and parameters")
-    name = table["name"]
-    if not isinstance(name, str) or name not in REDUCTIONS:
-        raise unknown("reduction", name, REDUCTIONS, "reductions")
+    name = check_name("reduction", table["name"], REDUCTIONS, "reductions")
     where, defaults = f"reductions: {name}", REDUCTIONS[name].parameters
     for key in table:
         if key not in ("name", "as", *defaults):
             raise unknown("parameter", key, ("as", *defaults), where)
     given = {key: table.get(key, default) for key, default in defaults.items()}
-    if (
-        "samples" in given
-        and not 1 <= integer(f"{where} samples", given["samples"]) <= _MOST_SAMPLES
-    ):
-        raise InputError(f"{where} samples {given['samples']}; allowed: 1 to {_MOST_SAMPLES}")
+    samples = integer(f"{where} samples", given.get("samples", 1))
+    if not 1 <= samples <= _MOST_SAMPLES:
+        raise InputError(f"{where} samples {samples}; allowed: 1 to {_MOST_SAMPLES}")
     if "offset" in given and not 0.0 < number(f"{where} offset", given["offset"]) <= 1.0:
         raise InputError(f"{where} offset {given['offset']:g}; allowed: above 0, to 1")
-    if "of" in given and given["of"] not in RANKS:
-        raise unknown("axis", given["of"], RANKS, f"{where} of")
+    if "of" in given:
+        check_name("axis", given["of"], RANKS, f"{where} of")
     if "above" in given and not 0.0 <= number(f"{where} above", given["above"]) <= math.pi:
         raise InputError(f"{where} above {given['above']:g}; allowed: 0 to pi, rad")
     if "towards" in table:
@@ -192,8 +178,7 @@ def _reduction(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
         if not any(given["towards"]):
             raise InputError(f"{where} towards: allowed: three finite numbers, not all 0")
     if "against" in given:
-        if not isinstance(given["against"], str) or given["against"] not in METHODS:
-            raise unknown("method", given["against"], METHODS, f"{where} against")
+        check_name("method", given["against"], METHODS, f"{where} against")
         if not 0.0 < number(f"{where} tolerance", given["tolerance"]) <= 1.0:
             raise InputError(f"{where} tolerance {given['tolerance']:g}; allowed: above 0, to 1")
     function, title = "", name
@@ -285,9 +270,10 @@ def _check_reductions(sweep: Sweep) -> None:
                 "name; give another name"
             )
         if reduction.only not in ("", kind):
+            allowed = [name for name, each in REDUCTIONS.items() if each.only in ("", kind)]
             raise InputError(
                 f"reductions: {asked.reduction} can't be computed from a {kind}; allowed with "
-                f"a {kind}: {', '.join(_given_by(kind))}"
+                f"a {kind}: {', '.join(allowed)}"
             )
         for method in _choices(sweep, "method", sweep.solver.method):
             if "attitude" in reduction.needs and method not in _WITH_ATTITUDE:
@@ -305,10 +291,6 @@ def _check_reductions(sweep: Sweep) -> None:
                 f"reductions: {asked.reduction} needs a scene without torque, because a "
                 "torque changes energy and momentum; leave it out"
             )
-
-
-def _given_by(kind: str) -> list[str]:
-    return [name for name, each in REDUCTIONS.items() if each.only in ("", kind)]
 
 
 def _choices(sweep: Sweep, field: str, default: str | None) -> Iterable[str]:
@@ -338,16 +320,14 @@ def _check_solvers(sweep: Sweep) -> None:
         bool(programs),
     )
     for program in programs:
-        if program not in PROGRAMS:
-            raise unknown("program", program, PROGRAMS)
+        check_name("program", program, PROGRAMS)
     for chosen in _chosen_together(sweep.axes):
         one = replace(solver, **chosen)
         if one.program is not None:
             listing_of(one.program, one.listing, one.reading)
     varied = [axis for axis in sweep.axes if axis.field == "tolerance"]
     for method in _choices(sweep, "method", solver.method):
-        if method not in REGISTRY:
-            raise unknown("method", method, REGISTRY)
+        check_name("method", method, REGISTRY)
         finest = REGISTRY[method].finest
         least = float(varied[0].coordinates().min()) if varied else solver.tolerance
         asked = requested_tolerance(method, least)

@@ -51,13 +51,16 @@ def context() -> dict[str, Any]:
     its flips (s).
     """
     first = _first()
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(PROGRAM, {})
     return {
         "data": data(),
         "first": first,
         "flip": float(flip_times(first.moments or (), first.omega)[0]),
         "case_4_flip": float(flip_times(case_scene(4).moments or (), case_scene(4).omega)[0]),
         "program": PROGRAM,
-        "output": _output(PROGRAM),
+        "output": printed.getvalue(),
         "agreement": AGREEMENT,
         "speeds": SPEEDS,
     }
@@ -101,13 +104,6 @@ def _first() -> Scene:
     return Scene(found["title"], found["omega"], moments=found["moments"])
 
 
-def _output(program: str) -> str:
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(program, {})
-    return printed.getvalue()
-
-
 def _picture(scene: Scene) -> Picture:
     """Return a picture of omega over time, polhode and herpolhode, over three flips."""
     from matplotlib.figure import Figure
@@ -117,11 +113,9 @@ def _picture(scene: Scene) -> Picture:
     times = np.linspace(0.0, end, _POINTS)
     found = solve(scene, times.tolist(), "closed-form", attitude=True)
     figure = Figure(figsize=(11.0, 3.7), layout="constrained")
-    over_time, ball, plane = (
-        figure.add_subplot(1, 3, 1),
-        figure.add_subplot(1, 3, 2, projection="3d"),
-        figure.add_subplot(1, 3, 3),
-    )
+    over_time = figure.add_subplot(1, 3, 1)
+    ball = figure.add_subplot(1, 3, 2, projection="3d")
+    plane = figure.add_subplot(1, 3, 3)
     for axis, (colour, style) in enumerate(zip(_COLOURS, _STYLES, strict=True)):
         label = f"$\\omega_{axis + 1}$"
         over_time.plot(times, found.omega[:, axis], style, color=colour, label=label)

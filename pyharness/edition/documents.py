@@ -52,8 +52,7 @@ def documents_folder(given: str | None = None) -> Path:
     if given is None:
         raise InputError(
             "edition: an installed package does not contain the documents; give --docs DIR, "
-            "the folder 'docs' of "
-            "the source, or run it in a checkout"
+            "the folder 'docs' of the source, or run it in a checkout"
         )
     raise InputError(
         f"--docs '{given}': does not contain {missing[0]}; give the folder 'docs' of the source"

@@ -38,26 +38,24 @@ _SHOWN = 3
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `data` is the script's `window.laboratoryData`. `switches` has defects, readings and conjectures
-    by heading. `first` is the run of `DEFAULTS`. `titles` are the names of the cases.
+    `switches` has defects, readings and conjectures by heading. `first` is the run of `DEFAULTS`.
+    `titles` are the names of the cases.
     """
-    given = data()
-    kinds = [
-        (head, [flag for flag in given["flags"] if flag["kind"] == kind])
-        for kind, head in _KINDS.items()
-    ]
+    flags = data()["flags"]
     return {
-        "data": given,
         "titles": {number: case_scene(number).name for number in case_numbers()},
         "programs": PROGRAMS,
-        "switches": kinds,
+        "switches": [
+            (head, [flag for flag in flags if flag["kind"] == kind])
+            for kind, head in _KINDS.items()
+        ],
         "first": _first(),
         "experiments": facts("experiments")["experiment"],
     }
 
 
 def data() -> dict[str, Any]:
-    """Return the values that the script needs to run any program on any case."""
+    """Return the script's `window.laboratoryData`, to run any program on any case."""
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
@@ -135,15 +133,14 @@ def _first() -> dict[str, Any]:
     truth = reference(scene, scene.times()).omega
     error = np.abs(run.omega - truth[: run.steps]).max(axis=1)
     told = ending(run)
+    options = " ".join(f"--{word} {value}" for word, value in DEFAULTS.items())
     assert run.velocity is not None
     values = np.column_stack([run.time, run.omega, run.velocity, run.recorded_time]).tolist()
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
     return {
         "state": DEFAULTS,
         "fragment": "&".join(f"{word}={value}" for word, value in DEFAULTS.items()),
-        "command": " ".join(
-            ["pyharness run", *(f"--{word} {value}" for word, value in DEFAULTS.items())]
-        ),
+        "command": f"pyharness run {options}",
         "ending": told[0].upper() + told[1:],
         "error": short(float(error.max())),
         # The Runge-Kutta program has no IER.

@@ -1,11 +1,12 @@
-"""The data of the pages on claims, thesis and apparatus.
+"""The data of the pages on claims, thesis, figures and apparatus.
 
 A claim is a statement of the thesis that we test. A judgement has our verdicts on it, for original
 and corrected programs; `judged` has the judgements of all claims, `told` those of all sentences.
+`figures` has Figures 6 to 12, drawn from computed curves, by file name without suffix.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -20,9 +21,11 @@ from pyharness.history.claims.report import KINDS, claims_report, kinds_table
 from pyharness.history.claims.sentences import Sentence, sentences
 from pyharness.history.claims.stories import Story, story
 from pyharness.history.claims.verdicts import REPRODUCED
+from pyharness.history.figures import FigureFinding, figure_picture, together_picture
 from pyharness.model.facts import facts
 from pyharness.model.report import Column, Table
 from pyharness.views import html
+from pyharness.views.pictures import saved
 
 
 class SentenceVerdicts(NamedTuple):
@@ -144,6 +147,44 @@ def formulas() -> dict[str, list[Formula]]:
             row.get("cards", {}), row.get("entry", ""),
         )  # fmt: skip
         found.setdefault(row["where"].partition(".")[0], []).append(formula)
+    return found
+
+
+def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
+    """Return the figures, and Figure 7 with its limit, as SVG and CSV.
+
+    Figure 7 with its limit shows the original and the corrected programs, and the limit of omega of
+    the original one as the step size goes to 0.
+    """
+    together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
+    files = saved(together, "figure-07-together.svg")
+    for stem, each in figures.items():
+        files |= saved(figure_picture(each), f"{stem}.svg")
+    return files
+
+
+def printed_figures(
+    figures: Mapping[str, FigureFinding], told: Sequence[SentenceVerdicts]
+) -> list[dict[str, Any]]:
+    """Return the thesis's figures in order, each with its number, caption and place.
+
+    `drawn` has our drawings. `says` has the thesis's sentences on the figure, each with its anchor,
+    which is empty for sections I to IV. `ours` is the text for a figure that is not drawn.
+    """
+    found = []
+    for each in facts("figures")["printed"]:
+        drawn = {
+            stem: figure for stem, figure in figures.items() if figure.plan.number == each["number"]
+        }
+        cases = {f"V.2, Case {figure.plan.case}" for figure in drawn.values()}
+        says = [
+            (inline(other.sentence.text), other.anchor)
+            for other in told
+            if other.sentence.where in cases
+        ]
+        if "says" in each:
+            says = [(inline(each["says"]), "")]
+        found.append({**each, "says": says, "ours": inline(each.get("ours", "")), "drawn": drawn})
     return found
 
 

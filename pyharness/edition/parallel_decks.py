@@ -52,11 +52,6 @@ class AlignedRow(NamedTuple):
     cells: dict[str, Cell | None]
     differences: list[str]
 
-    @property
-    def is_alone(self) -> bool:
-        """Return whether only one deck has such a card."""
-        return sum(each is not None for each in self.cells.values()) == 1
-
 
 class Operation(NamedTuple):
     """An operation: its row of the collation, and the aligned cards."""

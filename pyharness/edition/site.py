@@ -13,17 +13,7 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from pyharness.edition import (
-    api,
-    body,
-    decks,
-    documents,
-    figures,
-    laboratory,
-    ledger,
-    parallel_decks,
-    story,
-)
+from pyharness.edition import api, body, decks, documents, laboratory, ledger, parallel_decks, story
 from pyharness.edition.bundle import bundle
 from pyharness.edition.citation import bibtex, linked_data
 from pyharness.edition.markdown import inline, slug
@@ -100,7 +90,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
     drawn = {each.plan.stem: each for each in findings()}
-    content = {f"figures/{name}": file for name, file in figures.draw_figures(drawn).items()}
+    content = {f"figures/{name}": file for name, file in ledger.draw_figures(drawn).items()}
     places: list[Found] = []
     for page in _pages(drawn, docs, progress):
         content[page.path] = _rendered(page)
@@ -142,7 +132,7 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
         Found(f"figures.html#{stem}", f"{plan.title}, {plan.set}", "figure", plan.caption)
         for stem, plan in ((stem, each.plan) for stem, each in drawn.items())
     ]
-    context = {"figures": figures.printed(drawn, told)}
+    context = {"figures": ledger.printed_figures(drawn, told)}
     yield Page("figures.html", "Figures", "figures.html", context, found)
     yield Page(
         "claims.html", "Claims", "claims.html", ledger.claims_context(judged, told),

@@ -74,7 +74,9 @@ def context() -> dict[str, Any]:
     """Return the story's charts and numbers, from original and corrected runs of 100 steps."""
     stopped = _run(2, "runge-kutta")
     assert stopped.velocity is not None
-    velocity = stopped.velocity[:, 1].tolist()
+    velocity = [0.0, *stopped.velocity[:, 1].tolist()]
+    velocity_chart = _chart("velocity", ("step", "V2, m/s"), (0, 100), (-0.03, 0.03))
+    velocity_curve = _curve(velocity_chart, "runge-kutta", range(len(velocity)), velocity)
     endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
     limit = limit_solution("runge-kutta", scene, scene.times(), _truth(2))
@@ -84,7 +86,7 @@ def context() -> dict[str, Any]:
     charts = [
         _chart_of_case("claim", 2, by_letter, (-1.2, 1.5)),
         _chart_of_case("stop", 2, {"runge-kutta": stopped}, (-1.2, 1.5), in_steps=True),
-        _velocity_chart([0.0, *velocity]),
+        velocity_chart._replace(curves=[velocity_curve]),
         _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), is_log=True),
         half_speed._replace(curves=[*half_speed.curves, curve]),
         *(
@@ -184,11 +186,6 @@ def _chart_of_case(
         omega = [scene.omega[0], *run.omega[:, 0]]
         curves.append(_curve(found, program, x[: len(omega)], omega))
     return found._replace(curves=curves)
-
-
-def _velocity_chart(velocity: list[float]) -> Chart:
-    found = _chart("velocity", ("step", "V2, m/s"), (0, 100), (-0.03, 0.03))
-    return found._replace(curves=[_curve(found, "runge-kutta", range(len(velocity)), velocity)])
 
 
 def _race_chart(listing: str) -> Chart:

@@ -16,7 +16,7 @@ from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.sweep.fields import CHOICES, CONSTANTS, number_field
+from pyharness.sweep.axes import CHOICES, CONSTANTS, number_field
 from pyharness.sweep.reductions import empty, needs_attitudes, reduced
 from pyharness.sweep.state_torques import follows_body, with_numbers
 from pyharness.sweep.sweep import Arrays, Indices, Sweep, groups, points, value_columns

@@ -141,9 +141,8 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
-    for (name, count), length, places in zip(
-        sweep.dimensions.items(), sweep.chunk_shape, where, strict=True
-    ):
+    dimensions = sweep.dimensions.items()
+    for (name, count), length, places in zip(dimensions, sweep.chunk_shape, where, strict=True):
         # In a chunk, `scenes // length` scenes share an index along this dimension.
         distinct = max(_PLACES, len(places) * length // scenes)
         if name in shared and count > distinct:

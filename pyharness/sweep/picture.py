@@ -12,8 +12,7 @@ import numpy as np
 from pyharness.model.errors import unknown
 from pyharness.model.report import Column, Picture, Table
 from pyharness.model.trajectory import Array
-from pyharness.sweep.axes import Axis
-from pyharness.sweep.fields import units_of
+from pyharness.sweep.axes import Axis, units_of
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.store import Store
 from pyharness.sweep.sweep import ReductionSpec, Sweep

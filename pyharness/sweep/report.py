@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pyharness.model.report import Column, Report, Table, digits, format_duration, words
-from pyharness.sweep.axes import Axis
-from pyharness.sweep.fields import units_of
+from pyharness.sweep.axes import Axis, units_of
 from pyharness.sweep.forecast import format_estimate
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.run import Outcome

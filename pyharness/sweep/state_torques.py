@@ -13,7 +13,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene
 from pyharness.model.scene_file import scene_text
 from pyharness.model.state_torque import StateTorque
-from pyharness.sweep.fields import CONSTANTS
+from pyharness.sweep.axes import CONSTANTS
 
 
 def check_state_axis(scene: Scene, field: str) -> None:

@@ -57,12 +57,10 @@ class Store:
         import zarr
 
         self.sweep, self.folder, self.repaired = sweep, folder, 0
-        group = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
+        group: Any = zarr.open_group(folder, mode="r+", zarr_format=3, use_consolidated=False)
         # Zarr would otherwise write no file for a chunk that has only the fill value.
         with zarr.config.set({"array.write_empty_chunks": True}):
-            self._arrays: dict[str, Any] = {
-                asked.name: group[asked.name] for asked in sweep.reductions
-            }
+            self._arrays = {asked.name: group[asked.name] for asked in sweep.reductions}
         self._limit = largest_chunk(sweep)
         self._done = [False] * sweep.n_chunks
 

@@ -16,9 +16,8 @@ import numpy as np
 from pyharness.model.distribution import version
 from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
-from pyharness.sweep.axes import MOST_VALUES
+from pyharness.sweep.axes import MOST_VALUES, units_of
 from pyharness.sweep.checksums import DamageError, Label, place_checksums, read_bounded
-from pyharness.sweep.fields import units_of
 from pyharness.sweep.reductions import REDUCTIONS, empty
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 

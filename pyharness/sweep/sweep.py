@@ -98,11 +98,10 @@ class Sweep:
 
     def box(self, chunk: int) -> tuple[slice, ...]:
         """Return the part of the grid that a chunk covers, a slice per dimension."""
+        position = self.position_of(chunk)
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
-            for at, length, n in zip(
-                self.position_of(chunk), self.chunk_shape, self.shape, strict=True
-            )
+            for at, length, n in zip(position, self.chunk_shape, self.shape, strict=True)
         )
 
 

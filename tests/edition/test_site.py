@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from pyharness.edition import api, decks, documents, figures, parallel_decks, site
+from pyharness.edition import api, decks, documents, ledger, parallel_decks, site
 from pyharness.edition.ledger import counts
 from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
@@ -170,7 +170,7 @@ def test_builds_are_alike(built_site: dict[str, bytes], monkeypatch: pytest.Monk
         names = (name, name.replace(".svg", ".csv"))
         return {each: built_site[f"figures/{each}"] for each in names}
 
-    monkeypatch.setattr(figures, "saved", saved)
+    monkeypatch.setattr(ledger, "saved", saved)
     again = site.build_site()
     assert [name for name in again if again[name] != built_site[name]] == []
     assert again.keys() == built_site.keys()

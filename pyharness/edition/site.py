@@ -227,10 +227,8 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
-    for name, data in (
-        ("story", story.data()), ("laboratory", laboratory.data()), ("about", None),
-        ("body", body.data()),
-    ):  # fmt: skip
+    scripts = {"story": story.data(), "laboratory": laboratory.data(), "about": None}
+    for name, data in (*scripts.items(), ("body", body.data())):
         content[f"assets/{name}.js"] = bundle(web / name / f"{name}.js").encode()
         if data is not None:
             content[f"assets/{name}-data.js"] = script(f"{name}Data", data)

@@ -129,10 +129,12 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     program = given.get("program")
     for key in _OF_METHODS if program is not None else _OF_PROGRAMS:
         if key in given or key in fields:
-            why = "without a program; give [solve] program"
-            if program is not None:
-                why = "with a program, which advances with the step size of the scene; leave it out"
-            raise InputError(f"{key} has no meaning {why}")
+            if program is None:
+                raise InputError(f"{key} has no meaning without a program; give [solve] program")
+            raise InputError(
+                f"{key} has no meaning with a program, which advances with the step size of "
+                "the scene; leave it out"
+            )
     lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
     if not lipschitz >= 0.0:
         raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")

@@ -298,7 +298,7 @@ def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: pytest.Monke
         assert largest_error(sol_of(each), truth) <= 1e-10
 
 
-@pytest.mark.parametrize("end", [9.0, -2.0])
+@pytest.mark.parametrize("end", [4.0, -1.5])
 def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: float) -> None:
     calls = 0
 
@@ -308,10 +308,10 @@ def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: f
         return np.clip(-0.8 * omega + np.sin(3.0 * time), -0.5, 0.5)
 
     scene = Scene("brake", (1.0, 0.2, -0.7), moments=(1.0, 2.0, 2.5), torque=opaque(brake))
-    found = solve(scene, end, tolerance=1e-6, dense_output=True, events=lambda t, w: w[2])
+    found = solve(scene, end, tolerance=1e-4, dense_output=True, events=lambda t, w: w[2])
     assert calls <= found.evaluations + 2
     times = np.linspace(0.0, end, 101)[1:]
-    truth = solve(scene, times, "dop853", 1e-9)
-    assert largest_error(sol_of(found), truth) <= 1e-6
+    truth = solve(scene, times, "dop853", 1e-7)
+    assert largest_error(sol_of(found), truth) <= 1e-4
     assert found.t_events is not None
     assert len(found.t_events[0]) == np.sum(np.diff(np.sign(truth.omega[:, 2])) != 0.0)

@@ -399,7 +399,7 @@ def test_computer_error_is_judged_in_the_machines_words(judged: Judged) -> None:
     article = " ".join((ROOT / "docs/article/article.md").read_text().split())
     first, second = (" ".join(prose(x, 2).split()) for x in (ours, max(apart.values())))
     assert f"their error is at most {first} rad/s" in article
-    assert f"differ from ours by at most {second} rad/s" in article
+    assert f"differ from those in double precision by at most {second} rad/s" in article
     # With a limit below the rounding errors the verdict changes, also after a few steps.
     low = {**entry, "parameters": {**entry["parameters"], "limit": 1e-15}}
     few = Laboratory(False, Assumptions(steps=5))

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.many_alone import NO_ATTITUDE, is_solved_alone, solve_one_by_one
-from pyharness.engine.many_details import Details
+from pyharness.engine.many_alone import NO_ATTITUDE, Details, is_solved_alone, solve_one_by_one
 from pyharness.engine.many_scenes import (
+    BODIES,
+    TORQUES,
     Axes,
     about_principal,
     check_alike,
@@ -45,8 +46,6 @@ from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, boolean, finite
 from pyharness.model.waves import with_merged_rows
 
-_BODY = ("moments", "coefficients", "inertia")
-_TORQUE = ("torque_constant", "torque_rate", "sines", "cosines")
 _STARTS = ("omega0", "attitude0")
 _MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
 _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
@@ -179,16 +178,16 @@ def _solved(
     effort: float, estimates: bool, threads: int,
 ) -> Ensemble:  # fmt: skip
     own = {name: value for name, value in arrays.items() if value is not None}
-    kind = only_one({name: own[name] for name in _BODY if name in own})
+    kind = only_one({name: own[name] for name in BODIES if name in own})
     ready: dict[str, Any] = {}
     axes: Axes | None = None
     if isinstance(scene, Scene):
         if kind and scene.changing is not None:  # the arrays give other bodies
             scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
-        if is_solved_alone(scene, {name: own[name] for name in _TORQUE if name in own}):
+        if is_solved_alone(scene, {name: own[name] for name in TORQUES if name in own}):
             _, asked = _chosen(method, tolerance)
             return solve_one_by_one(
-                scene, t_end, {name: arrays[name] for name in (*_TORQUE, *_BODY, *_STARTS)}, out,
+                scene, t_end, {name: arrays[name] for name in (*TORQUES, *BODIES, *_STARTS)}, out,
                 method=method, tolerance=asked, effort=checked_effort(effort),
                 estimates=estimates, threads=threads_of(threads),
             )  # fmt: skip
@@ -200,10 +199,7 @@ def _solved(
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
             ready = rows_of_scene(scene)
     else:
-        scene = list(scene)
-        for name in (*_STARTS, *_TORQUE, *_BODY):
-            if name not in own:
-                continue
+        for name in own:
             raise InputError(
                 f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
                 "scenes without arrays"

@@ -29,8 +29,8 @@ from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
 _MOST_KEPT = 8  # scenes whose arrays are kept
-_BODIES = ("moments", "inertia", "coefficients")
-_TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
+BODIES = ("moments", "inertia", "coefficients")
+TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
 
 
 class Axes:
@@ -74,9 +74,9 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Axes]:
     The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
     matrix that is not symmetric and positive definite.
     """
-    rows = checked_rows({name: given[name] for name in given if name not in _BODIES})
+    rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
-    own |= {name: rows.pop(name) for name in _TORQUES}
+    own |= {name: rows.pop(name) for name in TORQUES}
     n = count_bodies(own)
     matrices, constant, rate, sines, cosines = (spread(each, n) for each in own.values())
     constant, sines, cosines = with_merged_rows(constant, sines, cosines)
@@ -130,7 +130,7 @@ def _filled(laws: list[Any]) -> list[Any]:
 def from_scene(scene: Scene) -> dict[str, Any]:
     """Return the arrays of a scene."""
     law = checked_scene(scene, any_axes=True).body_torque
-    kind = next(name for name in _BODIES if getattr(scene, name) is not None)
+    kind = next(name for name in BODIES if getattr(scene, name) is not None)
     return {
         kind: getattr(scene, kind),
         "omega0": scene.omega,
@@ -199,7 +199,7 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {"attitude0": None}
-    for name in (*_BODIES, "omega0", "torque_constant", "torque_rate"):
+    for name in (*BODIES, "omega0", "torque_constant", "torque_rate"):
         if name in rows[0]:
             found[name] = np.array([row[name] for row in rows])
     for name in ("sines", "cosines"):
@@ -245,8 +245,8 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
     for name in ("sines", "cosines"):
         if name in torque:
             torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
-    if own.keys() & _BODIES:
-        own = {**dict.fromkeys(_BODIES), **own}
+    if own.keys() & BODIES:
+        own = {**dict.fromkeys(BODIES), **own}
     for name in ("omega", "attitude"):
         if f"{name}0" in own:
             own[name] = own.pop(f"{name}0")

@@ -240,7 +240,7 @@ def _is_special(scene: Scene) -> bool:
 
 
 def _solve_groups(
-    scenes: list[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
+    scenes: Sequence[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
     **settings: Any,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of scenes that one kernel call can't solve."""

@@ -238,7 +238,7 @@ def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
         [
             f"{best}: in both cases with {most} of {len(WEIGHTINGS)} weightings, the most of all; "
             f"{'none' if most < len(WEIGHTINGS) else 'as IV.2 says,'} with all. A mistake in the "
-            "products alone can't fail Case 1, where A = B = C = 0 and the products count nothing.",
+            "products alone can't fail Case 1, where A = B = C = 0 and the products count nothing."
         ],
     ]
     return Report(

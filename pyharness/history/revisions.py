@@ -5,11 +5,7 @@ from typing import Any, NamedTuple
 
 from pyharness.model.facts import facts
 
-CHANGES = {
-    "added": "new entries",
-    "changed": "altered entries",
-    "removed": "removed entries",
-}
+CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "removed entries"}
 """The fields of a revision that name apparatus entries, with their headings."""
 
 

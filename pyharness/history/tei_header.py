@@ -29,12 +29,7 @@ KINDS = {
 }
 """The kinds of apparatus entries, with their contents."""
 
-CERTAINTY = {
-    "certain": "high",
-    "probable": "medium",
-    "conjecture": "low",
-    "undecidable": "unknown",
-}
+CERTAINTY = {"certain": "high", "probable": "medium", "conjecture": "low", "undecidable": "unknown"}
 """The degrees of certainty in the apparatus, with the values of `cert` in TEI."""
 
 

@@ -47,10 +47,7 @@ class Run(NamedTuple):
 
 
 def deck_text(
-    listing: Listing,
-    scene: Scene | None = None,
-    dialect: str = "1982",
-    terms: int | None = None,
+    listing: Listing, scene: Scene | None = None, dialect: str = "1982", terms: int | None = None
 ) -> str:
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 

@@ -15,13 +15,7 @@ from numpy.typing import NDArray
 from pyharness.history.claims.evidence import POINTS
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.ledger import claim
-from pyharness.history.claims.over_starts import (
-    FAILS,
-    HOLDS,
-    IN_PART,
-    Starts,
-    judged,
-)
+from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, Starts, judged
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.errors import InputError

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.history.claims.atlas import (
-    Atlas,
-    about,
-    bits,
-    shares,
-    shown_starts,
-    sum_of_points,
-)
+from pyharness.history.claims.atlas import Atlas, about, bits, shares, shown_starts, sum_of_points
 from pyharness.history.claims.laboratory import starts
 from pyharness.history.claims.over_starts import FAILS
 from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, words

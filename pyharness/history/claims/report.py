@@ -113,7 +113,7 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
         [
             "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
             "shows, and (1, 1, 1), which is ours, the claims about that case alone, for the "
-            "original programs; those with the same failing verdict for every start do not count:",
+            "original programs; those with the same failing verdict for every start do not count:"
         ]
     ]
     holding = []

@@ -163,9 +163,7 @@ def _stepped(scene: Scene, method: str) -> Array:
 
 
 def _power(
-    scene: Scene,
-    method: Callable[[Scene], Array],
-    truth: Callable[[Scene], Array] | None = None,
+    scene: Scene, method: Callable[[Scene], Array], truth: Callable[[Scene], Array] | None = None
 ) -> float:
     """Return p if a method's error in one step of size h is O(h**p)."""
     apart = []

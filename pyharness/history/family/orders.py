@@ -69,9 +69,7 @@ def family_members(
 
 
 def order_table(
-    scene: Scene,
-    members: Sequence[Member] | None = None,
-    progress: Progress = no_progress,
+    scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
     """Return the orders of convergence and the errors of many methods, measured together.
 

@@ -3,7 +3,7 @@
 A number m 2**e is a pair of integers (m, e); m has p bits, or fewer if subnormal. If m is 0, e is
 the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an `Operation` have m other than 0.
 No library has all these rules: mpmath and gmpy2 do not limit exponents, SoftFloat and numpy have
-only IEEE 754, and none has the rules of the CDC machines (`cdc.py`).
+only IEEE 754, and none has the rules of the CDC machines.
 """
 
 import math
@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 Pair = tuple[int, Any]
 Rounding = Callable[[int, int], Pair]
 Operation = Callable[[int, int, int, int], Pair]
+# Exponents of an integer coefficient, for the octal exponent fields 0000 and 3776 of a CDC word.
+_LEAST, _MOST = -1023, 1022
 
 
 class Rules(NamedTuple):
@@ -103,3 +105,56 @@ def ieee(p: int, largest: int, cut: bool) -> Rules:
 
     nearest, towards_zero = (rounding(p, least, most, each, gradual=True) for each in (False, True))
     return Rules(nearest, towards_zero, add, multiply, divide, add, signed_zero=True)
+
+
+def cdc(p: int, rounds: bool) -> Rules:
+    """Return the arithmetic of the CDC 6600 and CYBER 70 for p-bit coefficients.
+
+    The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient
+    of p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, the frame. Without
+    `rounds` it is `FX`, truncating sum, difference, product and quotient (octal 30, 31, 40 and 44);
+    with it `RX`, rounding ones (34, 35, 41 and 45). There is no guard bit: the bits below the unit
+    of the larger operand are truncated before NX (24) normalises a sum.
+
+    Literals are rounded to nearest, an assumption: no source states how CDC's FTN converted them.
+    """
+    settled = rounding(p, _LEAST, _MOST, cut=True, gradual=False)
+    quarter = 1 << p - 2 if rounds else 0
+    third = (1 << p) // 3 if rounds else 0
+
+    def multiply(xm: int, xe: int, ym: int, ye: int) -> Pair:
+        product = abs(xm * ym) + quarter
+        return settled(product if (xm < 0) == (ym < 0) else -product, xe + ye)
+
+    def divide(xm: int, xe: int, ym: int, ye: int) -> Pair:
+        quotient = ((abs(xm) << p) + third) // abs(ym)
+        return settled(quotient if (xm < 0) == (ym < 0) else -quotient, xe - ye - p)
+
+    def sum_with(rounds: bool) -> Operation:
+        def add(xm: int, xe: int, ym: int, ye: int) -> Pair:
+            frame, e = framed(p, rounds, xm, xe, ym, ye)
+            return settled(_cut(frame, p), e)
+
+        return add
+
+    nearest = rounding(p, _LEAST, _MOST, cut=False, gradual=False)
+    plain, add = sum_with(False), sum_with(rounds)
+    return Rules(nearest, settled, add, multiply, divide, plain, signed_zero=False)
+
+
+def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[int, int]:
+    """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
+
+    The frame is in units of 2**(e - p), where e is the larger exponent; coefficients have p bits.
+    The smaller operand is shifted and truncated. If `rounds`, half a unit in the last place is
+    first added to each operand, as RX does.
+    """
+    if xe <= ye:
+        xm, xe, ym, ye = ym, ye, xm, xe
+    apart = xe - ye
+    large, small = abs(xm) << p, abs(ym) << p >> apart
+    if rounds:
+        half = 1 << p - 1
+        large += half
+        small += half >> apart
+    return (large if xm > 0 else -large) + (small if ym > 0 else -small), xe

@@ -1,23 +1,38 @@
-"""Test vectors for the arithmetic of CDC machines, and our results.
+"""Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
 
-`data/words/cdc.json` follows from the CYBER 170 hardware reference, CDC 60463560; a public emulator
-agrees. A file is a JSON object with `schema` and `vectors`: objects with `name`, `op` (as in
-`octal.operated`), and `x`, `y` and `result` in octal.
+A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
+60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
+one if the field is below 2000 (octal).
+
+The test vectors `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC 60463560; a
+public emulator agrees. A file is a JSON object with `schema` and `vectors`: objects with `name`,
+`op` (as in `operated`), and `x`, `y` and `result` in octal.
 """
 
 import json
+import math
+import operator
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pyharness.model.errors import InputError, kind_of
+from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
-from pyharness.thesis.octal import operated
+from pyharness.thesis.rounding import Pair, framed
+from pyharness.thesis.word import WORDS
 
 OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
 _LARGEST = 1 << 24  # bytes of a file
 _FIELDS = ("name", "op", "x", "y", "result")
+BITS = 48
+_WORD = re.compile(r"[0-7]{20}")
+_ONES = (1 << 60) - 1
+_SIGN = 1 << 59
+_BIAS, _INDEFINITE, _INFINITE = 0o2000, 0o1777, 0o3777
+_INSTRUCTIONS = tuple(
+    f"{kind}X{each}" for kind in "FR" for each in ("+", "+ NX", "-", "- NX", "*", "/")
+)
 
 
 class Vector(NamedTuple):
@@ -66,9 +81,77 @@ def _answer(where: str, entry: Any) -> Answer:
         if not isinstance(entry.get(field), str):
             raise InputError(f"{where}: {field} is {kind_of(entry.get(field))}; it must be text")
     vector = Vector(*(entry[field] for field in _FIELDS))
-    if not re.fullmatch("[0-7]{20}", "".join(vector.result.split())):
+    if not _WORD.fullmatch("".join(vector.result.split())):
         raise InputError(f"{where}: result {vector.result!r}: not 20 octal digits")
     try:
         return Answer(vector, operated(vector.op, vector.x, vector.y))
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def from_octal(text: str) -> Pair:
+    """Return the number m 2**e that 20 octal digits represent, as the pair (m, e).
+
+    Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e the value
+    as a float. Raise InputError for other texts, and if the coefficient is not normalised.
+    """
+    digits = "".join(text.split()) if isinstance(text, str) else ""
+    if not _WORD.fullmatch(digits):
+        raise InputError(f"word {text!r}: not 20 octal digits, as in 1720 4000 0000 0000 0000")
+    bits = int(digits, 8)
+    sign = -1 if bits & _SIGN else 1
+    if sign < 0:
+        bits ^= _ONES
+    field, m = bits >> BITS, bits & (1 << BITS) - 1
+    if field in (_INDEFINITE, _INFINITE):
+        return 0, math.nan if field == _INDEFINITE else sign * math.inf
+    if not bits:
+        return 0, 0.0
+    if m.bit_length() != BITS:
+        raise InputError(
+            f"word {text!r}: its coefficient is not normalised; give a word of the machine as "
+            "it stores results"
+        )
+    return sign * m, field - _BIAS + (field < _BIAS)
+
+
+def to_octal(number: Pair) -> str:
+    """Return the CDC word of a pair (m, e), as in `from_octal`, in groups of four digits."""
+    m, e = number
+    if m:
+        return _written(m < 0, e, abs(m))
+    if e == 0.0:
+        return _grouped(0)
+    field = _INDEFINITE if math.isnan(e) else _INFINITE
+    return _grouped(field << BITS ^ (_ONES if e < 0.0 else 0))
+
+
+def operated(name: str, x: str, y: str) -> str:
+    """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
+
+    `name` is F (truncating) or R (rounding), X, and +, -, * or /, as in ``FX*``. A sum or
+    difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
+    """
+    if name not in _INSTRUCTIONS:
+        raise unknown("instruction", name, _INSTRUCTIONS)
+    rounds, operation = name[0] == "R", name[2]
+    (xm, xe), (ym, ye) = from_octal(x), from_octal(y)
+    if operation == "-":
+        ym, ye = (-ym, ye) if ym else (0, -ye)
+    if name[2:] in ("+", "-") and xm and ym:
+        frame, e = framed(BITS, rounds, xm, xe, ym, ye)
+        m = abs(frame) >> BITS
+        return _written(frame < 0, e + (m >> BITS), m >> (m >> BITS))
+    word = WORDS["cdc48-rounded" if rounds else "cdc48"]
+    left, right = word.number(xm, xe), word.number(ym, ye)
+    found = {"*": operator.mul, "/": operator.truediv}.get(operation, operator.add)(left, right)
+    return to_octal((found.m, found.e))
+
+
+def _written(negative: bool, e: int, m: int) -> str:
+    field = e + _BIAS - (e < 0)
+    return _grouped((field << BITS | m) ^ (_ONES if negative else 0))
+
+
+def _grouped(bits: int) -> str:
+    return " ".join(re.findall("....", f"{bits:020o}"))

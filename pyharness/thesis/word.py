@@ -12,8 +12,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from pyharness.model.errors import InputError, unknown
-from pyharness.thesis.cdc import cdc
-from pyharness.thesis.rounding import Pair, Rules, ieee
+from pyharness.thesis.rounding import Pair, Rules, cdc, ieee
 
 RULES = ("nearest-even", "chop", "FX", "RX")
 # Additional bits with which a sine or cosine is computed before it is rounded to the word.

@@ -15,10 +15,9 @@ from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import in_word
-from pyharness.thesis.octal import from_octal, to_octal
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import WORD_NAMES
-from pyharness.thesis.vectors import answers
+from pyharness.thesis.vectors import answers, from_octal, to_octal
 from pyharness.thesis.word import RULES, WORDS, Word
 from tests.campaigns.words_campaign import FLOATS, differing
 from tests.thesis.exact_words import disagreements

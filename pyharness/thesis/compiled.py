@@ -1,7 +1,7 @@
 """Runs of the compiled programs of the thesis's appendix on a scene."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,17 +24,15 @@ def run(
 
     The arguments are those of `run_program`, unchecked.
     """
-    rows, ier, n_rows, status, evaluations, variable, quotient = extension().run_program(
-        *program_arguments(scene, listing, lipschitz, may_stop, velocity)
-    )
-    ended = ENDS[status], variable, quotient
-    found = read_rows(listing, rows.T[:n_rows], ier, evaluations, *ended)
+    given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
+    rows, ier, n_rows, *ended = extension().run_program(*given)
+    found = read_rows(listing, rows.T[:n_rows], ier, *ended)
     return found if velocity else replace(found, velocity=None)
 
 
 def read_rows(
-    listing: Listing, rows: Array, ier: NDArray[np.int32], evaluations: int,
-    ended: str, stop_variable: int, stop_quotient: float,
+    listing: Listing, rows: Array, ier: NDArray[np.int32], status: int, evaluations: int,
+    stop_variable: int, stop_quotient: float,
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
@@ -44,7 +42,6 @@ def read_rows(
     right-hand side divided by the variable's (1/s).
     """
     n = len(rows)
-    is_stopped = stop_variable > 0
     return Trajectory(
         time=rows[:, 0],
         recorded_time=rows[:, 1],
@@ -52,50 +49,28 @@ def read_rows(
         velocity=rows[:, 5:8],
         steps=n,
         evaluations=evaluations,
-        ended=ended,
-        stop=Stop(n, STOP_VARIABLES[stop_variable - 1], stop_quotient) if is_stopped else None,
+        ended=ENDS[status],
+        stop=Stop(n, STOP_VARIABLES[stop_variable - 1], stop_quotient) if stop_variable else None,
         ier=None if listing.program == "runge-kutta" else ier[:n],
     )
 
 
-class Arguments(NamedTuple):
-    """The arguments of the compiled function `run_program`, in its order.
-
-    `flags` is a bit mask of defects, readings and conjectures. `body` has the moments (kg m2) if
-    `by_moments`, else A, B and C of Euler's equations. `torque_first` is the initial torque divided
-    by the moments (1/s2), or zeros.
-    """
-
-    program: int
-    flags: int
-    by_moments: bool
-    body: Any
-    omega: Any
-    masses: Any
-    forces: Any
-    torque_constant: Any
-    torque_rate: Any
-    torque_first: Any
-    torque_varies: bool
-    sines: Any
-    cosines: Any
-    step_size: float
-    n_steps: int
-    lipschitz: float
-    may_stop: bool
-    with_velocity: bool
-
-
 def program_arguments(
     scene: Scene, listing: Listing, lipschitz: float, may_stop: bool, velocity: bool
-) -> Arguments:
-    """Return the arguments of the compiled function `run_program`."""
+) -> tuple[Any, ...]:
+    """Return the arguments of the compiled function `run_program`, in its order.
+
+    They are the program, a bit mask of defects, readings and conjectures, and whether the body has
+    moments; then seven triples: moments (kg m2), or A, B and C of Euler's equations; omega, masses,
+    forces, constant and rate of the torque, and the initial torque divided by the moments (1/s2),
+    or zeros; then whether the torque varies, its sines and cosines, and the other arguments.
+    """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
         conjectures = listing.conjectures - {"initial-torque"}
         listing = replace(listing, conjectures=conjectures)
     law = scene.body_torque
-    return Arguments(
+    return (
         PROGRAMS.index(listing.program) + 1,
         listing.flags,
         scene.moments is not None,

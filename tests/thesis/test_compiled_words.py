@@ -23,8 +23,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import compiled_in_word, in_word
 from pyharness.thesis.cells import all_listings
-from pyharness.thesis.compiled_in_word import compiled_words
-from pyharness.thesis.interchange import from_bytes, to_bytes
+from pyharness.thesis.compiled_in_word import compiled_words, from_bytes, to_bytes
 from pyharness.thesis.programs import BINARY64, COMPILED_WORDS, IMPLEMENTATIONS
 from pyharness.thesis.word import WORDS, Number, Word
 

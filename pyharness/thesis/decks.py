@@ -19,6 +19,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.thesis.cards import deck, numbers
+from pyharness.thesis.equations import card_torque
+from pyharness.thesis.printer import TAPE5
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
@@ -242,10 +244,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
     if scene.case is None or scene.moments is None:
         raise InputError("a deck holds one of the cases of Table 1; allowed: --case 1 to 7")
     first = facts("cards/alterations")["case"][program]
-    torque = scene.body_torque.constant
-    for each in facts("printer")["initial_torque"]:
-        if each["case"] == scene.case:
-            torque = tuple(each["torque"])
+    torque = card_torque(scene) or scene.body_torque.constant
     found = {}
     for name, values in (("moments", scene.moments), ("torque", torque), ("omega", scene.omega)):
         for axis, value in enumerate(values):
@@ -283,7 +282,9 @@ def run_deck(text: str, folder: Path | None = None) -> Run:
         (here / "deck.f").write_text(text)
         _command([COMPILER, *FLAGS, "deck.f", str(solver), "-o", "deck"], here)
         _command([str(here / "deck")], here)
-        return Run(_records(here / "TAPE5"), _page((here / "TAPE6").read_text()))
+        lines = (here / "TAPE6").read_text().splitlines()
+        page = "".join(line[1:].rstrip() + "\n" for line in lines)
+        return Run(np.fromfile(here / "TAPE5", TAPE5.newbyteorder("="))["items"], page)
 
 
 def solver_object(folder: Path) -> Path:
@@ -298,13 +299,3 @@ def _command(words: list[str], folder: Path) -> None:
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{Path(words[0]).name}: {done.stderr.strip()[:600]}")
-
-
-def _records(path: Path) -> np.ndarray:
-    """Return TAPE5, shape (n, 7); each record is between copies of its length."""
-    record = np.dtype([("begin", "i4"), ("values", "f8", 7), ("end", "i4")])
-    return np.fromfile(path, dtype=record)["values"]
-
-
-def _page(text: str) -> str:
-    return "".join(line[1:].rstrip() + "\n" for line in text.splitlines())

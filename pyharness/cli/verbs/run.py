@@ -91,9 +91,9 @@ def run(options: argparse.Namespace) -> int:
         return page(scene, name, trajectory)
 
     def tape() -> bytes:
-        from pyharness.history.tape5 import records
+        from pyharness.thesis.printer import tape5
 
-        return records(trajectory)
+        return tape5(trajectory)
 
     form = options.attitude or FORMS[0]
     word = None if options.word == BINARY64 else options.word

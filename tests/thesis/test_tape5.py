@@ -8,9 +8,9 @@ from scipy.io import FortranFile
 
 from pyharness import case_scene
 from pyharness.cli.main import main
-from pyharness.history.tape5 import records
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.thesis import compiled
+from pyharness.thesis.printer import tape5
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -34,7 +34,7 @@ def test_tape_goes_through_a_pipe_and_not_to_a_terminal(
 ) -> None:
     arguments = ["run", "--case", "3", "--program", "runge-kutta", "--format", "tape5"]
     assert main(arguments) == 0
-    wanted = records(compiled.run(case_scene(3), Listing.original("runge-kutta")))
+    wanted = tape5(compiled.run(case_scene(3), Listing.original("runge-kutta")))
     assert capsysbinary.readouterr().out == wanted
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     assert main(arguments) == 2

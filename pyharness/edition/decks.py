@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 
 from pyharness.history.ablation import entries
 from pyharness.model.facts import facts
-from pyharness.thesis.cards import Card, deck, numbers, parallels, tight
+from pyharness.thesis.cards import Card, Place, deck, numbers, parallels, switch_at, tight
 from pyharness.thesis.collation import witness_lines
 from pyharness.thesis.decks import corrected_cards, corrections
-from pyharness.thesis.port_lines import Place, switch_at
 
 TITLES = {
     "two-term": "Two-term collocation",

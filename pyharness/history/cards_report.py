@@ -10,9 +10,8 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, counted, words
 from pyharness.model.report import numbers as columns
-from pyharness.thesis.cards import Card, deck, parallels
+from pyharness.thesis.cards import Card, Place, deck, parallels
 from pyharness.thesis.cards import numbers as cards_named
-from pyharness.thesis.port_lines import Place
 
 _CLASSES = (
     *words("class"), Column("entries"), Column("flags"), Column("two-term"), Column("four-term"),

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from pyharness.model.facts import SHIPPED, facts_folder, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import Card
-from pyharness.thesis.port_lines import PORT, port_file
+from pyharness.thesis.cards import PORT, Card, port_file
 
 DATA = "pyharness/data"
 """The path of the edition's data in the source repository."""

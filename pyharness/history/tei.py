@@ -27,8 +27,7 @@ from pyharness.history.tei_header import (
 )
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import Card, deck, numbers, parallels
-from pyharness.thesis.port_lines import Place
+from pyharness.thesis.cards import Card, Place, deck, numbers, parallels
 
 SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
 """The schema of the document, of version 4.12.0 of the TEI guidelines."""

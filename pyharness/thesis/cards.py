@@ -2,21 +2,25 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
 number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
-the twin's lines for each card. `data/apparatus.toml`, the critical apparatus, explains the
-deviations of the scan.
+the twin's lines for each card; the Fortran port names its cards in comments.
+`data/apparatus.toml`, the critical apparatus, explains the deviations of the scan.
 """
 
 import re
 from collections.abc import Iterable, Iterator
 from functools import cache, cached_property
+from pathlib import Path
 from typing import NamedTuple
 
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.facts import facts
+from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.port_lines import Place, port_lines, twin_line
 
 _SPECIFICATION = re.compile(r"PROGRAM |DIMENSION |REAL |FORMAT\(|END$")
+_MARGIN = re.compile(r"^(.*?)\s*!\s*(\d+(?:[-,\s]+\d+)*)\s*$")
+_TWINS = Path(__file__).parent
+PORT = "fortran/original"
+"""The folder of the Fortran port in the source repository."""
 
 
 class Difference(NamedTuple):
@@ -28,6 +32,14 @@ class Difference(NamedTuple):
     ours: str
     scans: str
     entry: str
+
+
+class Place(NamedTuple):
+    """A line of a source file: name of the file, number from 1, and text."""
+
+    file: str
+    line: int
+    text: str
 
 
 class Card(NamedTuple):
@@ -76,8 +88,26 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield each passage of the text with its difference from the scan, or None."""
-        return passages(self.text, self.differences)
+        """Yield each passage of the text with its difference from the scan, or None.
+
+        Raise ValueError if the text does not have all differences in order.
+        """
+        # Differences ignore blanks.
+        places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
+        letters = tight(self.text)
+        done = at = 0
+        for each in self.differences:
+            first = letters.find(each.ours, at)
+            if first < 0:
+                raise ValueError(f"{each.ours!r} does not stand in {self.text!r} where it should")
+            at = first + len(each.ours)
+            begin, end = places[first], places[at - 1] + 1
+            if done < begin:
+                yield self.text[done:begin], None
+            yield self.text[begin:end], each
+            done = end
+        if self.text[done:]:
+            yield self.text[done:], None
 
     @property
     def text_with_scanned_names(self) -> str:
@@ -155,7 +185,10 @@ class Deck:
     @cached_property
     def port(self) -> dict[int, list[Place]]:
         """Return, by card number, the corresponding lines of the Fortran port."""
-        return _by_card((cards, place) for place, cards in port_lines(self.program))
+        file = port_file(self.program)
+        lines = enumerate(_lines(shipped(PORT) / file), 1)
+        found = ((number, match) for number, text in lines if (match := _MARGIN.match(text)))
+        return _by_card((match[2], Place(file, n, match[1].strip())) for n, match in found)
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
@@ -179,27 +212,13 @@ def numbers(ranges: str) -> list[int]:
     return found
 
 
-def find(program: str, number: int) -> Card:
-    """Return the card `number` of a program; raise InputError if there is none."""
-    cards = deck(program).cards
-    if number not in cards:
-        near = sorted(cards, key=lambda each: abs(each - number))[:2]
-        told = " and ".join(str(each) for each in sorted(near))
-        raise InputError(
-            f"card {number}: the {program} deck has no such card; the nearest are {told}"
-        )
-    return cards[number]
-
-
 def chosen(asked: Iterable[str]) -> list[Card]:
     """Return the cards that `asked` names, or all if empty; raise InputError for other items.
 
     Items: ``two-term``, ``two-term:1660``; ``1660``, ``1040-1090`` (cards of any program).
     """
-    found: dict[Card, None] = {}
-    for each in list(asked) or PROGRAMS:
-        found.update(dict.fromkeys(_cards_of(each)))
-    return list(found)
+    every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
+    return list(dict.fromkeys(every))
 
 
 def parallels(card: Card) -> list[Card]:
@@ -237,52 +256,19 @@ def _cards_of(asked: str) -> list[Card]:
             f"cards {asked!r}: neither a program ({', '.join(PROGRAMS)}) nor a card or a range of "
             "cards, as 1660, 1040-1090, two-term:1660"
         )
-    first, last = int(match[1]), match[2]
-    if last is None:
-        having = [each for each in programs if first in deck(each).cards]
-        if having:
-            return [find(each, first) for each in having]
-        every = [card for each in programs for card in deck(each).cards.values()]
+    first, last = int(match[1]), int(match[2] or match[1])
+    every = [card for each in programs for card in deck(each).cards.values()]
+    found = [card for card in every if first <= card.number <= last]
+    if not found and match[2] is None:
         near = sorted(every, key=lambda card: abs(card.number - first))[:2]
         told = " and ".join(card.name for card in sorted(near, key=lambda card: card.number))
         raise InputError(f"card {first}: there is no such card; the nearest are {told}")
-    found = [
-        card
-        for each in programs
-        for card in deck(each).cards.values()
-        if first <= card.number <= int(last)
-    ]
     if not found:
         ends = ", ".join(
             f"{each} {min(c)}-{max(c)}" for each in programs for c in [deck(each).cards]
         )
         raise InputError(f"cards {asked!r}: the range is empty; the decks have {ends}")
     return found
-
-
-def passages(
-    text: str, differences: Iterable[Difference]
-) -> Iterator[tuple[str, Difference | None]]:
-    """Yield each passage of a card's text with its difference from the scan, or None.
-
-    `differences` must be all of the card's, in order; otherwise raise ValueError.
-    """
-    # Differences ignore blanks.
-    places = [n for n, letter in enumerate(text) if not letter.isspace()]
-    letters = tight(text)
-    done = at = 0
-    for each in differences:
-        first = letters.find(each.ours, at)
-        if first < 0:
-            raise ValueError(f"{each.ours!r} does not stand in {text!r} where it should")
-        at = first + len(each.ours)
-        begin, end = places[first], places[at - 1] + 1
-        if done < begin:
-            yield text[done:begin], None
-        yield text[begin:end], each
-        done = end
-    if text[done:]:
-        yield text[done:], None
 
 
 def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
@@ -296,3 +282,43 @@ def _by_card(places: Iterable[tuple[str, Place]]) -> dict[int, list[Place]]:
 def tight(text: str) -> str:
     """Return a text without its blanks."""
     return "".join(text.split())
+
+
+def port_file(program: str) -> str:
+    """Return the name of a program's port in the folder `PORT`."""
+    return f"{program.replace('-', '_')}.fypp"
+
+
+def switch_at(place: Place) -> tuple[str, bool] | None:
+    """Return the defect or reading on which a port's line depends, and whether it is active.
+
+    Return None if the line depends on no single switch.
+    """
+    lines = _lines(shipped(PORT) / place.file)
+    depth = _indentation(lines[place.line - 1])
+    beyond_else = False
+    for line in filter(str.strip, reversed(lines[: place.line - 1])):
+        text, here = line.strip(), _indentation(line)
+        # The line opens a block around the place, or the branch before the `else` around it.
+        if here < depth or (beyond_else and here == depth and text.startswith(("if ", "else if "))):
+            if match := re.fullmatch(r"if \(listing%(\w+)\) then", text):
+                return match[1].replace("_", "-"), not beyond_else
+            depth, beyond_else = here, text == "else"
+    return None
+
+
+def twin_line(file: str, text: str) -> Place:
+    """Return the line of a twin with this text; raise ValueError unless there is exactly one."""
+    where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
+    if len(where) != 1:
+        raise ValueError(f"{text!r} occurs {len(where)} times in {file}")
+    return Place(file, where[0], text)
+
+
+@cache
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines()
+
+
+def _indentation(line: str) -> int:
+    return len(line) - len(line.lstrip())

@@ -8,7 +8,7 @@ from typing import Any
 
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
-from pyharness.thesis.cards import chosen, find, numbers, tight
+from pyharness.thesis.cards import chosen, deck, numbers, tight
 
 HEADING = "APPENDIX AND PROGRAMS"
 
@@ -23,7 +23,7 @@ def expected_lines() -> list[tuple[str, str]]:
     for page in facts("cards/scan")["page"]:
         for item in page["lines"]:
             if isinstance(item, str):
-                for card in (find(page["program"], number) for number in numbers(item)):
+                for card in (deck(page["program"]).cards[number] for number in numbers(item)):
                     assert card.scan is not None
                     found.append((card.scan, card.name))
             else:

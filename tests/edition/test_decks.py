@@ -9,7 +9,7 @@ from pyharness.edition import decks, parallel_decks
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
-from pyharness.thesis.cards import deck, find, numbers, tight
+from pyharness.thesis.cards import deck, numbers, tight
 from pyharness.thesis.collation import expected_lines, witness_lines
 from pyharness.thesis.decks import corrections
 from tests.edition.pages import pages
@@ -43,7 +43,9 @@ def test_a_note_is_shown_once_for_its_range_of_cards(program: str) -> None:
     ]
     assert sorted(shown_notes) == sorted(wanted)
     for view in views:
-        assert {each.entry["id"] for each in view.notes} == set(find(program, view.number).entries)
+        assert {each.entry["id"] for each in view.notes} == set(
+            deck(program).cards[view.number].entries
+        )
         kinds = [each.kind for each in view.notes]
         assert kinds == sorted(kinds, key=decks._ORDER.index)
         assert view.kinds == sorted(set(kinds), key=decks._ORDER.index)
@@ -91,7 +93,7 @@ def test_the_scan_has_one_three_or_six_blanks_before_a_statement() -> None:
             found = Counter(
                 len(match[1])
                 for view in sheet.cards
-                if re.match(" {6}[A-Z]", find(program, view.number).text)
+                if re.match(" {6}[A-Z]", deck(program).cards[view.number].text)
                 and (line := witness_lines().get(f"{program}:{view.number}"))
                 and (match := re.search(r"-( *)\S", line))
             )
@@ -110,7 +112,9 @@ def test_corrected_cards_differ_where_a_defect_is_corrected(program: str) -> Non
     changed = {}
     for view in decks.card_views(program):
         corrected = view.corrected
-        assert corrected.changes == (corrected.text != find(program, view.number).text.rstrip())
+        assert corrected.changes == (
+            corrected.text != deck(program).cards[view.number].text.rstrip()
+        )
         if corrected.changes or corrected.inserted:
             changed[view.number] = corrected
         else:

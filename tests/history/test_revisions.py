@@ -9,7 +9,7 @@ from pyharness.history.revisions import CHANGES, revisions
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
-from pyharness.thesis.cards import find, numbers
+from pyharness.thesis.cards import deck, numbers
 
 TEI = "{http://www.tei-c.org/ns/1.0}"
 
@@ -38,7 +38,9 @@ def test_entries_and_cards_of_all_revisions_are_those_of_the_tables() -> None:
     assert entries == {each["id"] for each in facts("apparatus")["entry"]}
     for each in revisions():
         for program, cards in each.cards.items():
-            assert [find(program, number).number for number in numbers(cards)] == numbers(cards)
+            assert [deck(program).cards[number].number for number in numbers(cards)] == numbers(
+                cards
+            )
     first = [each for each in revisions() if each.digest][-1]
     for program, cards in first.cards.items():
         assert numbers(cards) == [int(number) for number in facts(f"cards/{program}")["cards"]]

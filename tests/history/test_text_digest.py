@@ -12,7 +12,7 @@ import pytest
 from pyharness.history.tei import tei_document
 from pyharness.history.text_digest import TABLES, text_digest
 from pyharness.model.facts import facts, shipped
-from pyharness.thesis import cards, port_lines
+from pyharness.thesis import cards
 from tests.conftest import Printed
 
 
@@ -20,7 +20,7 @@ from tests.conftest import Printed
 def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     folder = tmp_path / "original"
     shutil.copytree(shipped("fortran/original"), folder)
-    monkeypatch.setattr(port_lines, "shipped", lambda _: folder)
+    monkeypatch.setattr(cards, "shipped", lambda _: folder)
     cards.deck.cache_clear()
     yield folder
     cards.deck.cache_clear()
@@ -30,7 +30,7 @@ def test_a_comment_in_the_port_moves_the_places_and_not_the_text(port: Path) -> 
     before = tei_document(), text_digest()
     for file in port.glob("*.fypp"):
         file.write_text(f"! A comment.\n{file.read_text()}")
-    for cached in (cards.deck, port_lines._lines):
+    for cached in (cards.deck, cards._lines):
         cached.cache_clear()
     after = tei_document(), text_digest()
     assert after[0] != before[0]

@@ -11,7 +11,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import collation
-from pyharness.thesis.cards import Difference, chosen, deck, numbers, passages
+from pyharness.thesis.cards import Card, Difference, chosen, deck, numbers
 from pyharness.thesis.collation import HEADING, expected_lines, undeclared, unexplained
 from tests.conftest import Printed
 
@@ -186,7 +186,7 @@ def test_record_of_a_card(printed: Printed) -> None:
 def test_pieces_of_a_text_hold_their_blanks() -> None:
     why = Difference("BC", "X", "why")
     pieces = [(" A ", None), ("B C", why), ("D E", None)]
-    assert list(passages(" A B CD E", [why])) == pieces
+    assert list(Card("two-term", 100, " A B CD E", (why,)).passages()) == pieces
     # Each passage begins after the one before it.
     with pytest.raises(ValueError, match="'BC' does not stand in ' A B CD E'"):
-        list(passages(" A B CD E", [why, why]))
+        list(Card("two-term", 100, " A B CD E", (why, why)).passages())

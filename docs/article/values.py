@@ -23,8 +23,8 @@ from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.report import kinds_table
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.stories import prose
+from pyharness.history.identifiers import text_digest
 from pyharness.history.limits import limit
-from pyharness.history.text_digest import text_digest
 from pyharness.history.words import WordRun
 from pyharness.history.words import cells as word_cells
 from pyharness.model.facts import facts

@@ -16,10 +16,9 @@ from pyharness.history.origins import (
     statement_count,
     unexplained_defects,
 )
-from pyharness.history.revisions import CHANGES, Revision, revisions
 from pyharness.history.second_reading import second_reading_report
-from pyharness.history.tei_header import CERTAINTY, KINDS
-from pyharness.history.timeline import gaps, timeline
+from pyharness.history.tei import CERTAINTY, KINDS
+from pyharness.history.timeline import CHANGES, Revision, gaps, revisions, timeline
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck

@@ -4,8 +4,7 @@ import json
 from functools import cache
 from typing import Any
 
-from pyharness.history.identifiers import data_identifier
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import data_identifier, text_digest
 from pyharness.model.facts import facts, shipped
 
 # The properties of `codemeta.json` that schema.org defines for source code.

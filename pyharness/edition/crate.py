@@ -10,8 +10,7 @@ from pyharness.edition.citation import (
     release_date,
     thesis_record,
 )
-from pyharness.history.identifiers import content_identifier, data_identifier
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import content_identifier, data_identifier, text_digest
 
 PACKAGE_MARK = "data-package.json"
 """The file that marks a folder as a data package, and lists its files."""

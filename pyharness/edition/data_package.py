@@ -22,9 +22,9 @@ from pyharness.history.identifiers import (
     content_identifier,
     data_identifier,
     source_files,
+    text_digest,
 )
 from pyharness.history.tei import tei_document
-from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.progress import Progress, no_progress

@@ -18,8 +18,7 @@ from pyharness.history.claims.evidence import evidence
 from pyharness.history.claims.evidence_report import evidence_report
 from pyharness.history.claims.ledger import Judgement
 from pyharness.history.claims.report import KINDS, claims_report, kinds_table
-from pyharness.history.claims.sentences import Sentence, sentences
-from pyharness.history.claims.stories import Story, story
+from pyharness.history.claims.stories import Sentence, Story, sentences, story
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.history.figures import FigureFinding, figure_picture, together_picture
 from pyharness.model.facts import facts

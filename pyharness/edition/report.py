@@ -9,8 +9,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from pyharness.edition.crate import MANIFEST
-from pyharness.history.identifiers import data_identifier, directory_identifier
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import data_identifier, directory_identifier, text_digest
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, digits, words

@@ -22,10 +22,9 @@ from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
 from pyharness.history.figures import FigureFinding, findings
-from pyharness.history.identifiers import DATA, data_identifier
+from pyharness.history.identifiers import DATA, data_identifier, text_digest
 from pyharness.history.origins import disagreements
 from pyharness.history.tei import tei_document
-from pyharness.history.text_digest import text_digest
 from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped
 from pyharness.model.progress import Progress, no_progress

@@ -5,13 +5,15 @@ from collections.abc import Iterable, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import text_digest
+from pyharness.history.origins import Disagreement, origins, unexplained_defects
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, counted, words
 from pyharness.model.report import numbers as columns
 from pyharness.thesis.cards import Card, Place, deck, parallels
 from pyharness.thesis.cards import numbers as cards_named
+from pyharness.thesis.deck_collation import Row, faults
 
 _CLASSES = (
     *words("class"), Column("entries"), Column("flags"), Column("two-term"), Column("four-term"),
@@ -166,3 +168,101 @@ def _texts_of(places: Iterable[Place]) -> list[str]:
 def _named(name: str, texts: Iterable[str]) -> list[str]:
     lines = [line for text in texts for line in textwrap.wrap(text, _HALF - 6)]
     return [f"{name if not k else '':6s}{line}" for k, line in enumerate(lines)]
+
+
+_SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
+_COLUMNS = (
+    Column("step", left=True), *words("in decks thesis"), Column("why", left=True, fit="wrap"),
+)  # fmt: skip
+
+
+def collation_report(found: Sequence[Row]) -> Report:
+    """Return the report of the agreement of decks and thesis, operation by operation."""
+    told = faults([*found])
+    rows = [
+        [
+            row.what, "".join(_SHORT[program] for program in row.cards) or "-", row.decks,
+            row.thesis, _why(row),
+        ]
+        for row in found
+    ]  # fmt: skip
+    legend = (
+        "in: the decks that have the step, 2 two-term, 4 four-term, R runge-kutta. decks: whether "
+        "their statements agree, differ in names or in order alone, or differ. thesis: whether "
+        "sections II to V agree with the decks, differ, or are silent. why: entries of the "
+        "apparatus (`defects NAME`), and what else explains it."
+    )
+    full = [
+        [row.what, *(row.cards.get(program, "") for program in PROGRAMS), row.decks, row.text,
+         row.says, row.thesis, " ".join(row.entries), row.reason]
+        for row in found
+    ]  # fmt: skip
+    end = "nothing is unexplained" if not told else f"{len(told)} unexplained"
+    names = "step two-term four-term runge-kutta decks text says thesis entries reason"
+    return Report(
+        "cards",
+        [[legend], [Table(_COLUMNS, rows)], told, [f"{counted(len(found), 'step')}: {end}"]],
+        record=lambda: {"steps": [row._asdict() for row in found], "unexplained": told},
+        data=columns(names, full),
+    )
+
+
+def _why(row: Row) -> str:
+    return "; ".join(each for each in (", ".join(row.entries), row.reason) if each) or "-"
+
+
+_SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
+_COLUMNS = (
+    *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
+)  # fmt: skip
+
+
+def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
+    """Return the report of disagreements, their origins, and mistakes in the table."""
+    rows = [
+        [
+            each.id, "".join(_SHORT[program] for program in each.cards) or "-",
+            ", ".join(each.equations) or "-", each.origin, each.certainty,
+            ", ".join(each.entries) or "-",
+        ]
+        for each in found
+    ]  # fmt: skip
+    legend = (
+        "in: the decks whose cards are quoted, 2 two-term, 4 four-term, R runge-kutta. equation: "
+        "numbers of the formulas of the thesis. origin: kind of origin that we infer, as listed "
+        "below. certainty: of this inference. entries: of the apparatus (`defects NAME`)."
+    )
+    full = [
+        [each.id, each.title, " ".join(each.equations), each.where, each.says,
+         *(" ".join(map(str, each.cards.get(program, ()))) for program in PROGRAMS),
+         each.differs, each.known, each.suggests, each.origin, each.certainty,
+         " ".join(each.entries), each.unnoticed]
+        for each in found
+    ]  # fmt: skip
+    names = (
+        "disagreement title equations where says two-term four-term runge-kutta differs known "
+        "suggests origin certainty entries unnoticed"
+    )
+    kinds = [Field(f"{name:16s}", text) for name, text in origins().items()]
+    left = [f"not explained: {name}" for name in unexplained_defects()]
+    return Report(
+        "cards",
+        [
+            [legend], [Table(_COLUMNS, rows)], kinds,
+            [*left, *mistakes, counted(len(found), "disagreement")],
+        ],
+        record=lambda: {
+            "disagreements": [
+                {
+                    **each._asdict(),
+                    "cards": {
+                        program: {str(number): text for number, text in quotes.items()}
+                        for program, quotes in each.cards.items()
+                    },
+                }
+                for each in found
+            ],
+            "unexplained": [*unexplained_defects(), *mistakes],
+        },
+        data=columns(names, full),
+    )  # fmt: skip

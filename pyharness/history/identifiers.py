@@ -1,20 +1,27 @@
-"""Software Heritage identifiers (SWHIDs) of files, folders and cards, computed offline.
+"""Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
 
-A SWHID (ISO/IEC 18670) is git's SHA-1 hash of the content, as a blob or tree. Anyone can recompute
-it from the content, and the archive finds a copy by it.
+A SWHID (ISO/IEC 18670) of a file, a folder or a card is git's SHA-1 hash of the content, as a blob
+or tree. Anyone can recompute it from the content, and the archive finds a copy by it.
 """
 
-from collections.abc import Collection, Mapping
+import json
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
-from hashlib import sha1
+from hashlib import sha1, sha256
 from pathlib import Path
+from typing import Any
 
-from pyharness.model.facts import SHIPPED, facts_folder, shipped
+from pyharness.model.facts import SHIPPED, facts, facts_folder, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import PORT, Card, port_file
 
 DATA = "pyharness/data"
 """The path of the edition's data in the source repository."""
+TABLES = (*(f"cards/{program}" for program in PROGRAMS), "apparatus")
+"""The tables in `data` that make up the edition's text, without the suffix `.toml`.
+
+They are the cards of each program with the scan's variants, and the apparatus.
+"""
 
 
 def content_identifier(content: bytes) -> str:
@@ -97,3 +104,13 @@ def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
     entries.sort(key=lambda entry: entry[0].encode())
     body = b"".join(f"{mode} {name}\0".encode() + hashed for _, mode, name, hashed in entries)
     return _hash("tree", body)
+
+
+def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
+    """Return a digest of the cards and the apparatus, which identifies their text in citations.
+
+    It is 12 hexadecimal digits of the SHA-256 of `TABLES`, without comments.
+    """
+    told = {name: table(name) for name in TABLES}
+    text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    return sha256(text.encode()).hexdigest()[:12]

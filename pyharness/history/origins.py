@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any, NamedTuple
 
-from pyharness.history.tei_header import CERTAINTY
+from pyharness.history.tei import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck, numbers, tight

@@ -11,28 +11,23 @@ Cards are in order. To restore the scan, take the pages in the order of `n`, eac
 its `lem`, and the lines of cards, `fw` and `surplus`.
 """
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import Any
 from xml.etree import ElementTree as xml
 
-from pyharness.history.tei_header import (
-    CERTAINTY,
-    EDITORS,
-    XML,
-    add_header,
-    class_of,
-    named,
-    sources,
-    with_text,
-)
+import pyharness
+from pyharness.history.timeline import Revision, revisions
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import Card, Place, deck, numbers, parallels
+from pyharness.thesis.cards import Card, deck, numbers, parallels
 
 SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/tei_all.rng"
 """The schema of the document, of version 4.12.0 of the TEI guidelines."""
-
-_RESPONSIBLE = f"#{EDITORS}"
+TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
+AUTHOR = "Richard Jacobs"
+_XML = "{http://www.w3.org/XML/1998/namespace}"
+_EDITORS = "editors"  # the XML identifier of the edition's editors
+_RESPONSIBLE = f"#{_EDITORS}"
 _HEAD = (
     '<?xml version="1.0" encoding="utf-8"?>\n'
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
@@ -41,31 +36,36 @@ _HEAD = (
 # The fields of an apparatus entry in the document.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
+KINDS = {
+    "defect": "a fault of the author, kept in the text",
+    "reading": "the reading that is not adopted, where the scan leaves two open",
+    "conjecture": "what is assumed where no card exists",
+    "misreading": "characters or numbers that the scan has wrong",
+    "normalization": "a name made uniform, where that of the scan is legal and computes the same",
+    "redundant": "cards that compute what is known already, or what no result needs",
+    "unread": "what is set or declared, and read by no card",
+    "unreachable": "the aim of a jump that no card makes",
+    "missing text": "cards or pages that the scan or the report does not have",
+    "dialect": "what only the FORTRAN of the machine explains",
+}
+"""The kinds of apparatus entries, with their contents."""
 
-class _Page(NamedTuple):
-    """A page of the scan; `moved` explains an unexpected place, or is None."""
-
-    number: int
-    lines: list[Any]
-    moved: str | None
-
-    @property
-    def first(self) -> int:
-        return min(n for each in self.lines if isinstance(each, str) for n in numbers(each))
+CERTAINTY = {"certain": "high", "probable": "medium", "conjecture": "low", "undecidable": "unknown"}
+"""The degrees of certainty in the apparatus, with the values of `cert` in TEI."""
 
 
 def tei_document() -> bytes:
     """Return the cards and the apparatus as a TEI document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
-    root.set(XML + "lang", "en")
-    add_header(root)
-    text = xml.SubElement(root, "text")
-    body = xml.SubElement(text, "body")
+    root.set(_XML + "lang", "en")
+    _write_header(_add(root, "teiHeader"))
+    text = _add(root, "text")
+    body = _add(text, "body")
     blocks = [block for program in PROGRAMS for block in _deck(body, program)]
-    back = xml.SubElement(text, "back")
-    _apparatus(named(back, "div", type="apparatus"))
-    _places(named(back, "div", type="places"))
-    _bibliography(named(back, "div", type="bibliography"))
+    back = _add(text, "back")
+    _write_apparatus(_add(back, "div", type="apparatus"))
+    _write_places(_add(back, "div", type="places"))
+    _write_bibliography(_add(back, "div", type="bibliography"))
     # Indentation adds blanks, which are significant in cards; these are therefore filled in later.
     xml.indent(root)
     for block, card in blocks:
@@ -73,16 +73,133 @@ def tei_document() -> bytes:
     return (_HEAD + xml.tostring(root, "unicode") + "\n").encode()
 
 
+def _add(
+    parent: xml.Element, tag: str, text: str | None = None, id: str | None = None, **more: str
+) -> xml.Element:
+    """Return an element appended to a parent, with a text, an identifier and attributes."""
+    element = xml.SubElement(parent, tag, {} if id is None else {_XML + "id": id}, **more)
+    element.text = text
+    return element
+
+
+def _write_header(header: xml.Element) -> None:
+    edition, scan = facts("edition"), facts("cards/scan")
+    file = _add(header, "fileDesc")
+    titles = _add(file, "titleStmt")
+    _add(titles, "title", f"{TITLE}: the three programs of the appendix, with an apparatus")
+    _add(titles, "author", AUTHOR)
+    responsible = _add(titles, "respStmt", id=_EDITORS)
+    for name in edition["editors"]:
+        _add(responsible, "name", name)
+    _add(responsible, "resp", edition["responsibility"])
+    version = pyharness.__version__
+    _add(_add(file, "editionStmt"), "edition", f"pyharness {version}", n=version)
+    publication = _add(file, "publicationStmt")
+    _add(publication, "publisher", edition["publisher"])
+    released = edition["released"].get(version, "") or "no date"
+    when = {"when": released} if released[:1].isdigit() else {}
+    _add(publication, "date", released, **when)
+    available, rights = _add(publication, "availability"), edition["rights"]
+    licence = f"The edition: {rights['licence']}"
+    _add(available, "licence", licence, target=rights["licence_address"])
+    _add(available, "p", rights["edition"])
+    said = _add(available, "p", f"{rights['status']} {rights['where']}: ")
+    _add(said, "quote", rights["says"], source="#S.text")
+    source = _add(file, "sourceDesc")
+    printed = _add(source, "bibl", id="report")
+    _add(printed, "author", AUTHOR)
+    _add(printed, "title", TITLE)
+    _add(printed, "publisher", "AFWAL")
+    _add(printed, "date", "March 1982", when="1982-03")
+    _add(printed, "biblScope", "appendix", unit="section")
+    _write_witnesses(_add(source, "listWit"), scan["witness"], edition["witness"])
+    _write_encoding(_add(header, "encodingDesc"), scan)
+    described = _add(header, "revisionDesc")
+    for revision in revisions():
+        change = _add(
+            described, "change", f"{revision.what} ", when=revision.date, who=_RESPONSIBLE,
+            target=" ".join(_changed(revision)),
+        )  # fmt: skip
+        if revision.digest:
+            _add(change, "idno", revision.digest, type="text-digest")
+
+
+def _write_witnesses(found: xml.Element, given: list[dict[str, str]], scan: dict[str, str]) -> None:
+    for each in given:
+        witness = _add(found, "witness", each["what"], each["siglum"])
+        described = _add(witness, "bibl")
+        _add(described, "title", scan["title"])
+        _add(described, "idno", each["sha256"], type="SHA-256")
+        _add(described, "note", scan["medium"], type="medium")
+        for part in ("text", "appendix"):
+            _add(described, "biblScope", scan[part], f"{each['siglum']}.{part}", unit="part")
+        _add(described, "note", scan["state"], type="state")
+
+
+def _write_encoding(encoding: xml.Element, scan: dict[str, Any]) -> None:
+    declared = _add(encoding, "editorialDecl")
+    principles = scan["principles"]
+    for paragraph in (
+        f"Kept: {principles['kept']}.",
+        "A line of the listing is the number of a card, a dash, and its text: the num and the seg "
+        "of an ab. The columns of seg are those of the card.",
+        "The attribute wit names the witness of a variant, which is the scan alone. The attribute "
+        "source of an entry names the part of the scan from which the entry is known. The grounds "
+        "on which an entry is decided are categories in its attribute ana, and no witnesses.",
+    ):
+        _add(declared, "p", paragraph)
+    correction = _add(declared, "correction", method="markup")
+    _add(correction, "p", f"Emended: {principles['emended']}.")
+    _add(correction, "p", f"Conjectured: {principles['conjectured']}.")
+    normalization = _add(declared, "normalization", method="markup")
+    _add(normalization, "p", f"Normalized: {principles['normalized']}.")
+    _add(encoding, "variantEncoding", method="parallel-segmentation", location="internal")
+    classes = _add(encoding, "classDecl")
+    grounds = {each["siglum"]: each["what"] for each in scan["ground"]}
+    for name, described, categories in (
+        ("kind", "kinds of entries", KINDS),
+        ("certainty", "how sure an entry is, and its value of cert", CERTAINTY),
+        ("ground", "grounds of an entry, no witnesses of the text", grounds),
+    ):
+        taxonomy = _add(classes, "taxonomy", id=name)
+        _add(taxonomy, "desc", described)
+        for each, what in categories.items():
+            category = _add(taxonomy, "category", id=_class_of(name, each))
+            _add(category, "catDesc", f"{each}: {what}")
+
+
+def _class_of(taxonomy: str, name: str) -> str:
+    """Return the XML identifier of a category in a taxonomy, as in ``kind.missing-text``."""
+    return f"{taxonomy}.{name.replace(' ', '-')}"
+
+
+def _changed(revision: Revision) -> Iterator[str]:
+    """Yield pointers to a revision's added or changed elements that still exist."""
+    present = {entry["id"] for entry in facts("apparatus")["entry"]}
+    yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)
+    for program, cards in revision.cards.items():
+        changed = numbers(cards)
+        if changed == list(deck(program).cards):
+            yield f"#{program}"
+        else:
+            yield from (f"#{program}.{number}" for number in changed)
+
+
 def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]:
-    div = named(body, "div", program, type="deck")
-    with_text(div, "head", f"The {program} program")
+    div = _add(body, "div", id=program, type="deck")
+    _add(div, "head", f"The {program} program")
     cards = deck(program).cards
     lost = [n for n, card in cards.items() if card.lost]
-    for page in sorted(_pages(program), key=lambda each: each.first):
-        begin = xml.SubElement(div, "pb", n=str(page.number), edRef="#S")
-        if page.moved:
-            begin.set("corresp", f"#{page.moved}")
-        for item in page.lines:
+    pages = [
+        (place, page)
+        for place, page in enumerate(facts("cards/scan")["page"], 1)
+        if page["program"] == program
+    ]
+    for place, page in sorted(pages, key=lambda each: _first_card(each[1]["lines"])):
+        begin = _add(div, "pb", n=str(place), edRef="#S")
+        if "moved" in page:  # the entry that explains an unexpected place
+            begin.set("corresp", f"#{page['moved']}")
+        for item in page["lines"]:
             if isinstance(item, str):
                 for number in numbers(item):
                     # A lost card, which is on no page, precedes the next card on a page.
@@ -91,79 +208,72 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
                         yield _block(div, card), card
                     yield _block(div, cards[number]), cards[number]
             elif "furniture" in item:
-                with_text(div, "fw", item["furniture"], type="furniture")
+                _add(div, "fw", item["furniture"], type="furniture")
             else:
-                line = xml.SubElement(div, "ab", type="phantom", corresp=f"#{item['entry']}")
-                with_text(line, "surplus", item["phantom"])
+                line = _add(div, "ab", type="phantom", corresp=f"#{item['entry']}")
+                _add(line, "surplus", item["phantom"])
 
 
-def _pages(program: str) -> list[_Page]:
-    return [
-        _Page(place, page["lines"], page.get("moved"))
-        for place, page in enumerate(facts("cards/scan")["page"], 1)
-        if page["program"] == program
-    ]
+def _first_card(lines: Iterable[Any]) -> int:
+    return min(n for each in lines if isinstance(each, str) for n in numbers(each))
 
 
 def _block(div: xml.Element, card: Card) -> xml.Element:
     kind = deck(card.program).statement_kind(card)
-    block = named(div, "ab", _id(card), type="card", subtype=kind, n=str(card.number))
+    block = _add(div, "ab", id=_id(card), type="card", subtype=kind, n=str(card.number))
     if beside := parallels(card):
         block.set("corresp", " ".join(f"#{_id(each)}" for each in beside))
     return block
 
 
 def _fill(block: xml.Element, card: Card) -> None:
-    block.set(XML + "space", "preserve")
+    block.set(_XML + "space", "preserve")
     if card.lost:
-        where = {
-            "reason": "lost",
-            "corresp": f"#{card.lost}",
-            "cert": _cert(card.lost),
-            "resp": _RESPONSIBLE,
-        }
-        block = xml.SubElement(block, "supplied", where)
-    number = xml.SubElement(block, "num")
+        block = _add(
+            block, "supplied", reason="lost", corresp=f"#{card.lost}", cert=_cert(card.lost),
+            resp=_RESPONSIBLE,
+        )  # fmt: skip
+    number = _add(block, "num")
     if card.printed:
-        _app(number, str(card.number), *card.printed)
+        _write_variant(number, str(card.number), *card.printed)
     else:
         number.text = str(card.number)
-    text = xml.SubElement(block, "seg")
+    text = _add(block, "seg")
     before: xml.Element | None = None
     for passage, difference in card.passages():
-        if difference is None:
-            if before is None:
-                text.text = passage
-            else:
-                before.tail = passage
+        if difference is not None:
+            before = _write_variant(text, passage, difference.scans, difference.entry)
+        elif before is None:
+            text.text = passage
         else:
-            before = _app(text, passage, difference.scans, difference.entry)
+            before.tail = passage
 
 
-def _app(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:
-    app = xml.SubElement(
-        parent, "app", corresp=f"#{entry}", resp=_RESPONSIBLE, source="#S.appendix"
-    )
-    with_text(app, "lem", ours, cert=_cert(entry))
-    with_text(app, "rdg", scans, wit="#S")
+def _write_variant(parent: xml.Element, ours: str, scans: str, entry: str) -> xml.Element:
+    app = _add(parent, "app", corresp=f"#{entry}", resp=_RESPONSIBLE, source="#S.appendix")
+    _add(app, "lem", ours, cert=_cert(entry))
+    _add(app, "rdg", scans, wit="#S")
     return app
 
 
-def _apparatus(div: xml.Element) -> None:
-    with_text(div, "head", "The apparatus")
+def _write_apparatus(div: xml.Element) -> None:
+    _add(div, "head", "The apparatus")
     for entry in facts("apparatus")["entry"]:
-        classes = [class_of("kind", entry["kind"]), class_of("certainty", entry["certainty"])]
-        classes += [class_of("ground", siglum) for siglum in entry["grounds"]]
+        classes = [_class_of("kind", entry["kind"]), _class_of("certainty", entry["certainty"])]
+        classes += [_class_of("ground", siglum) for siglum in entry["grounds"]]
         ana = " ".join(f"#{each}" for each in classes)
-        note = named(div, "note", entry["id"], type="entry", ana=ana)
-        note.set("resp", _RESPONSIBLE)
-        note.set("source", sources(entry))
+        note = _add(div, "note", id=entry["id"], type="entry", ana=ana, resp=_RESPONSIBLE)
+        # The text is a source of an entry based on it or on results, or that names no card.
+        parts = ["appendix"] if entry["cards"] else []
+        if not parts or {"T", "R"} & set(entry["grounds"]):
+            parts.append("text")
+        note.set("source", " ".join(f"#S.{part}" for part in parts))
         if entry["programs"]:
             note.set("target", " ".join(f"#{each}" for each in _targets(entry)))
         for name in _TOLD:
             if name in entry:
-                with_text(note, "seg", entry[name], type=name)
-        xml.SubElement(note, "certainty", locus="value", cert=CERTAINTY[entry["certainty"]])
+                _add(note, "seg", entry[name], type=name)
+        _add(note, "certainty", locus="value", cert=CERTAINTY[entry["certainty"]])
 
 
 def _targets(entry: dict[str, Any]) -> Iterator[str]:
@@ -173,37 +283,32 @@ def _targets(entry: dict[str, Any]) -> Iterator[str]:
         yield from (_id(cards[n]) for n in named) if named else (program,)
 
 
-def _places(div: xml.Element) -> None:
-    with_text(div, "head", "Where the cards stand in the port and in the twin")
+def _write_places(div: xml.Element) -> None:
+    _add(div, "head", "Where the cards stand in the port and in the twin")
     for program in PROGRAMS:
         found = deck(program)
         for number, card in found.cards.items():
+            target = f"#{_id(card)}"
             for kind, places in (("port", found.port), ("twin", found.twin)):
                 for place in places.get(number, ()):
-                    _write_place(
-                        xml.SubElement(div, "note", type=kind, target=f"#{_id(card)}"), place
-                    )
+                    cited = _add(_add(div, "note", type=kind, target=target), "cit")
+                    _add(cited, "quote", place.text)
+                    where = _add(cited, "bibl")
+                    _add(where, "title", place.file)
+                    _add(where, "biblScope", str(place.line), unit="line")
             if number in found.absent:
-                with_text(div, "note", found.absent[number], type="absent", target=f"#{_id(card)}")
+                _add(div, "note", found.absent[number], type="absent", target=target)
 
 
-def _write_place(note: xml.Element, place: Place) -> None:
-    cited = xml.SubElement(note, "cit")
-    with_text(cited, "quote", place.text)
-    where = xml.SubElement(cited, "bibl")
-    with_text(where, "title", place.file)
-    with_text(where, "biblScope", str(place.line), unit="line")
-
-
-def _bibliography(div: xml.Element) -> None:
-    with_text(div, "head", "Works cited")
-    works = xml.SubElement(div, "listBibl")
+def _write_bibliography(div: xml.Element) -> None:
+    _add(div, "head", "Works cited")
+    works = _add(div, "listBibl")
     for each in facts("edition")["work"]:
-        work = named(works, "bibl", f"work.{each['id']}")
-        with_text(work, "author", each["author"])
-        with_text(work, "title", each["title"])
-        with_text(work, "note", each["imprint"], type="imprint")
-        with_text(work, "note", each["use"], type="use")
+        work = _add(works, "bibl", id=f"work.{each['id']}")
+        _add(work, "author", each["author"])
+        _add(work, "title", each["title"])
+        _add(work, "note", each["imprint"], type="imprint")
+        _add(work, "note", each["use"], type="use")
 
 
 def _id(card: Card) -> str:

@@ -1,5 +1,9 @@
-"""The dates of the thesis in `data/timeline.toml`, with their sources."""
+"""The dates of the thesis, with their sources, and the history of the edition's text.
 
+They are in `data/timeline.toml` and `data/revisions.toml`.
+"""
+
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from pyharness.model.facts import facts
@@ -10,6 +14,8 @@ CERTAINTIES = {
     "unknown": "no source dates the event",
 }
 """The degrees of certainty of a date, with their meanings."""
+CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "removed entries"}
+"""The fields of a revision that name apparatus entries, with their headings."""
 _MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
     *("July", "August", "September", "October", "November", "December"),
@@ -72,3 +78,27 @@ def gaps() -> tuple[Gap, ...]:
 def _in_words(month: str) -> str:
     year, number = month.split("-")
     return f"{_MONTHS[int(number) - 1]} {year}"
+
+
+class Revision(NamedTuple):
+    """A change of the edition's text: the cards and the apparatus.
+
+    `digest` identifies the text after the change, and is empty if the cards were not yet data.
+    `cards` has numbers by program, as in ``750-770, 800``.
+    """
+
+    date: str
+    what: str
+    digest: str = ""
+    added: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    cards: Mapping[str, str] = {}
+
+
+def revisions() -> tuple[Revision, ...]:
+    """Return the revisions, newest first."""
+    return tuple(
+        Revision(**row | {name: tuple(row[name]) for name in CHANGES if name in row})
+        for row in facts("revisions")["revision"]
+    )

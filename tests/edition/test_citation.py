@@ -7,8 +7,7 @@ import pytest
 
 from pyharness.edition import citation
 from pyharness.edition.citation import bibtex, codemeta, linked_data, release_date
-from pyharness.history.identifiers import DATA, data_identifier
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import DATA, data_identifier, text_digest
 from pyharness.model.facts import facts, shipped
 from tests.edition.pages import pages
 

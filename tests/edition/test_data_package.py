@@ -26,12 +26,11 @@ from pyharness.history import identifiers
 from pyharness.history.ablation import entries
 from pyharness.history.claims.report import KINDS
 from pyharness.history.figures import plans
-from pyharness.history.identifiers import content_identifier, directory_identifier
+from pyharness.history.identifiers import content_identifier, directory_identifier, text_digest
 from pyharness.history.listing_output import fits, read_page
 from pyharness.history.printed_page import main as judge
 from pyharness.history.printed_page import stored_fits
 from pyharness.history.tei import tei_document
-from pyharness.history.text_digest import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.programs import WORD_NAMES

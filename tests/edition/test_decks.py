@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from pyharness.edition import decks, parallel_decks
-from pyharness.history.text_digest import text_digest
+from pyharness.history.identifiers import text_digest
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
 from pyharness.thesis.cards import deck, numbers, tight

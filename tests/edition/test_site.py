@@ -14,7 +14,7 @@ from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import claims, judgements
 from pyharness.history.claims.report import kinds_table
-from pyharness.history.claims.sentences import sentences
+from pyharness.history.claims.stories import sentences
 from pyharness.history.origins import disagreements
 from pyharness.history.timeline import timeline
 from pyharness.model.facts import facts, shipped

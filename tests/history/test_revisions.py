@@ -5,9 +5,9 @@ from datetime import date
 from xml.etree import ElementTree as xml
 
 from docs.text.page import text_page
-from pyharness.history.revisions import CHANGES, revisions
+from pyharness.history.identifiers import text_digest
 from pyharness.history.tei import tei_document
-from pyharness.history.text_digest import text_digest
+from pyharness.history.timeline import CHANGES, revisions
 from pyharness.model.facts import facts
 from pyharness.thesis.cards import deck, numbers
 

@@ -10,7 +10,7 @@ import pytest
 from pyharness.cli.main import VERBS, main
 from pyharness.cli.parser import Parser
 from pyharness.history.claims.ledger import claims
-from pyharness.history.claims.sentences import Sentence, sentences
+from pyharness.history.claims.stories import Sentence, sentences
 from tests.conftest import Printed
 
 SENTENCES = sentences()

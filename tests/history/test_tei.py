@@ -17,8 +17,7 @@ from lxml import etree
 import pyharness
 from pyharness.cli.main import main
 from pyharness.history.cards_report import card_record
-from pyharness.history.tei import SCHEMA, tei_document
-from pyharness.history.tei_header import AUTHOR, TITLE
+from pyharness.history.tei import AUTHOR, SCHEMA, TITLE, tei_document
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import chosen, tight

@@ -9,8 +9,8 @@ from unittest.mock import Mock
 
 import pytest
 
+from pyharness.history.identifiers import TABLES, text_digest
 from pyharness.history.tei import tei_document
-from pyharness.history.text_digest import TABLES, text_digest
 from pyharness.model.facts import facts, shipped
 from pyharness.thesis import cards
 from tests.conftest import Printed

@@ -5,10 +5,14 @@ from hashlib import sha256
 from typing import Any
 
 from pyharness.cli import options as shared
-from pyharness.history.cards_report import cards_report, classes_report, scan_report
-from pyharness.history.collation_report import collation_report
+from pyharness.history.cards_report import (
+    cards_report,
+    classes_report,
+    collation_report,
+    origins_report,
+    scan_report,
+)
 from pyharness.history.origins import disagreements, mistakes
-from pyharness.history.origins_report import origins_report
 from pyharness.history.second_reading import second_reading_report
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input

@@ -1,6 +1,7 @@
-"""Each claim of the thesis as a story of three sentences, with computed numbers.
+"""The sentences of the thesis with their claims, and each claim as a story of three sentences.
 
-The sentences are in `data/claims.toml`. Their fields are replaced by numbers of our verdict.
+The sentences of stories are in `data/claims.toml`. Their fields are replaced by numbers of our
+verdict.
 """
 
 import re
@@ -8,6 +9,7 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from pyharness.history.claims.ledger import Judgement
+from pyharness.model.facts import facts
 
 FIELD = re.compile(r"\{(original|corrected): (?:(min|max) of )?(.+?)( in %)?\}")
 """The pattern of a field, as in ``{original: max of case *: gain in %}``.
@@ -57,3 +59,28 @@ def prose(x: float, digits: int = 3) -> str:
 def power_of_ten(exponent: int) -> str:
     """Return a power of ten as text, with the exponent in superscript digits."""
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+class Sentence(NamedTuple):
+    """A sentence of the thesis with its claims; fields that do not apply are empty.
+
+    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` tells why a
+    sentence has no claims. `laboratory` is the run that shows it best, as in
+    ``case=2&program=two-term``. `command` is one that shows more than `claims --explain`.
+    """
+
+    where: str
+    quote: str
+    text: str
+    claims: tuple[str, ...] = ()
+    why: str = ""
+    laboratory: str = ""
+    command: str = ""
+
+
+def sentences() -> tuple[Sentence, ...]:
+    """Return the sentences of sections V and VI of the thesis, in order."""
+    return tuple(
+        Sentence(**{**row, "claims": tuple(row.get("claims", ()))})
+        for row in facts("sentences")["sentence"]
+    )

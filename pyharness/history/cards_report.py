@@ -1,4 +1,4 @@
-"""The reports of `cards`: each card with its lines in scan, Fortran port and twin."""
+"""The reports of `cards`: cards with their lines in scan, port and twin, and comparisons."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, counted, words
 from pyharness.model.report import numbers as columns
-from pyharness.thesis.cards import Card, Place, deck, parallels
+from pyharness.thesis.cards import Card, deck, parallels
 from pyharness.thesis.cards import numbers as cards_named
 from pyharness.thesis.deck_collation import Row, faults
 
@@ -19,7 +19,13 @@ _CLASSES = (
     *words("class"), Column("entries"), Column("flags"), Column("two-term"), Column("four-term"),
     Column("runge-kutta"), Column("places"),
 )  # fmt: skip
-_CLASSES_NAMES = [each.head for each in _CLASSES]
+_STEPS = (
+    Column("step", left=True), *words("in decks thesis"), Column("why", left=True, fit="wrap"),
+)  # fmt: skip
+_DISAGREEMENTS = (
+    *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
+)  # fmt: skip
+_SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
 _HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
@@ -126,7 +132,7 @@ def classes_report() -> Report:
             [f"{len(entries)} entries: {told}; text {text_digest()}"],
         ],
         record=lambda: {
-            "classes": [dict(zip(_CLASSES_NAMES, row, strict=True)) for row in rows],
+            "classes": [dict(zip(table.in_full()[0], row, strict=True)) for row in rows],
             "certainty": dict(sure), "witnesses": edition["witness"],
             "grounds": edition["ground"],
             "principles": edition["principles"], "text": text_digest(),
@@ -142,16 +148,17 @@ def _block(card: Card) -> Section:
     absent = found.absent.get(card.number)
     missing = "-" if absent is None else f"none: {absent}"
     left = [*_named("card", [ours]), *_named("scan", [shown])]
-    right = [
-        *_named("port", _texts_of(found.port.get(card.number, [])) or [missing]),
-        *_named("twin", _texts_of(found.twin.get(card.number, [])) or [missing]),
-    ]
+    right = []
+    for name, places in (("port", found.port), ("twin", found.twin)):
+        texts = [f"{file}:{line} {text}" for file, line, text in places.get(card.number, ())]
+        right += _named(name, texts or [missing])
     pairs = zip_longest(left, right, fillvalue="")
     lines = [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
-    entries = [each for each in facts("apparatus")["entry"] if each["id"] in card.entries]
+    entries = card.entries
     told = [
         Field(f"  {each['id']}: ", f"{each['kind']}, {each['certainty']}: {each['why']}")
-        for each in entries
+        for each in facts("apparatus")["entry"]
+        if each["id"] in entries
     ]
     beside = ", ".join(each.name for each in parallels(card))
     return [
@@ -161,31 +168,19 @@ def _block(card: Card) -> Section:
     ]
 
 
-def _texts_of(places: Iterable[Place]) -> list[str]:
-    return [f"{each.file}:{each.line} {each.text}" for each in places]
-
-
 def _named(name: str, texts: Iterable[str]) -> list[str]:
     lines = [line for text in texts for line in textwrap.wrap(text, _HALF - 6)]
     return [f"{name if not k else '':6s}{line}" for k, line in enumerate(lines)]
 
 
-_SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
-_COLUMNS = (
-    Column("step", left=True), *words("in decks thesis"), Column("why", left=True, fit="wrap"),
-)  # fmt: skip
-
-
 def collation_report(found: Sequence[Row]) -> Report:
     """Return the report of the agreement of decks and thesis, operation by operation."""
     told = faults([*found])
-    rows = [
-        [
-            row.what, "".join(_SHORT[program] for program in row.cards) or "-", row.decks,
-            row.thesis, _why(row),
-        ]
-        for row in found
-    ]  # fmt: skip
+    rows = []
+    for row in found:
+        having = "".join(_SHORT[program] for program in row.cards) or "-"
+        why = "; ".join(filter(None, (", ".join(row.entries), row.reason))) or "-"
+        rows.append([row.what, having, row.decks, row.thesis, why])
     legend = (
         "in: the decks that have the step, 2 two-term, 4 four-term, R runge-kutta. decks: whether "
         "their statements agree, differ in names or in order alone, or differ. thesis: whether "
@@ -201,20 +196,10 @@ def collation_report(found: Sequence[Row]) -> Report:
     names = "step two-term four-term runge-kutta decks text says thesis entries reason"
     return Report(
         "cards",
-        [[legend], [Table(_COLUMNS, rows)], told, [f"{counted(len(found), 'step')}: {end}"]],
+        [[legend], [Table(_STEPS, rows)], told, [f"{counted(len(found), 'step')}: {end}"]],
         record=lambda: {"steps": [row._asdict() for row in found], "unexplained": told},
         data=columns(names, full),
     )
-
-
-def _why(row: Row) -> str:
-    return "; ".join(each for each in (", ".join(row.entries), row.reason) if each) or "-"
-
-
-_SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
-_COLUMNS = (
-    *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
-)  # fmt: skip
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
@@ -248,20 +233,11 @@ def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Re
     return Report(
         "cards",
         [
-            [legend], [Table(_COLUMNS, rows)], kinds,
+            [legend], [Table(_DISAGREEMENTS, rows)], kinds,
             [*left, *mistakes, counted(len(found), "disagreement")],
         ],
         record=lambda: {
-            "disagreements": [
-                {
-                    **each._asdict(),
-                    "cards": {
-                        program: {str(number): text for number, text in quotes.items()}
-                        for program, quotes in each.cards.items()
-                    },
-                }
-                for each in found
-            ],
+            "disagreements": [each._asdict() for each in found],
             "unexplained": [*unexplained_defects(), *mistakes],
         },
         data=columns(names, full),

@@ -4,7 +4,7 @@ The table `data/disagreements.toml` separates the sources' statements from our i
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -29,8 +29,8 @@ class Disagreement(NamedTuple):
 
     id: str
     title: str
-    steps: tuple[str, ...]
-    equations: tuple[str, ...]
+    steps: Sequence[str]
+    equations: Sequence[str]
     where: str
     says: str
     cards: dict[str, dict[int, str]]
@@ -39,13 +39,21 @@ class Disagreement(NamedTuple):
     suggests: str
     origin: str
     certainty: str
-    entries: tuple[str, ...]
+    entries: Sequence[str]
     unnoticed: str
 
 
 def disagreements() -> list[Disagreement]:
     """Return all disagreements in the table's order."""
-    return [_disagreement(each) for each in facts("disagreements")["disagreement"]]
+    found = []
+    for given in facts("disagreements")["disagreement"]:
+        cards = {
+            program: {int(number): text for number, text in quotes.items()}
+            for program, quotes in given["cards"].items()
+        }
+        may_lack = {"where": "", "says": "", "unnoticed": ""}
+        found.append(Disagreement(**may_lack | given | {"cards": cards}))
+    return found
 
 
 def origins() -> dict[str, str]:
@@ -136,16 +144,3 @@ def _statements(program: str, scanned_names: bool = False) -> list[str]:
     cards = (card for card in deck(program).cards.values() if not card.is_comment)
     texts = (card.text_with_scanned_names if scanned_names else card.text for card in cards)
     return [tight(text[6:]) for text in texts]
-
-
-def _disagreement(given: dict[str, Any]) -> Disagreement:
-    cards = {
-        program: {int(number): text for number, text in quotes.items()}
-        for program, quotes in given["cards"].items()
-    }
-    return Disagreement(
-        given["id"], given["title"], tuple(given["steps"]), tuple(given["equations"]),
-        given.get("where", ""), given.get("says", ""), cards, given["differs"], given["known"],
-        given["suggests"], given["origin"], given["certainty"], tuple(given["entries"]),
-        given.get("unnoticed", ""),
-    )  # fmt: skip

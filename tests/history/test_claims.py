@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyharness.history.claims import ledger, methods, theory, verdicts
+from pyharness.history.claims import ledger, methods, rules, theory, verdicts
 from pyharness.history.claims.laboratory import LITERALS, Assumptions, Laboratory, by_literals
 from pyharness.history.claims.ledger import Judgement, claim, claims, judgement, outcome
 from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
@@ -335,7 +335,7 @@ def test_judgements_by_hand() -> None:
     lab = _lab(lambda case: SimpleNamespace(omega=np.array([[0.0] * 3, [case, 0.0, 0.0]])))
     rows = ((7, 1.1, REPRODUCED), (7, 1.2, NOT_REPRODUCED), (6, 0.9, NOT_REPRODUCED))
     for case, factor, verdict in rows:
-        assert verdicts.dynamic(lab, case, factor).verdict == verdict
+        assert verdicts.judged(rules.dynamic(lab, case, factor)).verdict == verdict
 
 
 @pytest.mark.parametrize("error", [1.1e-2, 9e-3])
@@ -368,7 +368,7 @@ def test_a_verdict_survives_on_both_sides(turning: str, monkeypatch: pytest.Monk
         return SimpleNamespace(verdict=verdict)
 
     monkeypatch.setattr("pyharness.history.claims.ledger.outcome", other)
-    survivals = ledger.judge(claim("abstract-superior")).survivals
+    survivals = ledger.judgement.__wrapped__("abstract-superior").survivals
     assert survivals
     assert not any(each.survives for each in survivals)
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from pyharness.history.claims.rules import Runs, largest_error, largest_of, spread_of
+from pyharness.history.claims.rules import Runs, largest_error, largest_of
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, Triple
@@ -128,11 +128,6 @@ def distance(first: Array, second: Array) -> float:
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
-
-
-def ranges(truth: Reference) -> Array:
-    """Return the range, largest minus smallest, of each component of omega (rad/s), (3,)."""
-    return spread_of(truth.omega)
 
 
 def largest(truth: Reference) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from pyharness.history.claims import methods, theory, verdicts
+from pyharness.history.claims import methods, rules, theory, verdicts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
@@ -13,8 +13,6 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Triple
 from pyharness.thesis.programs import BINARY64
-
-_ROOMS = (verdicts, methods, theory)
 
 
 @dataclass(frozen=True)
@@ -65,32 +63,26 @@ def claim(identity: str) -> dict[str, Any]:
     return by_name[identity]
 
 
-def judge(entry: dict[str, Any], word: str = BINARY64) -> Judgement:
+@cache
+def judgement(identity: str, word: str = BINARY64) -> Judgement:
     """Return the verdicts on one claim, as adopted and with each assumption changed."""
+    entry = claim(identity)
 
-    def verdicts(entry: dict[str, Any], assumptions: Assumptions) -> tuple[Judged, Judged]:
-        programs = outcome(entry, Laboratory(True, assumptions))
-        return programs, outcome(entry, Laboratory(False, assumptions))
+    def outcomes(entry: dict[str, Any], assumptions: Assumptions) -> list[Judged]:
+        chosen = replace(assumptions, word=word)
+        return [outcome(entry, Laboratory(original, chosen)) for original in (True, False)]
 
-    programs, methods = verdicts(entry, Assumptions(word=word))
-    others = [
-        (name, verdicts(entry, replace(each, word=word))) for name, each in _alternatives(entry)
-    ]
+    programs, methods = outcomes(entry, Assumptions())
+    others = [(name, outcomes(entry, each)) for name, each in _alternatives(entry)]
     for name, changed in entry.get("otherwise", {}).items():
         other = {**entry, "parameters": {**entry["parameters"], **changed}}
-        others.append((name, verdicts(other, Assumptions(word=word))))
+        others.append((name, outcomes(other, Assumptions())))
     survivals = []
     for name, found in others:
         original, corrected = (each.verdict for each in found)
         same = (original, corrected) == (programs.verdict, methods.verdict)
         survivals.append(Survival(name, original, corrected, same))
     return Judgement(entry, programs, methods, tuple(survivals))
-
-
-@cache
-def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the judgement of the claim `identity`."""
-    return judge(claim(identity), word)
 
 
 def judgements() -> list[Judgement]:
@@ -100,9 +92,12 @@ def judgements() -> list[Judgement]:
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Return the verdict of a claim's test, for the laboratory's programs."""
-    (test,) = (vars(room)[entry["test"]] for room in _ROOMS if entry["test"] in vars(room))
-    judged: Judged = test(laboratory, **entry.get("parameters", {}))
-    return judged
+    name, parameters = entry["test"], entry.get("parameters", {})
+    for room in (verdicts, methods, theory):
+        if name in vars(room):
+            judged: Judged = vars(room)[name](laboratory, **parameters)
+            return judged
+    return verdicts.judged(vars(rules)[name](laboratory, **parameters))
 
 
 def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
@@ -115,10 +110,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
             # An original listing's conjecture is removed; any other is added.
-            conjecture, own = (
-                name.removeprefix("conjecture "),
-                Listing.original(PROGRAMS[0]).conjectures,
-            )
+            conjecture = name.removeprefix("conjecture ")
+            own = Listing.original(PROGRAMS[0]).conjectures
             told = "without" if conjecture in own else "with"
             yield f"{told} {name}", Assumptions(conjectures=own ^ {conjecture})
         else:

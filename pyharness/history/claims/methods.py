@@ -154,11 +154,6 @@ def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
     return numbers
 
 
-def small_step_runge_kutta(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that Runge-Kutta does not improve if the step size is divided by ten."""
-    return judged(rules.small_step_runge_kutta(lab, cases))
-
-
 def suffices(
     lab: Laboratory, cases: Sequence[int], terms: Sequence[int], share: float, enough: int
 ) -> Judged:

@@ -12,8 +12,7 @@ from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, c
 from pyharness.edition.machine_bundle import machine_parts
 from pyharness.edition.made_pages import table
 from pyharness.edition.package_runs import run_parts
-from pyharness.history.ablation import entries
-from pyharness.history.apparatus_report import apparatus_report
+from pyharness.history.ablation import apparatus_report, entries
 from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import claims_report
 from pyharness.history.figures import curve_numbers, findings

@@ -12,10 +12,8 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from pyharness.edition.markdown import inline
-from pyharness.history.ablation import effects_of, entries
-from pyharness.history.apparatus_report import FIELDS, entry_report
-from pyharness.history.claims.evidence import evidence
-from pyharness.history.claims.evidence_report import evidence_report
+from pyharness.history.ablation import FIELDS, effects_of, entries, entry_report
+from pyharness.history.claims.evidence import evidence, evidence_report
 from pyharness.history.claims.ledger import Judgement
 from pyharness.history.claims.report import KINDS, claims_report, kinds_table
 from pyharness.history.claims.stories import Sentence, Story, sentences, story

@@ -1,9 +1,12 @@
 """The effects of apparatus entries, such as defects, on the errors of the programs."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import string
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cache
+from itertools import zip_longest
 from typing import Any
 
 from pyharness.checks.compare.agreement import accuracy
@@ -11,12 +14,38 @@ from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, subset, switches
+from pyharness.model.records import listing_record, scene_record
+from pyharness.model.report import (
+    Column,
+    Field,
+    Line,
+    Report,
+    Section,
+    Table,
+    numbers,
+    short,
+    words,
+)
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Stop
 from pyharness.thesis.cells import subsets
 from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
+
+FIELDS = ("kind", "cards", "scan", "adopted", "certainty", "evidence", "grounds", "why")
+_ENTRIES = (*words("name kind certainty flag"), Column("what it is", left=True, fit="wrap"))
+_LISTINGS = ("original", "corrected_alone", "kept_alone", "corrected")
+_EFFECTS = words("case")
+for _a in "abcd":
+    _EFFECTS += [Column(f"w.{_a}", short, unit="rad/s"), Column(f"V.{_a}", short, unit="m/s")]
+    _EFFECTS += [Column(f"stop.{_a}")]
+_SUBSETS = (
+    *words("active"), Column("error of w", short, unit="rad/s"),
+    Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
+)  # fmt: skip
+_HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 @dataclass(frozen=True)
@@ -133,3 +162,117 @@ def _size(found: Effect) -> tuple[float, float]:
     worst = math.inf if found.ended == "overflow" else found.omega
     # Rounded to three digits, so that rounding errors do not affect the order.
     return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")
+
+
+def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
+    """Return the report of the critical apparatus, with a line for each entry."""
+    rows = [
+        [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
+        for each in entries
+    ]
+    legend = (
+        "kind: defect (a fault of the author), reading (a card that can be read in two ways), "
+        "conjecture (an assumption where no card exists), and others. flag: number of the switch "
+        "in the programs; -: no switch. `defects NAME` shows statements, evidence and effect."
+    )
+    return Report("defects", [[legend], [Table(_ENTRIES, rows)]], lambda: {"entries": entries})
+
+
+def entry_report(
+    entry: dict[str, Any], effects: Sequence[CaseEffects], names: Sequence[str] = FIELDS
+) -> Report:
+    """Return the report of one entry: the fields `names`, and a table of its `effects`, if any."""
+    cards = "; ".join(f"{program} {cards}" for program, cards in entry["cards"].items())
+    what = {each["siglum"]: each["what"] for each in facts("cards/scan")["ground"]}
+    grounds = "; ".join(f"{siglum}, {what[siglum]}" for siglum in entry["grounds"])
+    values = {**entry, "cards": cards, "grounds": grounds}
+    fields = [Field(f"{name:10s} ", values[name]) for name in names if values.get(name)]
+    text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
+    if "original" in entry:
+        text.append(_beside(entry, "original", "corrected"))
+    if effects:
+        text += _effects(effects, entry["kind"] != "defect")
+
+    def record() -> dict[str, Any]:
+        found = []
+        for each in effects:
+            under = {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
+            found.append({"program": each.program, "case": each.case, **under})
+        return {"entry": entry, "effects": found}
+
+    return Report("defects", text, record)
+
+
+def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
+    columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
+    pairs = zip_longest(*columns, fillvalue="")
+    return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
+
+
+def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
+    """Return a legend and, for each program, a table of errors by case and listing."""
+    columns = ("original", "this alone corrected", "this alone kept", "all corrected")
+    if is_reading:
+        columns = ("original, with it", "original", "corrected, with it", "corrected")
+    told: list[Section] = [
+        [
+            "Effect, measured now over 100 steps. w: largest error of the angular velocity "
+            "(rad/s); V: of the velocity (m/s); stop: variable and step that ended the run.",
+            ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
+        ]
+    ]
+    for program in dict.fromkeys(each.program for each in effects):
+        rows = []
+        for each in (each for each in effects if each.program == program):
+            row: list[Any] = [each.case]
+            for found in (getattr(each, name) for name in _LISTINGS):
+                row += [found.omega, found.velocity, _stop(found)]
+            rows.append(row)
+        told.append([program, Table(_EFFECTS, rows)])
+    return told
+
+
+def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
+    """Return the report of the outcomes with every subset of defects, which letters stand for."""
+    text: list[Section] = []
+    rows = []
+    for program, effects in found.items():
+        readings = sorted({name for each in effects for name in each.listing.readings})
+        names = (*switched(scene, program), *readings)
+        letters = dict(zip(names, string.ascii_lowercase, strict=False))
+        title = f"program {program}: every subset of its defects, sorted by effect"
+        key = [f"  {letter}  {name}" for name, letter in letters.items()]
+        subsets = []
+        for each in effects:
+            errors, active = (each.omega, each.velocity, each.steps), each.listing.active
+            written = "".join(a if name in active else "." for name, a in letters.items())
+            subsets.append([written, *errors, _stop(each)])
+            variable = each.stop.variable if each.stop else None
+            rows.append([program, " ".join(sorted(active)), *errors, each.ended, variable])
+        text += [[*heading(scene), title, *key], [Table(_SUBSETS, subsets)]]
+    return Report(
+        "compare",
+        text,
+        record=lambda: {
+            "scene": scene_record(scene),
+            "lattice": {name: list(map(_effect_record, each)) for name, each in found.items()},
+        },
+        data=numbers("program active error_w error_v steps ended stop_variable", rows),
+    )
+
+
+def _effect_record(effect: Effect) -> dict[str, Any]:
+    return {
+        "listing": listing_record(effect.listing),
+        "error": effect.omega,
+        "velocity_error": effect.velocity,
+        "steps": effect.steps,
+        "ended": effect.ended,
+        "stop": None if effect.stop is None else asdict(effect.stop),
+    }
+
+
+def _stop(found: Effect) -> str:
+    if found.stop is not None:
+        return f"{found.stop.variable}@{found.stop.step}"
+    return f"ovf@{found.steps}" if found.ended == "overflow" else "-"

@@ -5,12 +5,15 @@ compared with the page in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
+from pyharness.model.records import build_record
+from pyharness.model.report import Column, Picture, Report, Section, Table, numbers, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
@@ -20,9 +23,22 @@ from pyharness.thesis.printer import page
 from pyharness.thesis.word import RULES, Word
 from pyharness.truth.reference import reference
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
 # With 113 bits, rounding is negligible, so that the error is the method's truncation error.
 DOUBLE, WIDEST = Word(53), Word(113)
+# Multiple of the error with 113 bits above which an error counts as rounding.
+ROUNDS = 2.0
+_MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
+_SHORT = {"nearest-even": "ne", "chop": "chop", "FX": "FX", "RX": "RX"}
+_STYLES: dict[str, dict[str, Any]] = {
+    "nearest-even": {"color": "#1040a0", "linestyle": "-", "marker": "o"},
+    "chop": {"color": "#c02020", "linestyle": (0, (5, 2)), "marker": "s"},
+    "FX": {"color": "#107040", "linestyle": (0, (1, 1.2)), "marker": "^"},
+    "RX": {"color": "#a06000", "linestyle": (0, (6, 1, 1, 1)), "marker": "v"},
+}
 
 
 @dataclass(frozen=True)
@@ -128,3 +144,152 @@ def _stop(found: Trajectory) -> str:
     if found.stop is not None:
         return f"{found.stop.variable} at {found.stop.step}"
     return f"overflow at {found.steps + 1}" if found.ended == "overflow" else ""
+
+
+_FIELDS = " ".join(field.name for field in fields(WordRun))
+
+
+def words_report(cells: Sequence[WordCell]) -> Report:
+    """Return the report of `words`; all cells must have the same numbers of bits."""
+    runs = [run for cell in cells for run in cell.runs]
+    data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
+    tables: list[Section] = [
+        [
+            "Smallest precision p, in bits, from which on the printed rows (page) or the end of "
+            "the run (stop) are those of binary64; -: not up to the largest p. Rounding rules: ne "
+            "(nearest even), chop (towards zero), FX and RX (CDC, unrounded and rounded):",
+            _lengths(cells),
+        ],
+        [
+            "truncation: largest error with 113 bits (rad/s). rounding: smallest p from which on "
+            f"the error is at most {ROUNDS:g} times the truncation error. IER: largest p, with any "
+            "rule, with which LEQT1F reports IER = 129:",
+            _errors(cells),
+        ],
+    ]
+    notes: list[str] = []
+    if all(cell.find_run(p, rule) for cell in cells for _, p, rule in _MACHINE):
+        legend = (
+            "fields: numbers on the printed page, in binary64. cdc48, rounded: how many of them "
+            "differ in the CDC's arithmetic, unrounded and rounded. stop: variable and step at "
+            "which the run ended. error: largest error of w (rad/s):"
+        )
+        tables.insert(0, [legend, _machine(cells)])
+        notes = _changes(cells)
+
+    def draw() -> Picture:
+        return _picture(cells)
+
+    return Report(
+        "words",
+        text=[*tables, notes],
+        record=lambda: {"runs": [asdict(run) for run in runs], "build": build_record()},
+        data=data,
+        page=[*tables, notes],
+        pictures={"words": draw},
+    )
+
+
+def _head(cell: WordCell) -> list[Any]:
+    return [cell.double.case, cell.double.program, cell.double.listing]
+
+
+def _machine(cells: Sequence[WordCell]) -> Table:
+    columns = [Column("case"), *words("program listing"), Column("fields"), Column("stop")]
+    columns += [Column("error", short, unit="rad/s")]
+    for name, _, _ in _MACHINE:
+        columns += [
+            Column(name, name=f"{name}_different"),
+            Column("stop", name=f"{name}_stop"),
+            Column("error", short, unit="rad/s", name=f"{name}_error"),
+        ]
+    rows = []
+    for cell in cells:
+        row = [*_head(cell), cell.double.fields, cell.double.stop or "-", cell.double.error]
+        for _, p, rule in _MACHINE:
+            run = cell.find_run(p, rule)
+            assert run is not None
+            row += [run.different, "same" if run.stop == cell.double.stop else run.stop, run.error]
+        rows.append(row)
+    return Table(columns, rows)
+
+
+def _changes(cells: Sequence[WordCell]) -> list[str]:
+    told = []
+    for name, p, rule in _MACHINE:
+        found = [(cell.double, run) for cell in cells if (run := cell.find_run(p, rule))]
+        of = f"of {len(found)} runs"
+        pages = sum(run.different > 0 for _, run in found)
+        stops = sum(run.stop != double.stop for double, run in found)
+        changed = sum(run.different for _, run in found)
+        every = sum(run.fields for _, run in found)
+        told.append(
+            f"{name}: {changed} of {every} printed numbers are not those of binary64, on the pages "
+            f"of {pages} {of}; {stops} {of} end otherwise."
+        )
+    return told
+
+
+def _lengths(cells: Sequence[WordCell]) -> Table:
+    columns = [Column("case"), *words("program listing")]
+    columns += [Column(f"{what} {_SHORT[rule]}") for what in ("page", "stop") for rule in RULES]
+    rows = []
+    for cell in cells:
+        double = cell.double
+        tests: list[Callable[[WordRun], bool]] = [
+            lambda run: run.different == 0,
+            lambda run, stop=double.stop: run.stop == stop,  # type: ignore[misc]
+        ]
+        rows.append([*_head(cell), *(cell.settled(rule, test) for test in tests for rule in RULES)])
+    return Table(columns, rows)
+
+
+def _errors(cells: Sequence[WordCell]) -> Table:
+    columns = [
+        Column("case"), *words("program listing"), Column("truncation", short, unit="rad/s"),
+        *(Column(f"rounding {_SHORT[rule]}") for rule in RULES), Column("IER"),
+    ]  # fmt: skip
+    rows = []
+    for cell in cells:
+        floor = cell.widest.error
+
+        def is_truncation(run: WordRun, floor: float = floor) -> bool:
+            return run.error <= ROUNDS * floor
+
+        least = [cell.settled(rule, is_truncation) for rule in RULES]
+        singular = max((run.p for run in cell.runs if run.singular), default=None)
+        rows.append([*_head(cell), floor, *least, singular])
+    return Table(columns, rows)
+
+
+def _picture(cells: Sequence[WordCell]) -> Picture:
+    """Return a picture of the largest error of omega (rad/s) against p; dashed: with 113 bits."""
+    from matplotlib.figure import Figure
+
+    programs = list(dict.fromkeys(cell.double.program for cell in cells))
+    listings = list(dict.fromkeys(cell.double.listing for cell in cells))
+    figure = Figure(figsize=(4.4 * max(len(programs), 1.4), 7.5), dpi=110, layout="constrained")
+    axes = figure.subplots(len(listings), len(programs), sharex=True, sharey=True, squeeze=False)
+    for cell in cells:
+        row, column = listings.index(cell.double.listing), programs.index(cell.double.program)
+        _draw(axes[row, column], cell)
+        axes[row, column].set_title(f"{cell.double.program} {cell.double.listing}")
+    for place in axes[-1]:
+        place.set_xlabel("p (bits)")
+    for place in axes[:, 0]:
+        place.set_ylabel("largest error (rad/s)")
+    axes[0, 0].legend(fontsize=8)
+    runs = [list(asdict(run).values()) for cell in cells for run in cell.runs]
+    title = f"Case {cells[0].double.case}: largest error of omega against the length of the word"
+    return Picture(figure, numbers(_FIELDS, runs), (title, "dashed: the method's truncation error"))
+
+
+def _draw(axes: "Axes", cell: WordCell) -> None:
+    for rule in RULES:
+        points = sorted((run.p, run.error) for run in cell.runs if run.rule == rule)
+        lengths, errors = zip(*points, strict=True)
+        axes.plot(lengths, errors, label=rule, markersize=4.0, linewidth=1.2, **_STYLES[rule])
+    if cell.widest.error > 0.0:
+        axes.axhline(cell.widest.error, color="black", linestyle="--", linewidth=0.8)
+        axes.set_yscale("log")
+    axes.grid(visible=True, linewidth=0.3)

@@ -6,8 +6,14 @@ from dataclasses import replace
 import pytest
 
 from pyharness import Scene, case_scene
-from pyharness.history.ablation import CaseEffects, Effect, effects_of, entries, lattice
-from pyharness.history.apparatus_report import lattice_report
+from pyharness.history.ablation import (
+    CaseEffects,
+    Effect,
+    effects_of,
+    entries,
+    lattice,
+    lattice_report,
+)
 from pyharness.model.listing import Listing, flagged, names_of
 from pyharness.truth.reference import Reference
 from pyharness.views.render import render

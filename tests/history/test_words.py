@@ -12,8 +12,7 @@ from jsonschema import Draft202012Validator
 
 from pyharness.cli import options
 from pyharness.cli.main import main
-from pyharness.history.words import WordCell, WordRun, cells
-from pyharness.history.words_report import words_report
+from pyharness.history.words import WordCell, WordRun, cells, words_report
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.printer import page

@@ -55,8 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _evidence(options: argparse.Namespace) -> int:
-    from pyharness.history.claims.evidence import combinations, evidence
-    from pyharness.history.claims.evidence_report import evidence_report
+    from pyharness.history.claims.evidence import combinations, evidence, evidence_report
 
     shared.refuse(options, "--evidence", ("explain", "word"))
     shared.check_outputs(options)

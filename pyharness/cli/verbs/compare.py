@@ -108,8 +108,7 @@ def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) 
     effort = shared.chosen_effort(options)
     shared.check_outputs(options)
 
-    from pyharness.history.ablation import lattice
-    from pyharness.history.apparatus_report import lattice_report
+    from pyharness.history.ablation import lattice, lattice_report
 
     found = {}
     for program in programs:

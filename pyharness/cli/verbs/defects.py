@@ -3,8 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.ablation import effects_of, entries, entry
-from pyharness.history.apparatus_report import apparatus_report, entry_report
+from pyharness.history.ablation import apparatus_report, effects_of, entries, entry, entry_report
 from pyharness.model.report import Report
 
 FORMATS = ("table", "json")

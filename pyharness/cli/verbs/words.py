@@ -6,8 +6,7 @@ It also checks our emulation of the CDC's arithmetic by test vectors.
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.words import LENGTHS, cells
-from pyharness.history.words_report import words_report
+from pyharness.history.words import LENGTHS, cells, words_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table

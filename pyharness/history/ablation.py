@@ -1,10 +1,10 @@
-"""The effects of apparatus entries, such as defects, on the errors of the programs."""
+"""Apparatus entries, such as defects, and their effects on the errors of the programs."""
 
 import math
 import string
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import zip_longest
 from typing import Any
@@ -13,7 +13,7 @@ from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing, names_of, subset, switches
+from pyharness.model.listing import Listing, names_of, switches
 from pyharness.model.records import listing_record, scene_record
 from pyharness.model.report import (
     Column,
@@ -118,20 +118,9 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
     """
     known = entry(name)
     for program in known["programs"]:
-        first, last = Listing.original(program), Listing.corrected(program)
-        if known["kind"] == "reading":
-            listings = Listing.original(program, [name]), first, Listing(program, [name]), last
-        elif known["kind"] == "conjecture":
-            with_it, without = first.conjectures | {name}, first.conjectures - {name}
-            listings = (
-                replace(first, conjectures=with_it),
-                replace(first, conjectures=without),
-                Listing(program, [name]),
-                last,
-            )
-        else:
-            fixed = subset(program, "original", fix=[name])
-            listings = first, fixed, subset(program, "corrected", keep=[name]), last
+        printed = Listing.original(program).active
+        active = (printed | {name}, printed - {name}, {name}, ())
+        listings = [Listing(program, names) for names in active]
         for case in case_numbers():
             scene, truth = case_scene(case), case_truth(case)
             yield CaseEffects(program, case, *(effect(scene, each, truth) for each in listings))

@@ -4,17 +4,17 @@ An arithmetic is a number p of significand bits and a rounding rule. A run's pri
 compared with the page in binary64, and its omega with the reference solution.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import takewhile, zip_longest
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Picture, Report, Section, Table, numbers, short, words
-from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import in_word
@@ -41,8 +41,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class WordRun:
+class WordRun(NamedTuple):
     """A run of a program in one arithmetic, compared with binary64.
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
@@ -75,14 +74,10 @@ class WordCell:
         """Return the run with p bits and a rounding rule, or None."""
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
-    def settled(self, rule: str, same: Callable[[WordRun], bool]) -> int | None:
-        """Return the least p from which on `same` is true of every run with the rule, or None."""
-        least = None
-        for run in sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p):
-            if not same(run):
-                break
-            least = run.p
-        return least
+    def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
+        """Return the least p from which on every run with the rule is in `same`, or None."""
+        of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
+        return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 
 
 def cells(
@@ -101,43 +96,25 @@ def cells(
     ]
     every, done = len(chosen) * (len(words) + 2), 0
     for case, listing in chosen:
-        judge = _Judge(case_scene(case), listing)
-        found = []
+        scene = case_scene(case)
+        truth = reference(scene, scene.times())
+        pages, found = [], []
         for word in (DOUBLE, WIDEST, *words):
-            found.append(judge.run(word))
+            run = in_word.run(scene, listing, word)
+            lines = page(scene, listing.program, run).splitlines()
+            pages.append(" ".join(lines[len(lines) - run.steps :]).split())
+            pairs = list(zip_longest(pages[0], pages[-1]))
+            different, error = sum(x != y for x, y in pairs), max(accuracy(scene, run, truth).omega)
+            singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
+            found.append(
+                WordRun(
+                    case, listing.program, listing.label, word.p, word.rule, _stop(run),
+                    len(pairs), different, error, singular,
+                )
+            )  # fmt: skip
             done += 1
             progress(done, every, f"case {case}, {listing.program}")
         yield WordCell(found[0], found[1], tuple(found[2:]))
-
-
-class _Judge:
-    """The comparison of a program's runs with binary64 and the reference."""
-
-    def __init__(self, scene: Scene, listing: Listing) -> None:
-        self.scene, self.listing = scene, listing
-        self.truth = reference(scene, scene.times())
-        self.double = self._page(in_word.run(scene, listing, DOUBLE))
-
-    def run(self, word: Word) -> WordRun:
-        found = in_word.run(self.scene, self.listing, word)
-        pairs = list(zip_longest(self.double, self._page(found)))
-        assert self.scene.case is not None
-        return WordRun(
-            self.scene.case,
-            self.listing.program,
-            self.listing.label,
-            word.p,
-            word.rule,
-            _stop(found),
-            len(pairs),
-            sum(x != y for x, y in pairs),
-            max(accuracy(self.scene, found, self.truth).omega),
-            0 if found.ier is None else int((found.ier == SINGULAR).sum()),
-        )
-
-    def _page(self, found: Trajectory) -> list[str]:
-        lines = page(self.scene, self.listing.program, found).splitlines()
-        return " ".join(lines[len(lines) - found.steps :]).split()
 
 
 def _stop(found: Trajectory) -> str:
@@ -146,13 +123,10 @@ def _stop(found: Trajectory) -> str:
     return f"overflow at {found.steps + 1}" if found.ended == "overflow" else ""
 
 
-_FIELDS = " ".join(field.name for field in fields(WordRun))
-
-
 def words_report(cells: Sequence[WordCell]) -> Report:
     """Return the report of `words`; all cells must have the same numbers of bits."""
     runs = [run for cell in cells for run in cell.runs]
-    data = numbers(_FIELDS, [list(asdict(run).values()) for run in runs])
+    data = numbers(" ".join(WordRun._fields), runs)
     tables: list[Section] = [
         [
             "Smallest precision p, in bits, from which on the printed rows (page) or the end of "
@@ -177,16 +151,13 @@ def words_report(cells: Sequence[WordCell]) -> Report:
         tables.insert(0, [legend, _machine(cells)])
         notes = _changes(cells)
 
-    def draw() -> Picture:
-        return _picture(cells)
-
     return Report(
         "words",
         text=[*tables, notes],
-        record=lambda: {"runs": [asdict(run) for run in runs], "build": build_record()},
+        record=lambda: {"runs": [run._asdict() for run in runs], "build": build_record()},
         data=data,
         page=[*tables, notes],
-        pictures={"words": draw},
+        pictures={"words": partial(_picture, cells, data)},
     )
 
 
@@ -235,12 +206,10 @@ def _lengths(cells: Sequence[WordCell]) -> Table:
     columns += [Column(f"{what} {_SHORT[rule]}") for what in ("page", "stop") for rule in RULES]
     rows = []
     for cell in cells:
-        double = cell.double
-        tests: list[Callable[[WordRun], bool]] = [
-            lambda run: run.different == 0,
-            lambda run, stop=double.stop: run.stop == stop,  # type: ignore[misc]
-        ]
-        rows.append([*_head(cell), *(cell.settled(rule, test) for test in tests for rule in RULES)])
+        page = [run for run in cell.runs if run.different == 0]
+        stop = [run for run in cell.runs if run.stop == cell.double.stop]
+        least = (cell.settled(rule, same) for same in (page, stop) for rule in RULES)
+        rows.append([*_head(cell), *least])
     return Table(columns, rows)
 
 
@@ -252,17 +221,14 @@ def _errors(cells: Sequence[WordCell]) -> Table:
     rows = []
     for cell in cells:
         floor = cell.widest.error
-
-        def is_truncation(run: WordRun, floor: float = floor) -> bool:
-            return run.error <= ROUNDS * floor
-
-        least = [cell.settled(rule, is_truncation) for rule in RULES]
+        near = [run for run in cell.runs if run.error <= ROUNDS * floor]
+        least = [cell.settled(rule, near) for rule in RULES]
         singular = max((run.p for run in cell.runs if run.singular), default=None)
         rows.append([*_head(cell), floor, *least, singular])
     return Table(columns, rows)
 
 
-def _picture(cells: Sequence[WordCell]) -> Picture:
+def _picture(cells: Sequence[WordCell], data: Table) -> Picture:
     """Return a picture of the largest error of omega (rad/s) against p; dashed: with 113 bits."""
     from matplotlib.figure import Figure
 
@@ -279,9 +245,8 @@ def _picture(cells: Sequence[WordCell]) -> Picture:
     for place in axes[:, 0]:
         place.set_ylabel("largest error (rad/s)")
     axes[0, 0].legend(fontsize=8)
-    runs = [list(asdict(run).values()) for cell in cells for run in cell.runs]
     title = f"Case {cells[0].double.case}: largest error of omega against the length of the word"
-    return Picture(figure, numbers(_FIELDS, runs), (title, "dashed: the method's truncation error"))
+    return Picture(figure, data, (title, "dashed: the method's truncation error"))
 
 
 def _draw(axes: "Axes", cell: WordCell) -> None:

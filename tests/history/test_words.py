@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -69,9 +69,9 @@ def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
         assert run is not None
         assert run.error > 100.0 * floor
         least = 24 if rule == "nearest-even" else 28
-        assert cell.settled(rule, lambda run: run.error <= 2.0 * floor) == least
-        assert cell.settled(rule, lambda run: run.p != 28) == 48
-        assert cell.settled(rule, lambda run: run.p != 53) is None
+        assert cell.settled(rule, [run for run in cell.runs if run.error <= 2.0 * floor]) == least
+        assert cell.settled(rule, [run for run in cell.runs if run.p != 28]) == 48
+        assert cell.settled(rule, [run for run in cell.runs if run.p != 53]) is None
 
 
 def test_stops_and_singular_matrices(found: Found) -> None:
@@ -101,7 +101,7 @@ def test_pages_of_another_length_differ_in_every_number_that_is_missing(found: F
 def test_report_has_every_run(found: Found) -> None:
     cell = found[2, "runge-kutta", "original"]
     report = words_report([cell])
-    assert report.record()["runs"] == [asdict(run) for run in cell.runs]
+    assert report.record()["runs"] == [run._asdict() for run in cell.runs]
     assert report.data is not None
     assert len(csv_text(report.data).splitlines()) == 1 + len(cell.runs)
     # Without 48 bits the report has no section on the machine's own words.

@@ -6,6 +6,7 @@ The score is the number of testable claims about the original programs that are 
 reproduced in part counts one half. There are no weights or tuned parameters.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -15,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
-from pyharness.history.claims.ledger import claims, outcome
+from pyharness.history.claims.ledger import claim, claims, outcome
 from pyharness.history.claims.verdicts import IN_PART, NOT_TESTABLE, REPRODUCED
-from pyharness.model.listing import PROGRAMS, names_of
+from pyharness.model.listing import names_of
 from pyharness.model.report import (
     Column,
     Field,
@@ -29,6 +30,7 @@ from pyharness.model.report import (
     numbers,
     words,
 )
+from pyharness.thesis.cells import subsets
 
 POINTS = {REPRODUCED: 1.0, IN_PART: 0.5}
 STEPS = (100, 300)
@@ -39,6 +41,12 @@ _SHORT = {
     "omega(0)": "omega(0)", "reading c1-for-c": "C1", "reading do-variable": "DO",
     "conjecture torque-held": "held", "conjecture initial-torque": "first", "steps": "steps",
 }  # fmt: skip
+_RULE = (
+    "Every combination of starts (one for all cases in which none is given, or those adopted), "
+    "readings, conjectures and steps, scored by the claims about results and design of the "
+    "original programs: 1 for each reproduced, 1/2 in part, 0 otherwise; not testable ones do "
+    "not count. No weights: abstract-superior and vi-superior are one measure."
+)
 
 
 @dataclass(frozen=True)
@@ -61,16 +69,20 @@ class Combination:
     def choices(self) -> dict[str, str]:
         """Return the value of each choice as text, by the name of the choice."""
         given = self.assumptions
-        start = given.start or ()
+        active = given.readings | (given.conjectures or frozenset())
         return {
-            "omega(0)": ",".join(f"{x:g}" for x in start) or "adopted",
-            **{f"reading {name}": _yes_or_no(name in given.readings) for name in _names("reading")},
+            "omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted",
             **{
-                f"conjecture {name}": _yes_or_no(name in (given.conjectures or ()))
-                for name in _names("conjecture")
+                f"{kind} {name}": "yes" if name in active else "no"
+                for kind in ("reading", "conjecture")
+                for name in names_of(kind)
             },
             "steps": str(given.steps),
         }
+
+    def verdict_on(self, name: str) -> str:
+        """Return the verdict on a claim by its identifier."""
+        return self.verdicts.get(name, NOT_TESTABLE)
 
 
 def evidence() -> Iterator[Combination]:
@@ -86,32 +98,20 @@ def evidence() -> Iterator[Combination]:
         yield Combination(assumptions, verdicts)
 
 
-def evidence_rule() -> str:
-    """Return the report's explanation of the score."""
-    return (
-        "Every combination of starts (one for all cases in which none is given, or those adopted), "
-        "readings, conjectures and steps, scored by the claims about results and design of the "
-        "original programs: 1 for each reproduced, 1/2 in part, 0 otherwise; not testable ones do "
-        "not count. No weights: abstract-superior and vi-superior are one measure."
-    )
-
-
 def combinations() -> list[Assumptions]:
     """Return every combination; the start None stands for each case's adopted omega(0)."""
-    return [
-        Assumptions(start, frozenset(readings), steps, frozenset(conjectures))
-        for start, readings, conjectures, steps in product(
-            [None, *starts()], _subsets(_names("reading")), _subsets(_names("conjecture")), STEPS
-        )
-    ]
+    # The last name varies fastest.
+    readings, conjectures = (
+        list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")
+    )
+    choices = product([None, *starts()], readings, conjectures, STEPS)
+    return [Assumptions(start, chosen, steps, assumed) for start, chosen, assumed, steps in choices]
 
 
 def discriminating(found: list[Combination]) -> list[str]:
     """Return the claims whose verdict differs between combinations."""
     every = dict.fromkeys(name for each in found for name in each.verdicts)
-    return [
-        name for name in every if len({each.verdicts.get(name, NOT_TESTABLE) for each in found}) > 1
-    ]
+    return [name for name in every if len({each.verdict_on(name) for each in found}) > 1]
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
@@ -139,24 +139,7 @@ def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
 
 @cache
 def _verdict(identity: str, assumptions: Assumptions) -> str:
-    entry = next(each for each in claims() if each["id"] == identity)
-    return outcome(entry, Laboratory(True, assumptions)).verdict
-
-
-@cache
-def _names(kind: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for each in PROGRAMS for name in names_of(kind, each)))
-
-
-def _subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
-    return [
-        tuple(name for name, taken in zip(names, mask, strict=True) if taken)
-        for mask in product((False, True), repeat=len(names))
-    ]
-
-
-def _yes_or_no(chosen: bool) -> str:
-    return "yes" if chosen else "no"
+    return outcome(claim(identity), Laboratory(True, assumptions)).verdict
 
 
 def evidence_report(found: Sequence[Combination]) -> Report:
@@ -171,10 +154,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     telling = discriminating(ordered)
     spread = []
     for name in telling:
-        by_verdict = {
-            verdict: sum(_choice_of(each, name) == verdict for each in ordered)
-            for verdict in dict.fromkeys(_choice_of(each, name) for each in ordered)
-        }
+        by_verdict = Counter(each.verdict_on(name) for each in ordered)
         told = ", ".join(f"{verdict} {number}" for verdict, number in by_verdict.items())
         spread.append([name, told])
     best = ordered[0].score
@@ -186,7 +166,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     return Report(
         "claims",
         [
-            [evidence_rule()],
+            [_RULE],
             [f"Each row is one combination; reproduced: number of claims. {keys}"],
             [Table(columns, shown)],
             [f"{counted(len(telling), 'claim')} of {len(ordered[0].verdicts)} discriminate:"],
@@ -195,7 +175,7 @@ def evidence_report(found: Sequence[Combination]) -> Report:
             [Field(f"  {axis}: ", " or ".join(values)) for axis, values in open_axes.items()],
         ],
         record=lambda: {
-            "rule": evidence_rule(),
+            "rule": _RULE,
             "combinations": [
                 {**each.choices(), "score": each.score, "holding": each.holding,
                  "verdicts": each.verdicts}
@@ -209,16 +189,12 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     )  # fmt: skip
 
 
-def _choice_of(combination: Combination, name: str) -> str:
-    return combination.verdicts.get(name, NOT_TESTABLE)
-
-
 def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 8.0), dpi=110, layout="constrained")
     scores, verdicts = figure.subplots(2, 1, sharex=True, height_ratios=[1, 3])
-    points = np.array([[POINTS.get(_choice_of(e, name), 0.0) for e in ordered] for name in telling])
+    points = np.array([[POINTS.get(e.verdict_on(name), 0.0) for e in ordered] for name in telling])
     place = np.arange(1, len(ordered) + 1)
     scores.plot(place, [each.score for each in ordered], color="#1040a0", drawstyle="steps-mid")
     scores.set_ylabel("score")
@@ -232,7 +208,7 @@ def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:
     )
     axes = list(ordered[0].choices())
     rows = [
-        [k, *each.choices().values(), each.score, *(_choice_of(each, name) for name in telling)]
+        [k, *each.choices().values(), each.score, *(each.verdict_on(name) for name in telling)]
         for k, each in enumerate(ordered, 1)
     ]
     names = ["place", *(axis.replace(" ", "_") for axis in axes), "score", *telling]

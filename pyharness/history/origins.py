@@ -6,13 +6,13 @@ The table `data/disagreements.toml` separates the sources' statements from our i
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from pyharness.history.tei import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import deck, numbers, tight
-from pyharness.thesis.deck_collation import Row, rows
+from pyharness.thesis.cards import deck, tight
+from pyharness.thesis.deck_collation import Row, names_a_card, rows
 
 CERTAINTIES = tuple(CERTAINTY)
 """The degrees of certainty of an inference, as in the apparatus."""
@@ -101,7 +101,7 @@ def _of_each(found: list[Disagreement]) -> Iterator[str]:
         for name in each.entries:
             if name not in known:
                 yield f"{each.id}: no entry {name!r}"
-            elif known[name]["cards"] and not _names_a_quoted_card(known[name], each):
+            elif not names_a_card(known[name], each.cards):
                 yield f"{each.id}: {name} names none of its cards"
         if each.origin not in origins():
             yield f"{each.id}: no origin {each.origin!r}"
@@ -131,13 +131,6 @@ def _of_steps(found: list[Disagreement]) -> Iterator[str]:
 
 def _differs(row: Row) -> bool:
     return row.thesis == "differs" or row.decks in ("differ", "names", "order")
-
-
-def _names_a_quoted_card(entry: dict[str, Any], each: Disagreement) -> bool:
-    return any(
-        set(numbers(entry["cards"].get(program, ""))) & set(quotes)
-        for program, quotes in each.cards.items()
-    )
 
 
 def _statements(program: str, scanned_names: bool = False) -> list[str]:

@@ -66,7 +66,11 @@ def unexplained(scan: str) -> list[str]:
     found, wanted = [text for _, text in lines], [text for text, _ in expected]
     if len(found) == len(wanted):
         pairs = zip(lines, expected, strict=True)
-        return [_differs(n, text, *want) for (n, text), want in pairs if text != want[0]]
+        return [
+            f"line {n}, {name}: {text!r}, where the table has {want!r}"
+            for (n, text), (want, name) in pairs
+            if text != want
+        ]
     faults = []
     matcher = difflib.SequenceMatcher(None, wanted, found, autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
@@ -84,12 +88,11 @@ def undeclared() -> list[str]:
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
-        for each in card.differences:
-            used.add((each.entry, card.program, card.number, each.ours, each.scans))
+        place = card.program, card.number
+        used |= {(each.entry, *place, each.ours, each.scans) for each in card.differences}
         if card.printed:
-            used.add(
-                (card.printed[1], card.program, card.number, str(card.number), card.printed[0])
-            )
+            shown, entry = card.printed
+            used.add((entry, *place, str(card.number), shown))
     declared: set[tuple[Any, ...]] = set()
     for entry in facts("apparatus")["entry"]:
         for ours, scans, cards in entry.get("pairs", ()):
@@ -114,7 +117,3 @@ def undeclared() -> list[str]:
         if not (card.lost or card.scan):
             faults.append(f"{card.name}: neither in the scan nor lost")
     return faults
-
-
-def _differs(line: int, text: str, wanted: str, name: str) -> str:
-    return f"line {line}, {name}: {text!r}, where the table has {wanted!r}"

@@ -5,6 +5,7 @@ to V about them. Whether the decks agree is computed from their statements.
 """
 
 import re
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.facts import facts
@@ -55,18 +56,18 @@ def faults(found: list[Row]) -> list[str]:
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}
     for row in found:
         told += [f"{row.what}: no entry {name!r}" for name in row.entries if name not in known]
+        cards = {program: numbers(ranges) for program, ranges in row.cards.items()}
         told += [
             f"{row.what}: {name} names none of its cards"
             for name in row.entries
-            if name in known and not _names_a_card(known[name], row)
+            if name in known and not names_a_card(known[name], cards)
         ]
     for program in PROGRAMS:
         named = [n for row in found for n in numbers(row.cards.get(program, ""))]
         wanted = [n for n, card in deck(program).cards.items() if not card.is_comment]
         told += [f"{program}:{n} is in no row" for n in wanted if n not in named]
         told += [f"{program}:{n} is in two rows" for n in wanted if named.count(n) > 1]
-        comments = sorted(set(named) - set(wanted) - _comments(program))
-        told += [f"{program}:{n} is no card" for n in comments]
+        told += [f"{program}:{n} is no card" for n in sorted(set(named) - set(deck(program).cards))]
     explaining = {name for row in found for name in row.entries}
     told += [
         f"{name}: in no row"
@@ -133,13 +134,9 @@ def _renamed(statement: str, names: str) -> str:
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
-def _names_a_card(entry: dict[str, Any], row: Row) -> bool:
-    """Return whether an apparatus entry names a card of a row, or no card at all."""
+def names_a_card(entry: dict[str, Any], cards: Mapping[str, Iterable[int]]) -> bool:
+    """Return whether an apparatus entry names one of some cards, or no card at all."""
     return not entry["cards"] or any(
-        set(numbers(entry["cards"].get(program, ""))) & set(numbers(cards))
-        for program, cards in row.cards.items()
+        set(numbers(entry["cards"].get(program, ""))) & set(named)
+        for program, named in cards.items()
     )
-
-
-def _comments(program: str) -> set[int]:
-    return {n for n, card in deck(program).cards.items() if card.is_comment}

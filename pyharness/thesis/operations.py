@@ -5,9 +5,10 @@ version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each. Sub
 and WRITE do not count.
 """
 
+import operator
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.listing import Listing
@@ -20,7 +21,10 @@ _IF = re.compile(r"IF\((\w+)\.EQ\.(\d+)\)(.*)")
 _TEST = re.compile(r"IF\((.*)\.GT\.(.*)\)GOTO8")
 _CALL = re.compile(r"CALLLEQT1F\(A,M,N,")
 _TARGET = re.compile(r"(\w+?)(?:\(([\w,]+)\))?=(.*)")
-ALIKE = {"+": 1, "-": 1, "*": 1, "/": 1}
+_OPERATIONS = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+}  # fmt: skip
+ALIKE = dict.fromkeys(_OPERATIONS, 1)
 
 
 class Count(NamedTuple):
@@ -46,8 +50,7 @@ class _Counter:
         self.written += self.times[name]
         key = (name, _identity(left), _identity(right))
         if key not in self.known:
-            x, y = _value(left), _value(right)
-            value = {"+": x + y, "-": x - y, "*": x * y}[name] if name != "/" else x / y
+            value = _OPERATIONS[name](_value(left), _value(right))
             self.known[key] = _Number(self, value)
         return self.known[key]
 
@@ -60,6 +63,13 @@ def _value(x: Any) -> float:
     return x.value if isinstance(x, _Number) else float(x)
 
 
+def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], "_Number"]:
+    def operate(self: "_Number", other: Any) -> "_Number":
+        return self.counter.operate(name, *((other, self) if reflected else (self, other)))
+
+    return operate
+
+
 class _Number:
     """A floating-point value, with the counter of the operations on it.
 
@@ -69,29 +79,10 @@ class _Number:
     def __init__(self, counter: _Counter, value: float) -> None:
         self.counter, self.value = counter, value
 
-    def __add__(self, other: Any) -> "_Number":
-        return self.counter.operate("+", self, other)
-
-    def __radd__(self, other: Any) -> "_Number":
-        return self.counter.operate("+", other, self)
-
-    def __sub__(self, other: Any) -> "_Number":
-        return self.counter.operate("-", self, other)
-
-    def __rsub__(self, other: Any) -> "_Number":
-        return self.counter.operate("-", other, self)
-
-    def __mul__(self, other: Any) -> "_Number":
-        return self.counter.operate("*", self, other)
-
-    def __rmul__(self, other: Any) -> "_Number":
-        return self.counter.operate("*", other, self)
-
-    def __truediv__(self, other: Any) -> "_Number":
-        return self.counter.operate("/", self, other)
-
-    def __rtruediv__(self, other: Any) -> "_Number":
-        return self.counter.operate("/", other, self)
+    __add__, __radd__ = _operator("+"), _operator("+", reflected=True)
+    __sub__, __rsub__ = _operator("-"), _operator("-", reflected=True)
+    __mul__, __rmul__ = _operator("*"), _operator("*", reflected=True)
+    __truediv__, __rtruediv__ = _operator("/"), _operator("/", reflected=True)
 
     def __pow__(self, exponent: int) -> "_Number":
         square = self * self

@@ -19,12 +19,34 @@ RULES = ("nearest-even", "chop", "FX", "RX")
 _GUARD_BITS = 40
 
 
+def _quotient(x: float, y: float) -> float:
+    if y:
+        return x / y
+    return math.nan if math.isnan(x) or not x else math.copysign(math.inf, x) * math.copysign(1, y)
+
+
+def _operator(
+    rule: str, of_floats: Callable[[float, float], float], sign: int = 1
+) -> Callable[["Number", Any], "Number"]:
+    """Return the operator of a rounding rule, which first multiplies the operand by `sign`."""
+
+    def operate(self: "Number", other: Any) -> "Number":
+        own = self.__class__
+        if other.__class__ is not own:
+            other = own.word(other)
+        if self.m and other.m:
+            return own(*getattr(own.rules, rule)(self.m, self.e, sign * other.m, other.e))
+        return self._special(of_floats, other if sign > 0 else -other)
+
+    return operate
+
+
 class Number:
     """An immutable number of a word: the integer `m` times 2**`e`.
 
     If `m` is 0, `e` is the value as a float: 0.0, -0.0, inf, -inf or nan. `Word` makes a subclass
-    for each word. Square roots, sines and cosines are rounded to nearest even if the word
-    truncates.
+    for each word. The operators round their results; x/0 is infinite, 0/0 is nan. Square roots,
+    sines and cosines are rounded to nearest even if the word truncates.
     """
 
     __slots__ = ("e", "m")
@@ -34,49 +56,14 @@ class Number:
     def __init__(self, m: int, e: Any) -> None:
         self.m, self.e = m, e
 
-    def __add__(self, other: Any) -> "Number":
-        """Return the rounded sum."""
-        own = self.__class__
-        if other.__class__ is not own:
-            other = own.word(other)
-        if self.m and other.m:
-            return own(*own.rules.add(self.m, self.e, other.m, other.e))
-        return self._special(operator.add, other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> "Number":
-        """Return the rounded difference."""
-        own = self.__class__
-        if other.__class__ is not own:
-            other = own.word(other)
-        if self.m and other.m:
-            return own(*own.rules.add(self.m, self.e, -other.m, other.e))
-        return self._special(operator.add, -other)
+    __add__ = __radd__ = _operator("add", operator.add)
+    __sub__ = _operator("add", operator.add, sign=-1)
+    __mul__ = __rmul__ = _operator("multiply", operator.mul)
+    __truediv__ = _operator("divide", _quotient)
 
     def __rsub__(self, other: Any) -> "Number":
         """Return `other`, converted to the word, minus this number."""
         return self.word(other) - self
-
-    def __mul__(self, other: Any) -> "Number":
-        """Return the rounded product."""
-        own = self.__class__
-        if other.__class__ is not own:
-            other = own.word(other)
-        if self.m and other.m:
-            return own(*own.rules.multiply(self.m, self.e, other.m, other.e))
-        return self._special(operator.mul, other)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "Number":
-        """Return the rounded quotient: infinite for x/0, nan for 0/0."""
-        own = self.__class__
-        if other.__class__ is not own:
-            other = own.word(other)
-        if self.m and other.m:
-            return own(*own.rules.divide(self.m, self.e, other.m, other.e))
-        return self._special(_quotient, other)
 
     def __rtruediv__(self, other: Any) -> "Number":
         """Return `other`, converted to the word, divided by this number."""
@@ -204,12 +191,6 @@ class Number:
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
         apart: int = x.e - y.e
         return (x.m << apart) - y.m if apart >= 0 else x.m - (y.m << -apart)
-
-
-def _quotient(x: float, y: float) -> float:
-    if y:
-        return x / y
-    return math.nan if math.isnan(x) or not x else math.copysign(math.inf, x) * math.copysign(1, y)
 
 
 class Word:

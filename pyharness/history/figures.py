@@ -59,6 +59,7 @@ class FigurePlan:
     programs: tuple[str, ...]
     caption: str
     source: str
+    limit_of: str  # the program whose limit is drawn, or ""
 
     @property
     def stem(self) -> str:
@@ -108,6 +109,11 @@ class FigureFinding:
     curves: tuple[Curve, ...]
     limit: tuple[str, Array] | None = None  # label and omega (rad/s) of a program's limit
 
+    @property
+    def known(self) -> list[tuple[str, Array]]:
+        """Return label and omega (rad/s) of the reference solution and of any limit."""
+        return [("reference", self.reference.omega), *([self.limit] if self.limit else [])]
+
 
 def plans() -> list[FigurePlan]:
     """Return the plans of all figures, first those of the original programs."""
@@ -115,6 +121,7 @@ def plans() -> list[FigurePlan]:
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
             entry[_CAPTIONS[each]], entry["source"],
+            entry.get("limit_of", "") if each == "original" else "",
         )
         for each in SETS
         for entry in facts("figures")["figure"]
@@ -128,20 +135,14 @@ def findings() -> Iterator[FigureFinding]:
         scene = case_scene(plan.case)
         if plan.case not in truths:
             truths[plan.case] = reference(scene, scene.times())
+        truth = truths[plan.case]
         listings = map(SETS[plan.set], plan.programs)
         curves = tuple(Curve(listing, run_program(scene, listing)) for listing in listings)
-        yield FigureFinding(plan, scene, truths[plan.case], curves, _limit(plan, scene, truths))
-
-
-def _limit(
-    plan: FigurePlan, scene: Scene, truths: dict[int, Reference]
-) -> tuple[str, Array] | None:
-    asked = {entry["number"]: entry.get("limit_of") for entry in facts("figures")["figure"]}
-    program = asked[plan.number]
-    if program is None or plan.set != "original":
-        return None
-    omega = limit_solution(program, scene, scene.times(), truths[plan.case])
-    return f"limit of {program}", omega
+        limit = None
+        if plan.limit_of:
+            omega = limit_solution(plan.limit_of, scene, scene.times(), truth)
+            limit = f"limit of {plan.limit_of}", omega
+        yield FigureFinding(plan, scene, truth, curves, limit)
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
@@ -177,12 +178,9 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 def curve_numbers(finding: FigureFinding) -> Table:
     """Return a figure's plotted numbers: omega (rad/s) by curve and time (s)."""
     truth, start = finding.reference, np.array(finding.scene.omega)
-    known = [("reference", truth.omega)]
-    if finding.limit is not None:
-        known.append(("limit", finding.limit[1]))
     rows = [
         [curve, "", t, None, *omega]
-        for curve, values in known
+        for curve, (_, values) in zip(("reference", "limit"), finding.known, strict=False)
         for t, omega in zip(_from_zero(truth.time), _from_zero(values, start), strict=True)
     ]
     for curve in finding.curves:
@@ -204,15 +202,9 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
-    truth, start = finding.reference, np.array(finding.scene.omega)
-    time = _from_zero(truth.time)
+    start = np.array(finding.scene.omega)
     for row in range(3):
-        axes[row].plot(
-            time, _from_zero(truth.omega, start)[:, row], label="reference", **_REFERENCE
-        )
-        if finding.limit is not None:
-            name, omega = finding.limit
-            axes[row].plot(time, _from_zero(omega, start)[:, row], label=name, **_LIMIT)
+        _draw_known(axes[row], finding, row)
         bottom, top = _frame(finding, row)
         axes[row].set_ylim(bottom, top)
         for curve in finding.curves:
@@ -240,22 +232,16 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     from matplotlib.figure import Figure
 
     second = replace(second, curves=second.curves[-1:])
-    assert first.limit is not None
     figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
-    truth, start = first.reference, np.array(first.scene.omega)
-    time = _from_zero(truth.time)
-    for (label, omega), style in (
-        (("reference", truth.omega), _REFERENCE), (first.limit, _LIMIT),
-    ):  # fmt: skip
-        axes.plot(time, _from_zero(omega, start)[:, 0], label=label, **style)
+    _draw_known(axes, first, 0)
     bottom, top = _frame(first, 0)
     for finding, other in ((first, {}), (second, _CORRECTED)):
         for curve in finding.curves:
-            _draw(axes, curve, start, 0, bottom, top, **other)
+            _draw(axes, curve, np.array(first.scene.omega), 0, bottom, top, **other)
             line = axes.lines[-2 if curve.ending else -1]
             line.set_label(f"{curve.label}, {finding.plan.set}")
-    axes.set(ylim=(bottom, top), xlim=(0.0, time[-1]), xlabel="time (s)")
+    axes.set(ylim=(bottom, top), xlim=(0.0, first.reference.time[-1]), xlabel="time (s)")
     axes.set_ylabel("$\\omega_1$ (rad/s)")
     axes.grid(visible=True, linewidth=0.3)
     figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
@@ -270,6 +256,12 @@ def _heading(finding: FigureFinding) -> str:
     if any(curve.ending for curve in finding.curves):
         note += " Cross: the program ends."
     return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
+
+
+def _draw_known(axes: "Axes", finding: FigureFinding, row: int) -> None:
+    time, start = _from_zero(finding.reference.time), np.array(finding.scene.omega)
+    for (label, omega), style in zip(finding.known, (_REFERENCE, _LIMIT), strict=False):
+        axes.plot(time, _from_zero(omega, start)[:, row], label=label, **style)
 
 
 def _draw(
@@ -297,10 +289,9 @@ def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest
-    omegas = [each.trajectory.omega[:, row] for each in finding.curves]
-    if finding.limit is not None:
-        omegas.append(finding.limit[1][:, row])
-    for omega in omegas:
+    omegas = [each.trajectory.omega for each in finding.curves]
+    omegas += [omega for _, omega in finding.known[1:]]
+    for omega in (each[:, row] for each in omegas):
         bottom, top = float(omega.min(initial=least)), float(omega.max(initial=largest))
         low = min(low, bottom if bottom > least - far else least - near)
         high = max(high, top if top < largest + far else largest + near)

@@ -134,10 +134,11 @@ def recaptures() -> list[Recapture]:
         for found, reading in zip(places, (each.first, each.second), strict=True):
             found |= {(each.card.name, place) for place in misread_places(each.scan, reading)}
     cards = tuple({name for name, _ in found} for found in places)
-    return [
-        _recapture("places", len(places[0]), len(places[1]), len(places[0] & places[1])),
-        _recapture("cards", len(cards[0]), len(cards[1]), len(cards[0] & cards[1])),
-    ]
+    result = []
+    for unit, (one, other) in (("places", places), ("cards", cards)):
+        counts = len(one), len(other), len(one & other)
+        result.append(Recapture(unit, *counts, chapman(*counts), *recapture_interval(*counts)))
+    return result
 
 
 def disagreeing() -> list[ReadCard]:
@@ -184,8 +185,3 @@ def second_reading_report() -> Report:
         },
         data=columns("unit first second both estimate lower upper uncorrected", rows),
     )  # fmt: skip
-
-
-def _recapture(unit: str, first: int, second: int, both: int) -> Recapture:
-    estimate = chapman(first, second, both)
-    return Recapture(unit, first, second, both, estimate, *recapture_interval(first, second, both))

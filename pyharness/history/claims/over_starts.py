@@ -43,10 +43,11 @@ class Starts:
     def __init__(self, one: Laboratory, omega0: Array) -> None:
         """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
         self._one, self._omega0 = one, omega0
-        self._solution = cache(self._integrated)
-        self._error = cache(partial(rules.largest_error, self))
+        # As the methods of the same names of `rules.Bench`.
+        self.solution = cache(self._integrated)
+        self.error = cache(partial(rules.largest_error, self))
+        self.models = cache(self._modelled)
         self._kept = cache(self._run)
-        self._models = cache(self._modelled)
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case, with the laboratory's omega(0)."""
@@ -56,18 +57,6 @@ class Starts:
         """Return the runs of a program on a case from every start."""
         # Other runs are needed once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
-
-    def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, for each start."""
-        return self._solution(case)
-
-    def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest error of any omega component (rad/s) in a case, for each start."""
-        return self._error(program, case, may_stop, parts)
-
-    def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the models, as `Laboratory.models` except for rounding."""
-        return self._models(case, terms)
 
     def _starts(self, case: int) -> Array:
         is_open = case in facts("claims")["assumed"]["cases"]

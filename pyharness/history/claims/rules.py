@@ -7,6 +7,7 @@ omega over the steps that the program ran, against the reference solution. The r
 is its largest minus its smallest value.
 """
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -223,7 +224,4 @@ def _by_component(omega: Array) -> Array:
 
 
 def _most(numbers: Mapping[Any, Any]) -> Any:
-    first, *others = numbers.values()
-    for other in others:
-        first = np.maximum(first, other)
-    return first
+    return functools.reduce(np.maximum, numbers.values())

@@ -89,25 +89,15 @@ def _omega(moments: Triple, state: Array) -> Array:
 def _hamilton(moments: Triple, state: Array) -> Array:
     """Return dH/dp and -dH/dq for 3-1-3 angles q (rad) and momenta p; H = sum I omega**2 / 2."""
     theta, psi = float(state[1]), float(state[2])
+    sin_theta, cos_theta = math.sin(theta), math.cos(theta)
+    sin_psi, cos_psi = math.sin(psi), math.cos(psi)
     omega = _omega(moments, state)
-    matrix = _angle_rates_to_omega(state[:3])
-    rates = np.linalg.solve(matrix, omega)
+    rates = np.linalg.solve(_angle_rates_to_omega(state[:3]), omega)
     momentum = omega * moments
     # dH/dq at constant p is -L . (d matrix/dq) rates.
-    by_theta = np.array(
-        [
-            [math.cos(theta) * math.sin(psi), 0.0, 0.0],
-            [math.cos(theta) * math.cos(psi), 0.0, 0.0],
-            [-math.sin(theta), 0.0, 0.0],
-        ]
-    )
-    by_psi = np.array(
-        [
-            [math.sin(theta) * math.cos(psi), -math.sin(psi), 0.0],
-            [-math.sin(theta) * math.sin(psi), -math.cos(psi), 0.0],
-            [0.0, 0.0, 0.0],
-        ]
-    )
+    by_theta, by_psi = np.zeros((3, 3)), np.zeros((3, 3))
+    by_theta[:, 0] = cos_theta * sin_psi, cos_theta * cos_psi, -sin_theta
+    by_psi[:2, :2] = [[sin_theta * cos_psi, -sin_psi], [-sin_theta * sin_psi, -cos_psi]]
     forces = [0.0, momentum @ by_theta @ rates, momentum @ by_psi @ rates]
     return np.array([*rates, *forces])
 
@@ -127,11 +117,8 @@ def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
     """Judge the claim that the error of one step decreases with a power of the step size."""
-    numbers = {}
-    for case in cases:
-        numbers[f"case {case}: power of the step"] = _power(
-            lab.scene(case), lambda scene: _stepped(scene, method)
-        )
+    stepped = partial(_stepped, method=method)
+    numbers = {f"case {n}: power of the step": _power(lab.scene(n), stepped) for n in cases}
     near = [abs(each - power) <= within for each in numbers.values()]
     return graded(numbers, all(near), any(near))
 

@@ -220,16 +220,12 @@ def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
         names = []
         for name in names_of("defect", program):
             after = run_program(scene, subset(program, "original", fix=[name]))
-            same_end = (after.steps, after.ended) == (before.steps, before.ended)
-            if same_end and _same(before.omega, after.omega):
-                names.append(name)
+            if (after.steps, after.ended) == (before.steps, before.ended):
+                scale = float(np.abs(before.omega).max(initial=0.0))
+                if np.abs(before.omega - after.omega).max(initial=0.0) <= 1e-11 * scale:
+                    names.append(name)
         found[program] = tuple(names)
     return found
-
-
-def _same(first: Array, second: Array) -> bool:
-    scale = float(np.abs(first).max(initial=0.0))
-    return bool(np.abs(first - second).max(initial=0.0) <= 1e-11 * scale)
 
 
 def limits_report(

@@ -136,7 +136,7 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 def _matrix(weighting: str, length: float) -> Array:
     """Return the weighted integrals over (0, length) (s) of 1 and 2 t, one row per weight."""
-    columns = [_weighted(weighting, length, (i + 1) * _power(i)) for i in range(TERMS)]
+    columns = [_weighted(weighting, length, (i + 1) * np.eye(i + 1)[i]) for i in range(TERMS)]
     return np.array(columns).T
 
 
@@ -147,22 +147,18 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
     """
     if mistake == "transposed":
         matrix = matrix.T
+    (a, b), (c, d) = matrix.tolist()
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites its matrix with the factors, which the second call uses as the matrix.
-        matrix = _factors(matrix)
+        # LEQT1F overwrites its matrix with the L and U factors of Crout's method, which the second
+        # call uses as the matrix.
+        matrix = np.array([[a, b], [c / a, d - c / a * b]])
     if mistake == "unscaled-solver":
-        (a, b), (c, d) = matrix
         x, y = right.T
         # With the array as left operand, NumPy applies the number's arithmetic to each element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
     return np.array(solutions).T
-
-
-def _power(exponent: int) -> Array:
-    row: Array = np.eye(exponent + 1)[exponent]
-    return row
 
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
@@ -191,12 +187,6 @@ def _value(coefficients: list[Any], at: Any) -> Any:
     for x in reversed(others):
         value = x + value * at
     return value
-
-
-def _factors(matrix: Array) -> Array:
-    """Return the L and U factors with which Crout's method overwrites a 2 x 2 matrix."""
-    (a, b), (c, d) = matrix.tolist()
-    return np.array([[a, b], [c / a, d - c / a * b]])
 
 
 def halved(scene: Scene, weighting: str) -> float:

@@ -7,7 +7,7 @@ with a separate LEQT1F (`data/cards/leqt1f.f`), share no code with port and twin
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -173,31 +173,26 @@ def model_cards(terms: int) -> dict[int, str]:
         after = next(n for n in range(first, len(text)) if text[n].strip() == last)
         text[first : after + 1] = [f"      {each}" for each in new]
 
-    def polynomial(name: str, column: int, at: str, time: str) -> list[str]:
-        powers = [f"B({k},{column})*{time}" + (f"**{k}" if k > 1 else "") for k in terms_range]
-        head = f"{name}({at})={name}(1)+" + "+".join(powers[:3])
-        more = ["+".join(powers[3:])] if terms > 3 else []
-        return [head + "+", *more] if more else [head]
+    def polynomials(at: str, time: str) -> Iterator[str]:
+        """Yield the statements that evaluate all unknowns."""
+        for column, name in enumerate(("U1", "U2", "U3", "V1", "V2", "V3"), 1):
+            powers = [f"B({k},{column})*{time}" + (f"**{k}" if k > 1 else "") for k in terms_range]
+            more = ["+".join(powers[3:])] if terms > 3 else []
+            yield f"{name}({at})={name}(1)+" + "+".join(powers[:3]) + "+" * len(more)
+            yield from more
 
     matrix = [
         f"A({j},{k})={k}." + (f"*T{j}" if k > 1 else "") + (f"**{k - 1}" if k > 2 else "")
         for j in terms_range
         for k in terms_range
     ]
-    names = [f"{kind}{axis}" for kind in "UV" for axis in (1, 2, 3)]
-    inside = [(n, c, "L", "T(L)") for c, n in enumerate(names, 1)]
-    at_end = [(n, c, str(terms + 2), end) for c, n in enumerate(names, 1)]
-    made(
-        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
-        "DIMENSION A(4,4),B(4,6),WKA(24),T(6),F(6),G(6),H(6),",
-        [f"DIMENSION A({terms},{terms}),B({terms},6),WKA({6 * terms}),T(8),F(8),G(8),H(8),"],
-    )
-    text = [each.replace("X(6),Y(6),Z(6)", "X(8),Y(8),Z(8)") for each in text]
-    made(
-        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
-        "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
-        ["DIMENSION U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"],
-    )
+    for old, new in (
+        ("A(4,4),B(4,6),WKA(24),", f"A({terms},{terms}),B({terms},6),WKA({6 * terms}),"),
+        ("T(6),F(6),G(6),H(6),", "T(8),F(8),G(8),H(8),"),
+        ("X(6),Y(6),Z(6)", "X(8),Y(8),Z(8)"),
+        ("U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)", "U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"),
+    ):
+        text = [each.replace(old, new) for each in text]
     name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")
     text[text.index("C FOUR TERM APPROXIMATION")] = f"C {name} TERM APPROXIMATION, A CONJECTURE"
     made("T1=DT*.2", "T5=.01", [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range] + [f"{end}=.01"])
@@ -214,7 +209,7 @@ def model_cards(terms: int) -> dict[int, str]:
         [
             f"DO 400 L=2,{terms + 1},1",
             *(f"T({k + 1})=T{k}" for k in terms_range),
-            *(line for each in inside for line in polynomial(*each)),
+            *polynomials("L", "T(L)"),
         ],
     )
     second = text.index("C NOW REDO INTERVAL") + 1
@@ -228,7 +223,7 @@ def model_cards(terms: int) -> dict[int, str]:
     made(
         "U1(6)=U1(1)+B(1,1)*T5+B(2,1)*T5**2+B(3,1)*T5**3+",
         "CB(4,6)*T5**4",
-        [line for each in at_end for line in polynomial(*each)],
+        [*polynomials(str(terms + 2), end)],
     )
     tail = next(n for n, each in enumerate(text) if each.strip().startswith("WRITE(6,5)"))
     ending = [each.replace("(6)", f"({terms + 2})") for each in text[tail:]]

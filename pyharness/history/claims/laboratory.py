@@ -63,8 +63,11 @@ class Laboratory:
 
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case under the assumptions."""
-        scene = _scene(case, self.assumptions.start, self.assumptions.steps)
-        return replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
+        scene, given = case_scene(case), self.assumptions
+        is_open = case in facts("claims")["assumed"]["cases"]
+        start = scene.omega if given.start is None or not is_open else given.start
+        h, steps = scene.step_size / parts, given.steps * parts
+        return replace(scene, omega=start, step_size=h, steps=steps)
 
     def run(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Trajectory:
         """Return the run of a program on a case."""
@@ -133,14 +136,6 @@ def distance(first: Array, second: Array) -> float:
 def largest(truth: Reference) -> float:
     """Return the largest magnitude of any omega component of a reference (rad/s)."""
     return float(largest_of(truth.omega))
-
-
-@cache
-def _scene(case: int, start: Triple | None, steps: int) -> Scene:
-    scene = replace(case_scene(case), steps=steps)
-    if start is None or case not in facts("claims")["assumed"]["cases"]:
-        return scene
-    return replace(scene, omega=start)
 
 
 @cache

@@ -44,14 +44,11 @@ class Starts:
         """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
         self._one, self._omega0 = one, omega0
         # As the methods of the same names of `rules.Bench`.
+        self.scene = one.scene
         self.solution = cache(self._integrated)
         self.error = cache(partial(rules.largest_error, self))
         self.models = cache(self._modelled)
         self._kept = cache(self._run)
-
-    def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case, with the laboratory's omega(0)."""
-        return self._one.scene(case, parts)
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Return the runs of a program on a case from every start."""

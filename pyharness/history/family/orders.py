@@ -184,17 +184,15 @@ def verdict(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def _unexpected(found: Sequence[OrderFinding]) -> list[str]:
-    return [
-        f"{_name(each)}: order {each.measured:.2f}, derived {each.predicted}"
-        for each in found
-        if each.misses
-    ]
-
-
-def _name(each: OrderFinding) -> str:
-    member = each.member
-    points = f" at points {member.points_label}" if member.points is not None else ""
-    return f"{member.weighting}{points}, {member.terms} terms, {member.corrections} corrections"
+    told = []
+    for each in (each for each in found if each.misses):
+        member = each.member
+        points = f" at points {member.points_label}" if member.points is not None else ""
+        told.append(
+            f"{member.weighting}{points}, {member.terms} terms, {member.corrections} corrections: "
+            f"order {each.measured:.2f}, derived {each.predicted}"
+        )
+    return told
 
 
 def _tables(found: Sequence[OrderFinding]) -> list[Section]:

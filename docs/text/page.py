@@ -22,7 +22,7 @@ from pyharness.history.timeline import CHANGES, Revision, gaps, revisions, timel
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck
-from pyharness.thesis.deck_collation import rows
+from pyharness.thesis.collation import rows
 
 HERE = Path(__file__).parent
 PAGE = "explanation/about-the-text.md"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from pyharness.edition.decks import Run
 from pyharness.history.origins import Disagreement
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis import deck_collation
+from pyharness.thesis import collation
 from pyharness.thesis.cards import Card, deck, numbers
 
 # Parts of a statement, by kind; an operator may be a relation such as .GT., or a power.
@@ -56,13 +56,13 @@ class AlignedRow(NamedTuple):
 class Operation(NamedTuple):
     """An operation: its row of the collation, and the aligned cards."""
 
-    row: deck_collation.Row
+    row: collation.Row
     aligned: list[AlignedRow]
 
 
 def operations() -> list[Operation]:
     """Return all operations that have cards, without comments."""
-    return [Operation(row, _aligned(row.cards)) for row in deck_collation.rows() if row.cards]
+    return [Operation(row, _aligned(row.cards)) for row in collation.rows() if row.cards]
 
 
 def thesis_on(disagreement: Disagreement) -> str:

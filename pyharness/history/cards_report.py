@@ -1,6 +1,7 @@
 """The reports of `cards`: cards with their lines in scan, port and twin, and comparisons."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
 from typing import Any
@@ -13,7 +14,7 @@ from pyharness.model.report import Column, Field, Line, Report, Section, Table, 
 from pyharness.model.report import numbers as columns
 from pyharness.thesis.cards import Card, deck, parallels
 from pyharness.thesis.cards import numbers as cards_named
-from pyharness.thesis.deck_collation import Row, faults
+from pyharness.thesis.collation import Row, faults
 
 _CLASSES = (
     *words("class"), Column("entries"), Column("flags"), Column("two-term"), Column("four-term"),
@@ -115,16 +116,13 @@ def classes_report() -> Report:
             for each in card.differences
         )
         rows.append([kind, len(of_kind), sum("flag" in each for each in of_kind), *named, places])
-    sure = [
-        [certainty, sum(each["certainty"] == certainty for each in entries)]
-        for certainty in dict.fromkeys(each["certainty"] for each in entries)
-    ]
+    sure = Counter(each["certainty"] for each in entries)
     table = Table(_CLASSES, rows)
     edition = facts("cards/scan")
     head = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["witness"]]
     grounds = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["ground"]]
     principles = [Field(f"{name:12s}", f"{text}") for name, text in edition["principles"].items()]
-    told = ", ".join(f"{number} {certainty}" for certainty, number in sure)
+    told = ", ".join(f"{number} {certainty}" for certainty, number in sure.items())
     return Report(
         "cards",
         [

@@ -5,7 +5,7 @@ or tree. Anyone can recompute it from the content, and the archive finds a copy 
 """
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from hashlib import sha1, sha256
 from pathlib import Path
@@ -29,14 +29,9 @@ def content_identifier(content: bytes) -> str:
     return f"swh:1:cnt:{_hash('blob', content).hex()}"
 
 
-def directory_identifier(files: Mapping[str, bytes], executable: Collection[str] = ()) -> str:
-    """Return the SWHID of a folder, ``swh:1:dir:...``, without links and empty folders."""
-    return f"swh:1:dir:{_tree(files, executable).hex()}"
-
-
-def identifier_of_lines(identifier: str, first: int, last: int | None = None) -> str:
-    """Return the SWHID of a file, qualified by a line or a range of lines, from 1."""
-    return f"{identifier};lines={first}" + ("" if last is None else f"-{last}")
+def directory_identifier(files: Mapping[str, bytes]) -> str:
+    """Return the SWHID of a folder without links, empty folders and executable files."""
+    return f"swh:1:dir:{_tree(files).hex()}"
 
 
 @cache
@@ -71,7 +66,7 @@ def data_identifier() -> str:
 def card_identifier(card: Card) -> str:
     """Return the SWHID of a card: its deck's file, qualified by its line."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
-    return identifier_of_lines(content_identifier(content), card_lines(content)[card.number])
+    return f"{content_identifier(content)};lines={card_lines(content)[card.number]}"
 
 
 @cache
@@ -87,7 +82,7 @@ def _hash(kind: str, content: bytes) -> bytes:
     return sha1(f"{kind} {len(content)}\0".encode() + content, usedforsecurity=False).digest()
 
 
-def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
+def _tree(files: Mapping[str, bytes]) -> bytes:
     folders: dict[str, dict[str, bytes]] = {}
     entries = []
     for path, content in files.items():
@@ -95,12 +90,10 @@ def _tree(files: Mapping[str, bytes], executable: Collection[str]) -> bytes:
         if slash:
             folders.setdefault(name, {})[rest] = content
         else:
-            mode = "100755" if path in executable else "100644"
-            entries.append((name, mode, name, _hash("blob", content)))
+            entries.append((name, "100644", name, _hash("blob", content)))
     for name, within in folders.items():
-        runs = {path.removeprefix(f"{name}/") for path in executable if path.startswith(f"{name}/")}
         # git sorts a folder as if its name ended with a slash.
-        entries.append((f"{name}/", "40000", name, _tree(within, runs)))
+        entries.append((f"{name}/", "40000", name, _tree(within)))
     entries.sort(key=lambda entry: entry[0].encode())
     body = b"".join(f"{mode} {name}\0".encode() + hashed for _, mode, name, hashed in entries)
     return _hash("tree", body)

@@ -10,7 +10,7 @@ tenth of the largest omega.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -187,12 +187,6 @@ def _value(coefficients: list[Any], at: Any) -> Any:
     for x in reversed(others):
         value = x + value * at
     return value
-
-
-def halved(scene: Scene, weighting: str) -> float:
-    """Return the factor by which halving the step reduces the error of a method without mistake."""
-    finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
-    return _share(scene, weighting, "none") / _share(finer, weighting, "none")
 
 
 _ABBREVIATED = {"subdomain": "sub", "galerkin": "gal", "least-squares": "lsq"}

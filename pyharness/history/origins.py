@@ -12,7 +12,7 @@ from pyharness.history.tei import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck, tight
-from pyharness.thesis.deck_collation import Row, names_a_card, rows
+from pyharness.thesis.collation import Row, names_a_card, rows
 
 CERTAINTIES = tuple(CERTAINTY)
 """The degrees of certainty of an inference, as in the apparatus."""

@@ -170,7 +170,7 @@ def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Cou
             if names[match[1]] == int(match[2]):
                 _run([("", match[3])], names, counter)
         elif _CALL.match(text):
-            _solve(names, counter)
+            _solve(names)
         elif not _NOTHING.match(text):
             _assign(text, names, counter)
 
@@ -193,7 +193,7 @@ def _evaluated(expression: str, names: dict[str, Any]) -> Any:
     return eval(expression, {"__builtins__": {}}, names)
 
 
-def _solve(names: dict[str, Any], counter: _Counter) -> None:
+def _solve(names: dict[str, Any]) -> None:
     n, m = names["N"], names["M"]
     a, b = names["A"], names["B"]
     matrix = [[a(i, j) for j in range(1, n + 1)] for i in range(1, n + 1)]

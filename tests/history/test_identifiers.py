@@ -45,9 +45,6 @@ def test_known_identifiers() -> None:
     assert directory_identifier({}) == "swh:1:dir:4b825dc642cb6eb9a060e54bf8d69288fbee4904"
     # A folder with one empty file, from the documentation of git.
     assert directory_identifier({"a": b""}) == "swh:1:dir:496d6428b9cf92981dc9495211e6e1120fb6f2ba"
-    of_lines = identifiers.identifier_of_lines
-    assert of_lines("swh:1:cnt:0", 7) == "swh:1:cnt:0;lines=7"
-    assert of_lines("swh:1:cnt:0", 7, 9) == "swh:1:cnt:0;lines=7-9"
 
 
 @pytest.mark.external
@@ -70,15 +67,14 @@ def test_git_has_the_same_identifier_of_a_folder(tmp_path: Path, seed: int) -> N
         clash = any(f"{path}/".startswith(each) or each.startswith(f"{path}/") for each in others)
         if not clash and not {".", ".."} & set(parts):
             files[path] = draw.randbytes(draw.randint(0, 40))
-    executable = sorted(files)[::3]
     _git(tmp_path, "init", "--quiet")
     for path, content in files.items():
         file = tmp_path / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content)
-        file.chmod(0o755 if path in executable else 0o644)
+        file.chmod(0o644)
     _git(tmp_path, "add", "--all", "--force")
-    assert directory_identifier(files, executable) == f"swh:1:dir:{_git(tmp_path, 'write-tree')}"
+    assert directory_identifier(files) == f"swh:1:dir:{_git(tmp_path, 'write-tree')}"
 
 
 @pytest.mark.external

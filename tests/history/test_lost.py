@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, halved, integrate, ranked
+from pyharness.history.lost import CASES, WEIGHTINGS, Ranked, integrate, ranked
 from pyharness.model.facts import facts
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.in_word import WORDS, scene_in
+from pyharness.truth.reference import reference
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,14 @@ def found() -> dict[str, Ranked]:
 @pytest.mark.campaign
 def test_without_a_mistake_they_work(found: dict[str, Ranked]) -> None:
     assert not found["none"].in_either
+    scene = case_scene(2)
+    finer = replace(scene, step_size=scene.step_size / 2.0, steps=2 * scene.steps)
     for weighting in WEIGHTINGS:
-        assert 3.5 < halved(case_scene(2), weighting) < 4.5
+        coarse, fine = (
+            np.abs(integrate(each, weighting) - reference(each, each.times()).omega).max()
+            for each in (scene, finer)
+        )
+        assert 3.5 < coarse / fine < 4.5
 
 
 def test_ranking_is_by_both_cases_then_by_either(found: dict[str, Ranked]) -> None:

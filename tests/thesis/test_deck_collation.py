@@ -9,8 +9,8 @@ import pytest
 
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis import cards, deck_collation
-from pyharness.thesis.deck_collation import faults, rows, statements
+from pyharness.thesis import cards, collation
+from pyharness.thesis.collation import faults, rows, statements
 from tests.conftest import Printed
 
 
@@ -18,7 +18,7 @@ def _rows_with(monkeypatch: pytest.MonkeyPatch, name: str, change: Any) -> Any:
     content = copy.deepcopy(facts(name))
     change(content)
     tables = {name: content}
-    for module in (deck_collation, cards):
+    for module in (collation, cards):
         monkeypatch.setattr(module, "facts", lambda table: tables.get(table) or facts(table))
     cards.deck.cache_clear()
     try:

@@ -17,8 +17,7 @@ from pyharness.history.second_reading import second_reading_report
 from pyharness.model.errors import InputError
 from pyharness.model.pipes import read_input
 from pyharness.thesis.cards import chosen
-from pyharness.thesis.collation import expected_lines, undeclared, unexplained
-from pyharness.thesis.deck_collation import faults, rows
+from pyharness.thesis.collation import expected_lines, faults, rows, undeclared, unexplained
 
 _LARGEST_SCAN = 1 << 24  # bytes
 # What is shown instead of cards. The whole edition alone has the header and apparatus of TEI.

@@ -68,8 +68,7 @@ def _evidence(options: argparse.Namespace) -> int:
 
 def _atlas(options: argparse.Namespace) -> int:
     from pyharness.history.claims import over_starts
-    from pyharness.history.claims.atlas import atlas_of
-    from pyharness.history.claims.atlas_report import atlas_report
+    from pyharness.history.claims.atlas import atlas_of, atlas_report
     from pyharness.sweep.store import check_store, opened
     from pyharness.sweep.sweep_file import read_sweep
 

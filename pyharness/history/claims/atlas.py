@@ -4,10 +4,12 @@ The starts cover the sphere of directions at several magnitudes. Each claim coun
 if it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +21,22 @@ from pyharness.history.claims.over_starts import FAILS, HOLDS, IN_PART, Starts, 
 from pyharness.history.claims.verdicts import IN_PART as PARTLY
 from pyharness.history.claims.verdicts import REPRODUCED
 from pyharness.model.errors import InputError
+from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, words
 from pyharness.model.scene import Triple
 from pyharness.model.trajectory import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
 _POINTS = {HOLDS: POINTS[REPRODUCED], IN_PART: POINTS[PARTLY]}
 Codes = NDArray[np.int8]
+_MAPS = 6
+_PERCENT = digits(".2f", 100.0)
+_VERDICTS = (Column("whole %", _PERCENT), Column("in part %", _PERCENT), Column("not %", _PERCENT))
+_OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,3 +139,244 @@ def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
         start: {name: int(codes[k]) for name, codes in found.items()}
         for k, start in enumerate(given)
     }
+
+
+def atlas_report(atlas: Atlas) -> Report:
+    """Return the report of `claims --atlas`, mostly for the first reading and number of steps."""
+    claims = _claims(atlas)
+    score = atlas.score()
+    first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
+    best = float(score.max())
+    places = np.argwhere(score == best)
+    sections: list[list[Any]] = [
+        [
+            f"{atlas.n_starts} starts with {len(atlas.choices())} choices of reading and steps: "
+            f"{atlas.n_starts * len(atlas.choices())} scenes, {len(atlas.codes)} claims. A claim "
+            "counts 1 where it is reproduced, 1/2 in part, 0 otherwise."
+        ],
+        [f"Claims, those first that tell most of a start ({first}; shares of all starts):", claims],
+        [f"Starts by points ({first}):", _by_points(score)],
+        [
+            f"The most points are {best:g}, from {len(places)} starts; from "
+            f"{int(atlas.none_fails().sum())} no claim fails. By magnitude:",
+            _by_magnitude(atlas, score),
+        ],
+        ["Starts from which all claims about one case hold, at least in part:", _by_case(atlas)],
+        ["Starts that the thesis shows, and (1, 1, 1), which is ours:", _shown(atlas, score)],
+    ]
+    if len(atlas.choices()) > 1:
+        sections += [
+            ["Readings and steps:", _by_choice(atlas)],
+            [
+                "Starts whose verdict another reading turns, or other steps:",
+                _percentage_turned(atlas),
+            ],
+        ]
+    return Report(
+        "claims",
+        sections,
+        record=lambda: {
+            "claims": [
+                dict(zip(("id", "whole", "in part", "not", "bits"), row, strict=True))
+                for row in claims.rows
+            ],
+            "best": best,
+            "starts": [list(atlas.start(at)) for at in places],
+        },
+        data=claims,
+        pictures={"atlas": partial(atlas_picture, atlas)},
+    )
+
+
+def _claims(atlas: Atlas) -> Table:
+    rows = [(name, *shares(codes[0, 0]), bits(codes[0, 0])) for name, codes in atlas.codes.items()]
+    columns = [*words("claim"), *_VERDICTS, Column("bits", digits(".3f"))]
+    return Table(columns, sorted(rows, key=lambda row: -row[-1]))
+
+
+def _by_points(score: Any) -> Table:
+    values, counts = np.unique(score, return_counts=True)
+    rows = [
+        (float(value), int(count), count / score.size, counts[k:].sum() / score.size)
+        for k, (value, count) in enumerate(zip(values, counts, strict=True))
+    ]
+    columns = [Column("points", digits("g")), Column("starts"), Column("%", _PERCENT)]
+    return Table([*columns, Column("as many or more %", _PERCENT)], rows[::-1])
+
+
+def _by_magnitude(atlas: Atlas, score: Any) -> Table:
+    best, none = score.max(), atlas.none_fails()
+    rows = []
+    for k, magnitude in enumerate(atlas.magnitudes):
+        most = np.argwhere(score[k] == best)
+        one = atlas.start((k, *most[0])) if len(most) else (None, None, None)
+        mean, largest = float(score[k].mean()), float(score[k].max())
+        rows.append((float(magnitude), mean, largest, int(none[k].sum()), len(most), *one))
+    points = digits(".4g")
+    columns = [
+        Column("magnitude", points, unit="rad/s"), Column("mean", points),
+        Column("most", points), Column("none fails"), Column("of the best"), *_OMEGA,
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _by_case(atlas: Atlas) -> Table:
+    rows = []
+    for case, names in sorted(about(list(atlas.codes)).items()):
+        points = np.stack([sum_of_points([atlas.codes[name][0, 0]]) for name in names])
+        row: list[Any] = [case, len(names)]
+        for least in (0.5, 1.0):
+            held = (points >= least).all(axis=0)
+            sizes = atlas.magnitudes[np.any(held, axis=(1, 2))]
+            ends = (float(sizes[0]), float(sizes[-1])) if len(sizes) else (None, None)
+            row += [float(held.mean()), *ends]
+        rows.append(row)
+    size = digits(".3g")
+    columns = [
+        Column("case"), Column("claims"),
+        Column("hold %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
+        Column("whole %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _shown(atlas: Atlas, score: Any) -> Table:
+    rows = []
+    for start, codes in shown_starts(list(atlas.codes)).items():
+        points = float(sum_of_points([np.array(code, np.int8) for code in codes.values()]))
+        failing = [name for name, code in codes.items() if code == 0]
+        rows.append((*start, points, float((score > points).mean()), ", ".join(failing) or "none"))
+    columns = [
+        *_OMEGA, Column("points", digits("g")), Column("more %", _PERCENT),
+        Column("fail", left=True, fit="wrap"),
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _by_choice(atlas: Atlas) -> Table:
+    rows = []
+    for k, reading in enumerate(atlas.readings):
+        for m, steps in enumerate(atlas.steps):
+            score = atlas.score(k, m)
+            most = float(score.max())
+            best, none = int((score == most).sum()), int(atlas.none_fails(k, m).sum())
+            rows.append((reading, steps, float(score.mean()), most, best, none))
+    columns = [
+        *words("reading"), Column("steps"), Column("mean", digits(".4f")),
+        Column("most", digits("g")), Column("starts with it"), Column("none fails"),
+    ]  # fmt: skip
+    return Table(columns, rows)
+
+
+def _percentage_turned(atlas: Atlas) -> Table:
+    """Return, by claim, the percentage of verdicts that another reading or step number changes."""
+    places = [(k, 0) for k in range(1, len(atlas.readings))]
+    places += [(0, m) for m in range(1, len(atlas.steps))]
+    rows = []
+    for name, codes in atlas.codes.items():
+        turned = [float((codes[at] != codes[0, 0]).mean()) for at in places]
+        if any(turned):
+            rows.append((name, *turned))
+    heads = [f"{atlas.readings[k]} %" if k else f"{atlas.steps[m]} steps %" for k, m in places]
+    return Table([*words("claim"), *(Column(head, _PERCENT) for head in heads)], rows)
+
+
+def atlas_picture(atlas: Atlas) -> Picture:
+    """Return a picture: points over the sphere of directions, and mean points of each claim."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")
+    parts: Any = figure.subfigures(1, 2, width_ratios=[1.15, 1.0])
+    maps, claims = parts
+    score = atlas.score()
+    _draw_maps(maps, atlas, score)
+    names = [row[0] for row in _claims(atlas).rows]
+    means = np.array(
+        [[sum_of_points([each]).mean() for each in atlas.codes[name][0, 0]] for name in names]
+    )
+    _draw_claims(claims, atlas, names, means)
+    rows = [
+        (
+            name,
+            float(magnitude),
+            float(means[k, m]),
+            float((atlas.codes[name][0, 0, m] != FAILS).mean()),
+        )
+        for k, name in enumerate(names)
+        for m, magnitude in enumerate(atlas.magnitudes)
+    ]
+    title = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
+    return Picture(
+        figure,
+        numbers("claim omega.magnitude mean_points share_not_failing", rows),
+        [f"claims of section V over starts omega(0) ({title})"],
+    )
+
+
+def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
+    import matplotlib as mpl
+
+    # The maps of the first and last magnitude resemble their neighbours'.
+    count = len(atlas.magnitudes)
+    inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
+    chosen = np.unique(inside) if count > _MAPS else np.arange(count)
+    plots = figure.subplots(-(-len(chosen) // 2), 2, squeeze=False, sharex=True, sharey=True)
+    none = atlas.none_fails()
+    least, largest = float(score.min()), float(score.max())
+    count = max(1, round(2.0 * (largest - least)))
+    colours = mpl.colormaps["viridis"].resampled(count + 1)
+    drawn: Any = None
+    for plot, k in zip(plots.ravel(), chosen.astype(int), strict=False):
+        drawn = plot.pcolormesh(
+            np.degrees(atlas.longitudes), atlas.heights, score[k], cmap=colours,
+            vmin=least - 0.25, vmax=largest + 0.25, shading="nearest", rasterized=True,
+        )  # fmt: skip
+        if none[k].any() and not none[k].all():
+            plot.contour(
+                np.degrees(atlas.longitudes), atlas.heights, none[k].astype(float), [0.5],
+                colors="#b02018", linewidths=0.8,
+            )  # fmt: skip
+        for start in starts():
+            size = math.hypot(*start)
+            if math.isclose(size, atlas.magnitudes[k], rel_tol=1e-3):
+                longitude = math.degrees(math.atan2(start[1], start[0])) % 360.0
+                plot.plot(longitude, start[2] / size, "w+", markersize=9, markeredgewidth=2.0)
+        plot.set_title(f"|omega(0)| = {atlas.magnitudes[k]:.3g} rad/s", fontsize=9)
+        plot.set_xticks([0, 90, 180, 270, 360])
+    for plot in plots.ravel()[len(chosen) :]:
+        plot.set_axis_off()
+    plots[0, 0].set_xlim(0.0, 360.0)
+    step = float(np.ptp(atlas.heights)) / max(1, len(atlas.heights) - 1)
+    plots[0, 0].set_ylim(atlas.heights[0] - step / 2.0, atlas.heights[-1] + step / 2.0)
+    for plot in plots[-1]:
+        plot.set_xlabel("longitude from axis 1 (degrees)", fontsize=8)
+    for plot in plots[:, 0]:
+        plot.set_ylabel("omega3 / |omega|", fontsize=8)
+    figure.colorbar(
+        drawn, ax=list(plots.ravel()), location="bottom", aspect=40,
+        label=f"points of {len(atlas.codes)}; red: the edge of where no claim fails",
+    )  # fmt: skip
+
+
+def _draw_claims(figure: "Figure", atlas: Atlas, names: Sequence[str], means: Any) -> None:
+    plot = figure.subplots()
+    drawn = plot.pcolormesh(
+        _edges(atlas.magnitudes), np.arange(len(names) + 1) - 0.5, means, cmap="gray_r", vmin=0.0,
+        vmax=1.0, rasterized=True,
+    )  # fmt: skip
+    plot.set_xscale("log")
+    plot.set_yticks(range(len(names)), names, fontsize=8)
+    plot.invert_yaxis()
+    plot.set_xlabel("|omega(0)| (rad/s)", fontsize=8)
+    plot.set_title("claims, those first that tell most of a start", fontsize=9)
+    figure.colorbar(
+        drawn, ax=plot, location="bottom", aspect=40, label="mean points over the sphere"
+    )
+
+
+def _edges(values: Array) -> Array:
+    if len(values) < 2:
+        return np.array([values[0] / 2.0, values[0] * 2.0])
+    middles = np.sqrt(values[1:] * values[:-1])
+    first, last = values[0] ** 2 / middles[0], values[-1] ** 2 / middles[-1]
+    return np.array([first, *middles, last])

@@ -190,7 +190,10 @@ def model_cards(terms: int) -> dict[int, str]:
         ("A(4,4),B(4,6),WKA(24),", f"A({terms},{terms}),B({terms},6),WKA({6 * terms}),"),
         ("T(6),F(6),G(6),H(6),", "T(8),F(8),G(8),H(8),"),
         ("X(6),Y(6),Z(6)", "X(8),Y(8),Z(8)"),
-        ("U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)", "U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)"),
+        (
+            "DIMENSION U1(6),U2(6),U3(6),V1(6),V2(6),V3(6)",
+            "DIMENSION U1(8),U2(8),U3(8),V1(8),V2(8),V3(8)",
+        ),
     ):
         text = [each.replace(old, new) for each in text]
     name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")

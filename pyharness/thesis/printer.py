@@ -1,13 +1,8 @@
-"""The output of a program, made from its trajectory: TAPE6, the printed page, and TAPE5.
+"""The output of a program, the printed page and TAPE5, made from its trajectory.
 
 The page lacks the first character of each record, the carriage control, always a blank.
 `data/printer.toml` has the FORMATs, and marks their conjectural parts. `fortranformat` writes the
 values; only zeros and values that are not finite are treated here.
-
-TAPE5 is a file of unformatted sequential records. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one
-record: its length in bytes, seven binary64 numbers, and the length again. All are little-endian, as
-in today's Fortran compilers and `scipy.io.FortranFile`. The author's tape had other record marks
-and, as we infer, words of 60 bits.
 """
 
 import math
@@ -23,7 +18,6 @@ from pyharness.model.facts import facts
 from pyharness.model.functions import is_finite
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.thesis.equations import card_torque
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
@@ -31,8 +25,6 @@ _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
 # machine printed R or I, which has no more information.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
-TAPE5 = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
-"""The data type of a record of TAPE5."""
 
 
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
@@ -43,8 +35,7 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """
     formats = formats_of(program)
     assert scene.moments is not None
-    # The input cards have no torque that varies with time.
-    pairs = zip(scene.moments, card_torque(scene) or scene.law.constant, strict=True)
+    pairs = zip(scene.moments, _torque_cards(scene), strict=True)
     records = write(formats["header"], [value for pair in pairs for value in pair])
     records += write(formats["heads"], [])
     for index, row in enumerate(_printed_rows(trajectory, formats["rows"])):
@@ -91,6 +82,13 @@ def formats_of(program: str) -> dict[str, Any]:
     return formats[program]
 
 
+def _torque_cards(scene: Scene) -> tuple[float, float, float]:
+    """Return the torques (N m) on the input cards, which can't vary with time."""
+    cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
+    first, second, third = cards.get(scene.case, scene.law.constant)
+    return first, second, third
+
+
 def write(text: str, values: Sequence[float]) -> list[str]:
     """Return the records, with carriage control, that a FORTRAN WRITE makes of values."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
@@ -104,8 +102,18 @@ def _writer(text: str) -> Any:
     return FortranRecordWriter(text)
 
 
+TAPE5 = np.dtype([("head", "<i4"), ("items", "<f8", (7,)), ("tail", "<i4")])
+"""The data type of a record of TAPE5."""
+
+
 def tape5(trajectory: Trajectory) -> bytes:
-    """Return the bytes of TAPE5 for a trajectory with translational velocities."""
+    """Return the bytes of TAPE5 for a trajectory with translational velocities.
+
+    TAPE5 is a file of unformatted sequential records. Each WRITE(5)TIME,U1,U2,U3,V1,V2,V3 is one
+    record: its length in bytes, seven binary64 numbers, and the length again. All are
+    little-endian, as in today's Fortran compilers and `scipy.io.FortranFile`. The author's tape had
+    other record marks and, as we infer, words of 60 bits.
+    """
     assert trajectory.velocity is not None
     result = np.empty(len(trajectory.time), dtype=TAPE5)
     result["head"] = result["tail"] = TAPE5["items"].itemsize

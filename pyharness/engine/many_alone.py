@@ -1,4 +1,4 @@
-"""What is computed body by body: events, sensitivities, and what the vector kernel can't take.
+"""Bodies one by one: events, sensitivities, and what the vector kernel can't take.
 
 That kernel takes no torque of the state or about the axes of space, and no changing inertia.
 """

@@ -20,8 +20,7 @@ found = solve(scene, time, tolerance=1e-9, attitude=True)
 
 # With the arcsine the small angles are accurate too. The two signs are one attitude.
 distance = np.minimum(
-    np.linalg.norm(found.attitude - target, axis=1),
-    np.linalg.norm(found.attitude + target, axis=1),
+    np.linalg.norm(found.attitude - target, axis=1), np.linalg.norm(found.attitude + target, axis=1)
 )
 error = np.degrees(4.0 * np.arcsin(distance / 2.0))
 print(f"error from {error[0]:.0f} to {error[-1]:.0e} deg")

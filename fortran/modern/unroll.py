@@ -58,11 +58,7 @@ ORDER_CARRIED = 7
 # The two factors of the products in equations 13-15, and the arrays in which the plain code stores
 # each unknown.
 FACTORS = (("y", "z"), ("x", "z"), ("x", "y"))
-PLACES = {
-    "x": ("left(2", "left(3"),
-    "y": ("left(1", "right(3"),
-    "z": ("right(1", "right(2"),
-}
+PLACES = {"x": ("left(2", "left(3"), "y": ("left(1", "right(3"), "z": ("right(1", "right(2")}
 # A factor over k is a product with 1/k, which is rounded. The rounding error has the same sign in
 # each step, so that the energy would drift in proportion to time. In these terms 1/k is therefore
 # corrected by its rounding error. Higher terms cause no drift that could be measured.

@@ -274,7 +274,7 @@ def _notes(finding: Finding) -> list[str]:
     lines = [
         f"ratio: time of {yardstick(finding)} over own time, above 1 is faster. A time is that of "
         f"the fastest setting whose error, {error}, is at most the one "
-        f"named; '-': none is. {last if drawn else 'best: smallest error of any setting.'}",
+        f"named; '-': none is. {last if drawn else 'best: smallest error of any setting.'}"
     ]
     compiling: dict[str, float] = {}
     for (_, method), seconds in finding.preparation.items():

@@ -209,7 +209,7 @@ def _notes(found: Terms) -> list[str]:
         "us per solve: time of a prepared solver's call at its fastest tolerance whose error at T "
         "is at most the target error; '-': no tolerance has one. The error is that of omega over "
         "the largest |omega| at 0 and T, or the angle between the attitudes (rad) if it is larger. "
-        "prepare: time of the first prepare(), ms.",
+        "prepare: time of the first prepare(), ms."
     ]
     if _has(found, HEYOKA):
         lines.append(

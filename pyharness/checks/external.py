@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from pyharness.checks.compare.candidates import (
     program_candidate,
 )
 from pyharness.checks.external_file import UNITS, Problem, Value, problems
-from pyharness.checks.scenes.perturbed import perturbed
 from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import METHODS, REGISTRY
 from pyharness.engine.solve import finest
@@ -29,9 +28,41 @@ from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.scene import Scene
+from pyharness.model.scene import Scene, Triple
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import PROGRAM_REGISTRY
+
+
+def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
+    """Yield copies of the scene, each with one nonzero number multiplied by 1 + `part`."""
+    for name in ("moments", "coefficients", "omega"):
+        for triple in _triples(getattr(scene, name), part):
+            yield _with(scene, name, triple)
+    law = scene.law
+    for name in ("constant", "rate"):
+        for triple in _triples(getattr(law, name), part):
+            yield replace(scene, torque=_with(law, name, triple))
+    for name in ("sines", "cosines"):
+        waves = getattr(law, name)
+        for place, (amplitude, frequency) in enumerate(waves):
+            faster = (amplitude, frequency * (1.0 + part))
+            for wave in (*((triple, frequency) for triple in _triples(amplitude, part)), faster):
+                changed = (*waves[:place], wave, *waves[place + 1 :])
+                yield replace(scene, torque=_with(law, name, changed))
+
+
+def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
+    changes: dict[str, Any] = {name: part}
+    return replace(whole, **changes)
+
+
+def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
+    for axis, x in enumerate(triple or ()):
+        if x:
+            first, second, third = np.array(triple) * (1.0 + part * (np.arange(3) == axis))
+            yield float(first), float(second), float(third)
+
 
 __all__ = ["external_checks", "problems"]
 

@@ -34,15 +34,58 @@ from pyharness.checks.judge import (
 )
 from pyharness.checks.scenes.extreme import EXTREMES, Circumstance, speed
 from pyharness.checks.stress import LISTINGS, named
-from pyharness.checks.theory import promises
 from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.checks.theory.schemes import SCHEMES, Series, constant
 from pyharness.checks.tolerances import affordable
 from pyharness.engine.problem import closed_form
-from pyharness.engine.registry import FIXED_STEP, GAUSS, SCIPY_METHODS
+from pyharness.engine.registry import FIXED_STEP, GAUSS, REGISTRY, SCIPY_METHODS
+from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import reference
+
+STEPS = Basis(
+    "derived",
+    "error of omega, energy and momentum: promised errors of all steps, and rounding errors, with "
+    "the error amplification",
+    "the tolerance, or a majorant series for fixed steps (`theory/py`); first-order "
+    "perturbations (`theory/conditioning.py`)",
+)
+"""Basis of limits from the promised errors of the steps."""
+
+
+def steps_of(name: str, run_steps: int, evaluations: int) -> float:
+    """Return how often omega is rounded: 0 if compensated; for SciPy's methods an estimate."""
+    if name in SCIPY_METHODS:
+        return evaluations / (1 if name == "lsoda" else 6)
+    return float(run_steps) if name in FIXED_STEP or name == "quick" else 0.0
+
+
+def fixed_step_sum(name: str, angle: float, steps: int) -> float:
+    """Return a bound on the sum of the relative truncation errors of all fixed steps.
+
+    `angle` (rad) is the product of the largest Euler coefficient, the largest omega and the step.
+    From 0.5 on, the bound is infinite.
+    """
+    if angle >= 0.5:
+        return math.inf
+    order = REGISTRY[name].order
+    own = sum(c * angle**k for k, c in enumerate(_series(name)) if k > order)
+    return steps * (angle ** (order + 1) / (1.0 - angle) + own)
+
+
+@cache
+def _series(name: str) -> tuple[float, ...]:
+    """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
+
+    This is one of Euler's equations with A = B = C = 1 and equal components.
+    """
+    ones = np.ones(3)
+    equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
+    found = SCHEMES[name].scheme(Series(equal), constant(ones))[:, 0]
+    return tuple(found.tolist())
+
 
 # Our methods that run at two tolerances: a middling one, and one near the finest, where rounding
 # shows.
@@ -162,7 +205,7 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
     return linear(allowed(truth, made, growth, steps=steps))
 
 
-DERIVED = Policy(_derived, promises.STEPS, refusable)
+DERIVED = Policy(_derived, STEPS, refusable)
 """Policy whose limit is a method's promised error plus rounding, amplified by the flow."""
 
 
@@ -173,7 +216,7 @@ def _roundings(tried: MethodRun, truth: Truth) -> float:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
     if method == "auto":
         return float(answer.steps)
-    return promises.steps_of(method, answer.steps, answer.evaluations or 0)
+    return steps_of(method, answer.steps, answer.evaluations or 0)
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
@@ -207,7 +250,7 @@ def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     if tried.method in FIXED_STEP and truth.exact:
         radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
         steps = _steps(tried.scene, truth.end)
-        return promises.fixed_step_sum(tried.method, radians / steps, steps)
+        return fixed_step_sum(tried.method, radians / steps, steps)
     return tried.tolerance
 
 

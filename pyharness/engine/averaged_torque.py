@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pyharness.engine.array_tape import outputs_at
 from pyharness.engine.averaged_coordinates import Torque
 from pyharness.engine.problem import normalized
+from pyharness.engine.recorded import outputs_at
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene

@@ -12,8 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.engine.rates import rates
 from pyharness.engine.stepper import step_lengths
+from pyharness.engine.steps import rates
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces, nodes
 from pyharness.model.errors import InputError

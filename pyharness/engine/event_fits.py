@@ -12,15 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import (
-    NODES,
-    POINTS,
-    TO_COEFFICIENTS,
-    Fits,
-    Index,
-    Roots,
-    joined,
-)
+from pyharness.engine.event_roots import NODES, POINTS, TO_COEFFICIENTS, Fits, Index, Roots, joined
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes
 

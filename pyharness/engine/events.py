@@ -10,13 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.engine.event_fits import (
-    ROUNDING,
-    Solution,
-    fitted,
-    with_noise,
-    zero_intervals,
-)
+from pyharness.engine.event_fits import ROUNDING, Solution, fitted, with_noise, zero_intervals
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
 from pyharness.engine.periodic_events import improved, repeated

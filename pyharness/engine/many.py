@@ -26,14 +26,7 @@ from pyharness.engine.many_scenes import (
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
 from pyharness.engine.solver import CODES, PREPARED
-from pyharness.model.arrays import (
-    check_rows,
-    count_bodies,
-    only_one,
-    rows_of,
-    spread,
-    threads_of,
-)
+from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
 from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
@@ -220,7 +213,7 @@ def _solved(
     if step is not None:
         step_size = finite("step", step)
     code, asked = _chosen(method, tolerance)
-    bodies = _Bodies(ready, {**own, "t_end": t_end}, step_size, code, asked, checked_effort(effort))
+    bodies = Bodies(ready, {**own, "t_end": t_end}, step_size, code, asked, checked_effort(effort))
     if bodies.attitude is not None:
         check_attitude(method)
     found = bodies.solve(threads_of(threads), out, estimates)
@@ -270,7 +263,7 @@ def _solve_groups(
     return found
 
 
-class _Bodies:
+class Bodies:
     """The checked arguments of the kernel: arrays `own`, and for others a scene's `ready` rows."""
 
     def __init__(
@@ -309,6 +302,7 @@ class _Bodies:
             )
 
     def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
+        """Return the final states."""
         found = place_for(out, self.n, self.attitude is not None, with_estimates)
         if found.estimates is not None:
             found.estimates[:] = _UNKNOWN

@@ -86,10 +86,8 @@ def solve_one_by_one(
     # Bodies that differ in their starts alone share one solver.
     shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
     # `omega0` or `attitude0` may share memory with `out`.
-    own = Ensemble(
-        np.full((n, 3), np.nan), found.status, np.full((n, 4), np.nan) if with_attitude else None,
-        found.estimates,
-    )  # fmt: skip
+    attitudes = np.full((n, 4), np.nan) if with_attitude else None
+    own = Ensemble(np.full((n, 3), np.nan), found.status, attitudes, found.estimates)
     found.status[:] = Statuses.REFUSED
     turns = counted.get("attitude0")
 
@@ -106,7 +104,7 @@ def solve_one_by_one(
 
     for_each_piece(enter, n, threads)
     found.omega[:] = own.omega
-    if found.attitude is not None and own.attitude is not None:
+    if found.attitude is not None:
         found.attitude[:] = own.attitude
     return found
 

@@ -91,49 +91,29 @@ def many_states(
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
     """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many`."""
+    usual = solver.scene.attitude or IDENTITY
+    given = usual if attitude0 is None else scalar_first(attitude0)
     starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
-    n = len(starts)
+    n, turns = len(starts), rows_of("attitude0", given, 4)
     check_rows("t_end", times, n)
-    turns = rows_of("attitude0", solver.scene.attitude or IDENTITY, 4)
-    if attitude0 is not None:
-        turns = rows_of("attitude0", scalar_first(attitude0), 4)
-        check_rows("attitude0", turns, n)
-    found = place_for(out, n, with_attitude=True)
-    if out is not None:  # the starts may share memory with it
-        starts, turns = starts.copy(), turns.copy()
-    has_kernel = solver.packed[Places.METHOD] in _SIDE_BY_SIDE and solver.scene.inertia is None
-    work = partial(_solve_by_moments if has_kernel else solve_each, solver, starts, times, turns)
-    for_each_piece(partial(work, found), n, threads_of(threads))
+    check_rows("attitude0", turns, n)
+    code = int(solver.packed[Places.METHOD])
+    if code in _SIDE_BY_SIDE and solver.scene.inertia is None:
+        from pyharness.engine.many import Bodies
+        from pyharness.engine.many_scenes import rows_of_scene
+
+        scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
+        own = {"omega0": starts, "t_end": times, "attitude0": turns}
+        bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort)
+        found = bodies.solve(threads_of(threads), out, with_estimates=False)
+    else:
+        found = place_for(out, n, with_attitude=True)
+        if out is not None:  # the starts may share memory with it
+            starts, turns = starts.copy(), turns.copy()
+        work = partial(solve_each, solver, starts, times, turns, found)
+        for_each_piece(work, n, threads_of(threads))
     assert found.attitude is not None
     return found.omega, found.attitude, found.status
-
-
-def _solve_by_moments(
-    solver: "Solver[Any]", starts: Array, times: Array, turns: Array, found: Ensemble,
-    piece: slice, given_up: NDArray[np.int32],
-) -> None:  # fmt: skip
-    assert found.attitude is not None
-    scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
-    law = scene.body_torque
-    waves = [
-        np.array([[*amplitude, frequency] for amplitude, frequency in each]).reshape(1, -1, 4)
-        for each in (law.sines, law.cosines)
-    ]
-    extension().solve_ensemble(
-        int(solver.packed[Places.METHOD]), tolerance, scene.step_size, effort,
-        scene.moments is not None,
-        *(np.array([each]).T for each in (
-            scene.moments or scene.coefficients, law.constant, law.rate
-        )),
-        *(each.T for each in waves),
-        starts[piece].T, _select(times, piece), _select(turns, piece).T, given_up,
-        found.omega[piece].T, found.attitude[piece].T, found.status[piece],
-        found.estimates_of(piece),
-    )  # fmt: skip
-
-
-def _select(rows: Array, piece: slice) -> Array:
-    return rows if len(rows) == 1 else rows[piece]
 
 
 def solve_each(
@@ -184,7 +164,7 @@ def solve_side_by_side(
     n = piece.stop - piece.start
 
     def part(rows: Array) -> Array:
-        return spread(_select(rows, piece), n)
+        return spread(rows if len(rows) == 1 else rows[piece], n)
 
     first = last = np.empty((0, 4))
     if turns is not None:

@@ -185,12 +185,7 @@ def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) ->
 
 
 def tilt(
-    axis: int,
-    toward: Numbers,
-    angle: Number,
-    *,
-    terminal: bool | int = False,
-    direction: int = 0,
+    axis: int, toward: Numbers, angle: Number, *, terminal: bool | int = False, direction: int = 0
 ) -> Event:
     """Return the event that the angle between a body axis and a direction in space equals a value.
 

@@ -13,13 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.engine.scipy_run import (
-    FINEST_STEP,
-    NoNumberError,
-    RightHandSide,
-    Run,
-    rows_of,
-)
+from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, RightHandSide, Run, rows_of
 from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.system import slopes_of
@@ -393,8 +387,7 @@ class _StateRun(Run):
         finite = np.isfinite(rows).all(axis=1)
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
         rows = _with_unit_attitude(rows)
-        solutions = tuple(self._solutions)
-        return _Rows(rows, len(rows) == wanted, self._largest, solutions)
+        return _Rows(rows, len(rows) == wanted, self._largest, tuple(self._solutions))
 
 
 def _with_unit_attitude(rows: Array) -> Array:

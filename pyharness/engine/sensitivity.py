@@ -34,11 +34,7 @@ def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> 
 
 
 def torque_noise(
-    scene: Scene,
-    omega0: Triple,
-    t_end: float,
-    steps: float = math.inf,
-    scale: float | None = None,
+    scene: Scene, omega0: Triple, t_end: float, steps: float = math.inf, scale: float | None = None
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.array_tape import ARRAYS
+from pyharness.engine.recorded import ARRAYS
 from pyharness.model.errors import TimedError
 from pyharness.model.tape import OMEGA, Tape, slot_values
 

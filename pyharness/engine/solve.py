@@ -16,7 +16,6 @@ from pyharness.engine.continuous import solution_of, with_events, with_events_re
 from pyharness.engine.event_functions import event_functions
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
 from pyharness.engine.plan import plan
-from pyharness.engine.rates import rates as rates_of
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
@@ -35,6 +34,7 @@ from pyharness.engine.rescaled import (
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
+from pyharness.engine.steps import rates as rates_of
 from pyharness.engine.steps import transformed_steps
 from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array

@@ -13,8 +13,8 @@ import pytest
 
 from pyharness import InputError, Scene, TorqueLaw, load, solve
 from pyharness.engine.parameters import parameters_of
-from pyharness.engine.rates import rates
 from pyharness.engine.scene_reader import scene_of_file
+from pyharness.engine.steps import rates
 from pyharness.events import crosses
 from pyharness.model.attitude import product
 from pyharness.model.changing import ChangingMoments

@@ -76,8 +76,7 @@ def momentum(scene: Scene, times: Array) -> Array:
 
 @pytest.mark.sampled
 @pytest.mark.parametrize(
-    ("name", "time"),
-    [("waves", -2.0), *zip(SCENES, itertools.cycle((2.0, -2.0)), strict=False)],
+    ("name", "time"), [("waves", -2.0), *zip(SCENES, itertools.cycle((2.0, -2.0)), strict=False)]
 )
 def test_series_agrees_with_seven_unknowns(name: str, time: float) -> None:
     times = [0.1 * time, 0.5 * time, time]

@@ -8,15 +8,7 @@ import numpy as np
 
 import pyharness
 from pyharness import *  # noqa: F403
-from pyharness import (
-    ChangingMoments,
-    Scene,
-    TorqueLaw,
-    case_scene,
-    events,
-    opaque,
-    torques,
-)
+from pyharness import ChangingMoments, Scene, TorqueLaw, case_scene, events, opaque, torques
 from tests.refusals.names_cli import *  # noqa: F403
 from tests.refusals.names_cli import BRICK
 from tests.refusals.names_model import *  # noqa: F403

@@ -6,13 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pyharness import (
-    ChangingMoments,
-    Scene,
-    StateTorque,
-    TorqueLaw,
-    read_scene,
-)
+from pyharness import ChangingMoments, Scene, StateTorque, TorqueLaw, read_scene
 from pyharness.engine.scene_reader import scene_of
 from pyharness.model.expressions import parsed
 from pyharness.model.scene_file import scene_text

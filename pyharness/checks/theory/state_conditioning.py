@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow, sampled
-from pyharness.engine.array_tape import inputs_of, outputs_at, table_values
 from pyharness.engine.linearised import transitions
-from pyharness.engine.recorded import system
+from pyharness.engine.recorded import inputs_of, outputs_at, system, table_values
 from pyharness.engine.solve import solve
 from pyharness.model.dual import with_derivatives
 from pyharness.model.errors import InputError

@@ -251,7 +251,4 @@ def compute(text: str, angles: Any) -> tuple[Any, Any]:
     odd = quarter % 2 != 0
     sine = np.where(odd, scope["c_"], scope["s_"])
     cosine = np.where(odd, scope["s_"], scope["c_"])
-    return (
-        np.where(quarter & 2, -sine, sine),
-        np.where((quarter + 1) & 2, -cosine, cosine),
-    )
+    return (np.where(quarter & 2, -sine, sine), np.where((quarter + 1) & 2, -cosine, cosine))

@@ -23,13 +23,7 @@ from tests.campaigns.function_errors import lane_circular, pair_operations
 from tests.campaigns.function_errors.nearness import half_pi, hard_angle
 from tests.campaigns.function_errors.pair_circular import Method, of_fortran
 from tests.campaigns.function_errors.pair_operations import OPERATIONS, Operation
-from tests.campaigns.function_errors.sources import (
-    JAVASCRIPT,
-    LANES,
-    WIDE,
-    WORD_PAIRS,
-    Pair,
-)
+from tests.campaigns.function_errors.sources import JAVASCRIPT, LANES, WIDE, WORD_PAIRS, Pair
 from tests.instruction_sets import fuses_here
 
 Numbers = NDArray[np.float64]

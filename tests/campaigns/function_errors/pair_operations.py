@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.campaigns.function_errors.nearness import exponent
-from tests.campaigns.function_errors.sources import (
-    TWO_WORDS,
-    WIDE,
-    WORD_PAIRS,
-    Pair,
-    translate,
-)
+from tests.campaigns.function_errors.sources import TWO_WORDS, WIDE, WORD_PAIRS, Pair, translate
 
 Numbers = NDArray[np.float64]
 

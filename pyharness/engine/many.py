@@ -5,20 +5,18 @@ Each result is bit-for-bit independent of the other bodies, their order and the 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.engine.many_alone import NO_ATTITUDE, Details, is_solved_alone, solve_one_by_one
 from pyharness.engine.many_scenes import (
     BODIES,
     TORQUES,
     Axes,
+    Bodies,
     about_principal,
     check_alike,
-    checked_rows,
     from_scene,
     from_scenes,
     rows_of_scene,
@@ -26,24 +24,19 @@ from pyharness.engine.many_scenes import (
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
 from pyharness.engine.solver import CODES, PREPARED
-from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
+from pyharness.model.arrays import check_rows, only_one, rows_of, spread, threads_of
 from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, unknown
-from pyharness.model.extension import extension
-from pyharness.model.progress import bar_of_bodies, expect_bodies, for_each_piece
+from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, boolean, finite
-from pyharness.model.waves import with_merged_rows
 
 _STARTS = ("omega0", "attitude0")
-_MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
-_NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
-_UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 
 
 def solve_many(
@@ -261,75 +254,6 @@ def _solve_groups(
         if found.estimates is not None:
             found.estimates[rows] = part.estimates
     return found
-
-
-class Bodies:
-    """The checked arguments of the kernel: arrays `own`, and for others a scene's `ready` rows."""
-
-    def __init__(
-        self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
-        effort: float,
-    ) -> None:  # fmt: skip
-        given = checked_rows(own)
-        self.n = count_bodies(given)
-        rows = {**ready, **given}
-        self.by_moments = "moments" in (given if "coefficients" in given else rows)
-        self.body = rows["moments" if self.by_moments else "coefficients"]
-        self.rate, self.times = rows["torque_rate"], rows["t_end"]
-        self.attitude = rows.get("attitude0")
-        law: tuple[Array, Array, Array] | None = ready.get("merged")
-        if law is None or not given.keys().isdisjoint(_MERGED):
-            law = with_merged_rows(*(rows[name] for name in _MERGED))
-        self.constant, self.sines, self.cosines = law
-        self.omega0 = spread(rows["omega0"], self.n)
-        self.step = step
-        if not step > 0.0:
-            raise InputError(f"step is {step:g}; allowed: above 0")
-        self.code, self.tolerance, self.effort = code, tolerance, effort
-        if code == Methods.CLOSED_FORM:
-            self._check_form()
-
-    def _check_form(self) -> None:
-        torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
-        if any(each.any() for each in torques):
-            raise InputError(
-                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
-            )
-        if self.attitude is not None and not self.by_moments:
-            raise InputError(
-                "closed-form can't compute the attitude of bodies given by coefficients; "
-                "allowed: moments, or methods auto and taylor"
-            )
-
-    def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
-        """Return the final states."""
-        found = place_for(out, self.n, self.attitude is not None, with_estimates)
-        if found.estimates is not None:
-            found.estimates[:] = _UNKNOWN
-        # The kernel may write a result before it reads the start again.
-        if np.may_share_memory(self.omega0, found.omega):
-            self.omega0 = self.omega0.copy()
-        attitude = self.attitude
-        if attitude is not None and np.may_share_memory(attitude, found.attitude):
-            self.attitude = attitude.copy()
-        for_each_piece(partial(self._enter, found), self.n, threads)
-        if found.estimates is not None:
-            found.estimates[~(found.estimates >= 0.0)] = np.nan
-        return found
-
-    def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
-        def part(array: Array) -> Array:
-            return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
-
-        extension().solve_ensemble(
-            self.code, self.tolerance, self.step, self.effort, self.by_moments,
-            part(self.body), part(self.constant), part(self.rate), part(self.sines),
-            part(self.cosines), part(self.omega0), part(self.times),
-            _NOTHING if self.attitude is None else part(self.attitude), given_up,
-            found.omega[piece].T,
-            _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
-            found.estimates_of(piece),
-        )  # fmt: skip
 
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.many_scenes import Bodies, rows_of_scene
 from pyharness.model.arrays import (
     buffer_of,
     check_rows,
@@ -15,7 +16,7 @@ from pyharness.model.arrays import (
     threads_of,
     unit_quaternions,
 )
-from pyharness.model.attitude import IDENTITY, product, scalar_first
+from pyharness.model.attitude import IDENTITY, rotated, scalar_first
 from pyharness.model.codes import Methods, Places, Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
@@ -68,24 +69,6 @@ def times_within(scene: Scene, times: Array) -> Array:
     return np.where((first < times) & (times < last), times, np.nan)
 
 
-def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
-    # The fixed order of the sums gives bit-for-bit the same products for any n, and as in C.
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    return np.stack(
-        [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
-        axis=-1,
-    )
-
-
-def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes of the matrix's axes from those of the principal axes, (4,) or (n, 4)."""
-    w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
-    first, *rest = np.moveaxis(attitudes, -1, 0)
-    parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
-    return np.stack(parts, axis=-1)
-
-
 def many_states(
     solver: "Solver[Any]", omega0: Any, t_end: Any, attitude0: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
@@ -99,9 +82,6 @@ def many_states(
     check_rows("attitude0", turns, n)
     code = int(solver.packed[Places.METHOD])
     if code in _SIDE_BY_SIDE and solver.scene.inertia is None:
-        from pyharness.engine.many import Bodies
-        from pyharness.engine.many_scenes import rows_of_scene
-
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
         own = {"omega0": starts, "t_end": times, "attitude0": turns}
         bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort)

@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pyharness.engine.many_prepared import rotated, turned_back
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
@@ -18,16 +18,21 @@ from pyharness.model.arrays import (
     unit_quaternions,
     waves_of,
 )
-from pyharness.model.attitude import IDENTITY, quaternions_of_axes
-from pyharness.model.codes import Statuses
+from pyharness.model.attitude import IDENTITY, quaternions_of_axes, rotated, turned_back
+from pyharness.model.codes import Methods, Statuses
+from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.inertia import SYMMETRIC, nearest_float, principal_frame
+from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import STATE_TORQUE, Scene, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.model.waves import with_merged_rows
 
+_MERGED = ("torque_constant", "sines", "cosines")  # what `with_merged_rows` may change
+_NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
+_UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
 TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
@@ -256,3 +261,72 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
             raise InputError(STATE_TORQUE)
         law = replace(law, **torque)
     return replace(scene, torque=law, **own)
+
+
+class Bodies:
+    """The checked arguments of the kernel: arrays `own`, and for others a scene's `ready` rows."""
+
+    def __init__(
+        self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
+        effort: float,
+    ) -> None:  # fmt: skip
+        given = checked_rows(own)
+        self.n = count_bodies(given)
+        rows = {**ready, **given}
+        self.by_moments = "moments" in (given if "coefficients" in given else rows)
+        self.body = rows["moments" if self.by_moments else "coefficients"]
+        self.rate, self.times = rows["torque_rate"], rows["t_end"]
+        self.attitude = rows.get("attitude0")
+        law: tuple[Array, Array, Array] | None = ready.get("merged")
+        if law is None or not given.keys().isdisjoint(_MERGED):
+            law = with_merged_rows(*(rows[name] for name in _MERGED))
+        self.constant, self.sines, self.cosines = law
+        self.omega0 = spread(rows["omega0"], self.n)
+        self.step = step
+        if not step > 0.0:
+            raise InputError(f"step is {step:g}; allowed: above 0")
+        self.code, self.tolerance, self.effort = code, tolerance, effort
+        if code == Methods.CLOSED_FORM:
+            self._check_form()
+
+    def _check_form(self) -> None:
+        torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
+        if any(each.any() for each in torques):
+            raise InputError(
+                "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
+            )
+        if self.attitude is not None and not self.by_moments:
+            raise InputError(
+                "closed-form can't compute the attitude of bodies given by coefficients; "
+                "allowed: moments, or methods auto and taylor"
+            )
+
+    def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
+        """Return the final states."""
+        found = place_for(out, self.n, self.attitude is not None, with_estimates)
+        if found.estimates is not None:
+            found.estimates[:] = _UNKNOWN
+        # The kernel may write a result before it reads the start again.
+        if np.may_share_memory(self.omega0, found.omega):
+            self.omega0 = self.omega0.copy()
+        attitude = self.attitude
+        if attitude is not None and np.may_share_memory(attitude, found.attitude):
+            self.attitude = attitude.copy()
+        for_each_piece(partial(self._enter, found), self.n, threads)
+        if found.estimates is not None:
+            found.estimates[~(found.estimates >= 0.0)] = np.nan
+        return found
+
+    def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
+        def part(array: Array) -> Array:
+            return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
+
+        extension().solve_ensemble(
+            self.code, self.tolerance, self.step, self.effort, self.by_moments,
+            part(self.body), part(self.constant), part(self.rate), part(self.sines),
+            part(self.cosines), part(self.omega0), part(self.times),
+            _NOTHING if self.attitude is None else part(self.attitude), given_up,
+            found.omega[piece].T,
+            _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
+            found.estimates_of(piece),
+        )  # fmt: skip

@@ -159,3 +159,21 @@ def quaternions_of_axes(axes: Array) -> Array:
     # Older versions of SciPy refuse read-only arrays.
     found: Array = Rotation.from_matrix(np.array(axes)).as_quat()[:, [3, 0, 1, 2]]
     return found
+
+
+def rotated(vectors: Array, matrix: Array) -> Array:
+    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
+    # The fixed order of the sums gives bit-for-bit the same products for any n, and as in C.
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.stack(
+        [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
+        axis=-1,
+    )
+
+
+def turned_back(attitudes: Array, turn: Any) -> Array:
+    """Return attitudes of the matrix's axes from those of the principal axes, (4,) or (n, 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
+    first, *rest = np.moveaxis(attitudes, -1, 0)
+    parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
+    return np.stack(parts, axis=-1)

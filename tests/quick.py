@@ -138,14 +138,15 @@ def importers(path: str) -> dict[str, int]:
 def users_of() -> dict[str, set[str]]:
     """Return the modules of the package and of the tests that import a module, by its name."""
     found: dict[str, set[str]] = {}
-    for path in [*(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]:
+    stub = ROOT / "pyharness/__init__.pyi"
+    for path in [stub, *(ROOT / "pyharness").rglob("*.py"), *(ROOT / "tests").rglob("*.py")]:
         for name in imported(path.read_text()):
             found.setdefault(name, set()).add(_module(str(path.relative_to(ROOT))))
     return found
 
 
 def _module(path: str) -> str:
-    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    return path.removesuffix("i").removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 @cache

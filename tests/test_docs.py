@@ -76,9 +76,9 @@ def test_output_is_current(
     reports: list[Report] = []
     show = options.show
 
-    def shown(report: Report, *rest: Any) -> None:
+    def shown(report: Report, *rest: Any, **options: Any) -> int:
         reports.append(report)
-        show(report, *rest)
+        return show(report, *rest, **options)
 
     monkeypatch.setattr(options, "show", shown)
     words = command.removeprefix("pyharness ")

@@ -49,7 +49,7 @@ STEPS = Basis(
     "derived",
     "error of omega, energy and momentum: promised errors of all steps, and rounding errors, with "
     "the error amplification",
-    "the tolerance, or a majorant series for fixed steps (`theory/py`); first-order "
+    "the tolerance, or a majorant series for fixed steps (`checks/hold.py`); first-order "
     "perturbations (`theory/conditioning.py`)",
 )
 """Basis of limits from the promised errors of the steps."""

@@ -4,7 +4,7 @@ The parameter `samples` is the number of times at which states are read; `of` na
 by the rank of its moment.
 """
 
-import pkgutil
+import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -101,7 +101,8 @@ def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
-    return np.asarray(pkgutil.resolve_name(given["function"])(batch))
+    room, _, name = given["function"].partition(":")
+    return np.asarray(getattr(importlib.import_module(room), name)(batch))
 
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:

@@ -260,6 +260,7 @@ def test_memory_is_refused_where_the_half_of_it_ends(tmp_path: Path, monkeypatch
     sweep = read_sweep(written(tmp_path, text(TILT)))
     estimate = run_sweep(sweep, str(tmp_path / "store")).estimate
     assert estimate is not None
+    monkeypatch.setattr("pyharness.model.scene._BYTES_PER_STEP", 1)  # only the sweep is too large
     # Pages of one byte: exactly half of the memory, and two bytes less.
     for number, refused in ((2 * estimate.memory, False), (2 * estimate.memory - 2, True)):
         sizes = {"SC_PHYS_PAGES": number, "SC_PAGE_SIZE": 1}

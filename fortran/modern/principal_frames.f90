@@ -10,7 +10,8 @@ module principal_frames
   integer, parameter :: MOST_ROTATIONS = 60 ! some ten suffice
   ! A smaller element off the diagonal changes no digit that is returned.
   real(dp), parameter :: NOTHING = 2.0_dp**(-100)
-  real(dp), parameter :: THIN = 2.0_dp**(-40) ! least over largest moment that double-double resolves
+  ! Least over largest moment that double-double resolves.
+  real(dp), parameter :: THIN = 2.0_dp**(-40)
   type(pair_t), parameter :: ZERO = pair_t(0.0_dp, 0.0_dp), ONE = pair_t(1.0_dp, 0.0_dp)
 
   public :: find_frame

@@ -76,6 +76,15 @@ def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
         assert line.startswith(f"quick: {wanted} files;")
 
 
+@pytest.mark.campaign
+def test_it_runs_tests_of_the_project() -> None:
+    command = "from tests.quick import run; print(run(['tests/test_style.py'], 60.0))"
+    done = subprocess.run(
+        [sys.executable, "-c", command], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.endswith("of 1 files; make test runs all\n0\n"), done.stdout + done.stderr
+
+
 def test_a_commit_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["no-such-commit"]) == 2
     assert capsys.readouterr().err.count("\n") == 1

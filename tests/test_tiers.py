@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests import tiers
+from tests.quick import MARK
 
 TESTS = """
 import pytest, time
@@ -39,9 +40,7 @@ def test_a_long_test_is_marked(
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n campaign\n sampled\n")
     (tmp_path / f"test_{len(mark)}.py").write_text(TESTS)
     if mark:  # it is not even imported
-        (tmp_path / "test_marked_as_a_whole.py").write_text(
-            "import pytest\n" + tiers.MARK + "1 / 0\n"
-        )
+        (tmp_path / "test_marked_as_a_whole.py").write_text("import pytest\n" + MARK + "1 / 0\n")
     pytest.main(
         [str(tmp_path), "-p", "no:cacheprovider", "-p", "no:zarr", "-v", *mark], plugins=[tiers]
     )

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.quick import MARK, WEEKLY
+
 FAST = "not campaign"
 LIMIT = 1.0  # s of CPU on the machine on which the yardstick takes _USUAL
 _USUAL = 0.045  # s
 # A test that imports packages first is not judged, because another would do it in another order.
 _MODULES = 20
-WEEKLY = Path(__file__).parent / "campaigns"
-MARK = "\npytestmark = pytest.mark.campaign\n"
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -56,6 +56,14 @@ def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
         (60.0, "pass", 0, "2 tests passed of 2"),
         (60.0, "assert False", 1, "1 tests passed of 2"),
         (2.0, "time.sleep(90)", 0, "1 tests passed of 2"),
+        (
+            2.0,
+            """
+    try: time.sleep(90)
+    except Exception: assert False""",
+            0,
+            "1 tests passed of 2",
+        ),
         (-1.0, "pass", 0, "0 tests passed of 2"),
     ]
     (tmp_path / "test_z.py").write_text("def test_z(): pass\n")

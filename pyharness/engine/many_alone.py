@@ -59,8 +59,8 @@ def solve_one_by_one(
     Raise InputError if the torque needs an attitude and there is none, if the method can't solve
     the scene, or if a torque in space acts on bodies given by coefficients.
     """
-    check_torque(scene, method, attitude=True)
     check_prepared(scene, method)
+    check_torque(scene, method, attitude=True)
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
         raise InputError(

@@ -20,7 +20,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import is_opaque
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
@@ -50,7 +50,7 @@ def checked_names(
     allowed = "allowed: names, as in ['omega0', 'moments']"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
-    if isinstance(scene.torque, StateTorque) and scene.torque.tape is None:
+    if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
     values = parameters_of(scene)
     known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]

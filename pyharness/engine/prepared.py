@@ -96,8 +96,8 @@ def prepare(
         raise unknown("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
-    check_torque(scene, method, attitude)
     check_prepared(scene, method)
+    check_torque(scene, method, attitude)
     # An attitude that was not requested is not computed, unless the torque needs it.
     own = scene.attitude or IDENTITY if attitude else None
     about_principal, _ = principal(replace(scene, attitude=own))

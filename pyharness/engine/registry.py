@@ -14,7 +14,7 @@ from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, tolerance_of
 
@@ -236,6 +236,11 @@ def check_attitude(method: str) -> None:
 
 def check_prepared(scene: Scene, method: str) -> None:
     """Raise InputError if the method has no prepared solver for the torque or inertia."""
+    if is_opaque(scene.torque):
+        raise InputError(
+            "an opaque torque has no prepared solver; allowed: a torque that can be recorded, or "
+            "the function solve"
+        )
     if is_recorded(scene) and method not in PREPARED_FOR_STATE:
         what = "an inertia that changes" if scene.changing else "a torque that depends on the state"
         raise InputError(

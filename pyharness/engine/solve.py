@@ -43,7 +43,7 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, unknown
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, boolean, number, number_list
@@ -130,7 +130,8 @@ def solve(
     dense_output = boolean("dense_output", dense_output)
     if not isinstance(method, str) or method not in METHODS:
         raise unknown("method", method, METHODS)
-    if method == "auto" and isinstance(scene.torque, StateTorque) and scene.torque.tape is None:
+    asked = method
+    if method == "auto" and is_opaque(scene.torque):
         method = "dop853"
     chosen = METHODS[method]
     tolerance = requested_tolerance(method, tolerance)
@@ -144,7 +145,7 @@ def solve(
         )
     check_torque(scene, method, attitude)
     functions = None if events is None else event_functions(events, attitude)
-    names = None if sensitivities is None else checked_names(scene, sensitivities, method, attitude)
+    names = None if sensitivities is None else checked_names(scene, sensitivities, asked, attitude)
     if attitude:
         check_attitude(method)
     given = scene

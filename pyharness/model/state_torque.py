@@ -236,6 +236,11 @@ def opaque(function: Any) -> StateTorque:
     return StateTorque(None, function, _takes_attitude(function))
 
 
+def is_opaque(torque: object) -> bool:
+    """Return whether a torque calls a function that is not recorded."""
+    return isinstance(torque, StateTorque) and torque.tape is None
+
+
 def checked_torque(value: object) -> TorqueLaw | StateTorque:
     """Return a user's torque, recorded if it is a function, or raise InputError."""
     if isinstance(value, (TorqueLaw, StateTorque)):

@@ -26,7 +26,7 @@ from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.symbols import MOST_OPERATIONS
 from pyharness.model.tape import N_INPUTS, Functions, Linear, Operation, Table, Tape
 from pyharness.model.torque_law import TorqueLaw
@@ -163,7 +163,7 @@ def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
         "torque": None,
     }
     torque = scene.torque
-    if isinstance(torque, StateTorque) and torque.tape is None:
+    if is_opaque(torque):
         raise InputError(
             "[torque]: an opaque function can't be written to a file; allowed: a torque that can "
             "be recorded, or dataclasses.replace(trajectory, scene=None) to save the rows alone"

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from pyharness import (
     ChangingInertia,
     ChangingMoments,
+    InputError,
     Scene,
     TorqueLaw,
     Trajectory,
@@ -27,6 +28,7 @@ from pyharness import (
 )
 from pyharness.engine.registry import METHODS
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.codes import Statuses
 from pyharness.truth.reference import reference
 from tests.engine.tolerance_scenes import KINDS, motions
 from tests.engine.tolerance_scenes import draw_changing as draw
@@ -284,3 +286,11 @@ def test_times_before_a_zero_are_solved() -> None:
     states = solve_many(SHRINKING, [19.0, 21.0])
     assert states.omega[0] == pytest.approx(solve(SHRINKING, 19.0).omega[-1], rel=1e-11)
     assert np.isnan(states.omega[1]).all()
+    assert states.ended.tolist() == ["complete", "refused"]
+    start = np.array([SHRINKING.omega] * 2)
+    for attitude in (False, True):
+        solver: Any = prepare(SHRINKING, attitude=attitude)
+        *_, status = solver.many(start, [10.0, 21.0])
+        assert status.tolist() == [Statuses.COMPLETE, Statuses.REFUSED]
+        with pytest.raises(InputError, match="21 s is not before it"):
+            solver(SHRINKING.omega, 21.0)

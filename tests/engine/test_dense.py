@@ -298,6 +298,19 @@ def test_steps_beyond_those_that_are_kept_are_replaced(monkeypatch: pytest.Monke
         assert largest_error(sol_of(each), truth) <= 1e-10
 
 
+@pytest.mark.parametrize("name", [each for each in SCENES if each != "free"])
+def test_steps_are_those_of_the_integration_and_have_its_rows(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pyharness.engine.solve.solution_of", None)  # would solve again
+    times, turning = np.linspace(0.3, 12.0, 40), name != "changing"
+    found = solve(SCENES[name], times, tolerance=1e-5, attitude=turning, dense_output=True)
+    rows = sol_of(found)(times)
+    assert pytest.approx(found.omega, rel=0.0, abs=2e-13) == rows[:3].T
+    if found.attitude is not None:
+        assert pytest.approx(found.attitude, rel=0.0, abs=2e-13) == rows[3:].T
+
+
 @pytest.mark.parametrize("end", [4.0, -1.5])
 def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: float) -> None:
     calls = 0

@@ -179,3 +179,18 @@ def test_a_matrix_in_an_array_is_refused_alone() -> None:
     assert found.omega[4] == pytest.approx(
         solve(Scene("", (1.0, 2.0, 3.0), inertia=thin), 1.0).omega[-1], rel=1e-9
     )
+
+
+def test_a_needle_beyond_double_double_in_an_array() -> None:
+    """Of Fibonacci numbers f, f[75] f[77] - f[76]**2 = 1: the least moment is 1e-16 kg m2."""
+    f = [0.0, 1.0]
+    while len(f) < 78:
+        f.append(f[-2] + f[-1])
+    matrix = ((f[75], f[76], 0.0), (f[76], f[77], 0.0), (0.0, 0.0, f[77]))
+    law = TorqueLaw((1.0, 2.0, 3.0))
+    scene, axes = principal(Scene("", (1.0, 2.0, 3.0), inertia=matrix, torque=law))
+    given = {"inertia": [matrix], "torque_constant": law.constant, "torque_rate": law.rate}
+    found, own = about_principal({**given, "sines": [], "cosines": [], "omega0": scene.omega})
+    assert found["coefficients"][0] == pytest.approx(scene.euler_coefficients, rel=4e-16)
+    assert found["torque_constant"][0] * scene.moments == pytest.approx(scene.law.constant)
+    assert own.axes[0] == pytest.approx(axes, rel=1e-15)

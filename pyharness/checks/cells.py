@@ -21,7 +21,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.thesis import compiled_in_word, in_word
+from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_cells, cell_name, listing_name
 from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
@@ -111,7 +111,7 @@ def words(chosen: Selection) -> Iterator[Attempt]:
         if chosen.only or _is_few(listing):
             yield Attempt(name, partial(_in_word, listing, case, None))
         if chosen.only or _has_all_or_none(listing):
-            for word in compiled_in_word.compiled_words():
+            for word in in_word.compiled_words():
                 own = replace(name, subject=f"{word}/{listing.program}")
                 yield Attempt(own, partial(_in_word, listing, case, word))
 
@@ -128,7 +128,7 @@ def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check
     if word is None:
         other = run_program(scene, listing, "python")
     else:
-        other = compiled_in_word.run(scene, listing, WORDS[word])
+        other = in_word.run_compiled(scene, listing, WORDS[word])
     found = differences(ours, other)
     return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
 

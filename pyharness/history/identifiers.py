@@ -8,7 +8,6 @@ import json
 from collections.abc import Callable, Mapping
 from functools import cache
 from hashlib import sha1, sha256
-from pathlib import Path
 from typing import Any
 
 from pyharness.model.facts import SHIPPED, facts, facts_folder, shipped
@@ -53,13 +52,10 @@ def source_files() -> dict[str, bytes]:
 
 def data_identifier() -> str:
     """Return the SWHID of the folder `DATA` in the source repository."""
-    data = Path(DATA)
+    files = source_files().items()
+    within = f"{DATA}/"
     return directory_identifier(
-        {
-            str(Path(name).relative_to(data)): content
-            for name, content in source_files().items()
-            if Path(name).is_relative_to(data)
-        }
+        {name.removeprefix(within): each for name, each in files if name.startswith(within)}
     )
 
 

@@ -59,10 +59,10 @@ class Program:
         if not isinstance(implementation, str) or implementation not in IMPLEMENTATIONS:
             raise unknown("implementation", implementation, IMPLEMENTATIONS)
         if checked_word(word, implementation) != BINARY64:
-            from pyharness.thesis import compiled_in_word, in_word
+            from pyharness.thesis import in_word
 
             check_steps(scene, self.name, work_of(word, implementation), effort)
-            run = in_word.run if implementation == "python" else compiled_in_word.run
+            run = in_word.run if implementation == "python" else in_word.run_compiled
             return run(scene, listing, in_word.WORDS[word], lipschitz, may_stop)
         check_steps(scene, self.name, implementation, effort)
         return self._computed(scene, listing, implementation, lipschitz, may_stop, velocity)

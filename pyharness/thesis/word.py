@@ -41,6 +41,10 @@ def _operator(
     return operate
 
 
+def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", Any], bool]:
+    return lambda number, other: compare(number._order(other), 0.0)
+
+
 class Number:
     """An immutable number of a word: the integer `m` times 2**`e`.
 
@@ -95,21 +99,9 @@ class Number:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __lt__(self, other: Any) -> bool:
-        """Return whether the exact difference is below zero."""
-        return self._order(other) < 0
-
-    def __gt__(self, other: Any) -> bool:
-        """Return whether the exact difference is above zero."""
-        return self._order(other) > 0
-
-    def __le__(self, other: Any) -> bool:
-        """Return whether the exact difference is at most zero; False for nan."""
-        return self._order(other) <= 0
-
-    def __ge__(self, other: Any) -> bool:
-        """Return whether the exact difference is at least zero; False for nan."""
-        return self._order(other) >= 0
+    # Comparisons use the exact difference; all are false for nan.
+    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
+    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def __float__(self) -> float:
         """Return the nearest float, or an infinity with the same sign."""

@@ -19,7 +19,7 @@ from pathlib import Path
 from pyharness.checks.check import Check, Name
 from pyharness.checks.report import checks_report, summary
 from pyharness.model.facts import facts
-from pyharness.thesis.compiled_in_word import compiled_words
+from pyharness.thesis.in_word import compiled_words
 from pyharness.views.render import render
 from tests.changed import PASSED, changed
 from tests.cross.builds import ROOT, Build, environment, false_claims, make, native_flag

@@ -13,9 +13,9 @@ from pyharness import _build, _kernels  # noqa: PLC2701
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
-from pyharness.thesis import compiled_in_word, in_word
+from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_cells, all_listings, cell_name, listing_name
-from pyharness.thesis.compiled_in_word import compiled_words
+from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import BINARY64, COMPILED_WORDS, PROGRAM_REGISTRY
 from pyharness.thesis.word import WORDS
 from tests.thesis.test_programs import NASTY
@@ -66,7 +66,7 @@ def all_digests(language: str) -> Iterator[tuple[str, str]]:
 def _in_words(language: str) -> Iterator[tuple[str, str]]:
     """Yield name and digest of cells with all defects or none, in the other IEEE formats."""
     compiled = language == "fortran"
-    run = compiled_in_word.run if compiled else in_word.run
+    run = in_word.run_compiled if compiled else in_word.run
     for word in compiled_words() if compiled else COMPILED_WORDS:
         for listing, case in all_cells():
             if word != BINARY64 and _has_other_words(listing):

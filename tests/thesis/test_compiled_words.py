@@ -21,9 +21,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.thesis import compiled_in_word, in_word
+from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_listings
-from pyharness.thesis.compiled_in_word import compiled_words, from_bytes, to_bytes
+from pyharness.thesis.in_word import compiled_words, from_bytes, to_bytes
 from pyharness.thesis.programs import BINARY64, COMPILED_WORDS, IMPLEMENTATIONS
 from pyharness.thesis.word import WORDS, Number, Word
 
@@ -48,7 +48,7 @@ EXTREMES = {
 
 def differing(scene: Scene, listing: Listing, word: str, *options: Any) -> list[str]:
     twin = in_word.run(scene, listing, WORDS[word], *options)
-    return differences(twin, compiled_in_word.run(scene, listing, WORDS[word], *options))
+    return differences(twin, in_word.run_compiled(scene, listing, WORDS[word], *options))
 
 
 @pytest.mark.parametrize("word", HERE)
@@ -79,11 +79,11 @@ def test_runs_end_as_their_word_has_it() -> None:
     assert {"binary32", "binary64"} <= set(HERE) <= set(COMPILED_WORDS)
     scene, listing = EXTREMES["overflow"], Listing.original("two-term")
     names = sorted(HERE, key=lambda name: WORDS[name].p)
-    runs = [compiled_in_word.run(scene, listing, WORDS[name]) for name in names]
+    runs = [in_word.run_compiled(scene, listing, WORDS[name]) for name in names]
     assert {run.ended for run in runs} == {"overflow"}
     assert sorted({run.steps for run in runs}) == [run.steps for run in runs]
     for name in HERE:
-        run = compiled_in_word.run(case_scene(2), Listing.original("runge-kutta"), WORDS[name])
+        run = in_word.run_compiled(case_scene(2), Listing.original("runge-kutta"), WORDS[name])
         assert run.stop is not None
         assert (run.stop.step, run.stop.variable) == (25, "V2")
         assert isinstance(run.stop.quotient, float)
@@ -92,7 +92,7 @@ def test_runs_end_as_their_word_has_it() -> None:
 def test_binary64_by_bytes_is_the_run_in_floats() -> None:
     for program in PROGRAMS:
         scene, listing = case_scene(7), Listing.original(program)
-        by_bytes = compiled_in_word.run(scene, listing, WORDS["binary64"])
+        by_bytes = in_word.run_compiled(scene, listing, WORDS["binary64"])
         assert differences(run_program(scene, listing), by_bytes) == []
 
 
@@ -232,7 +232,7 @@ def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.M
     found = compare_programs(scene, listings, word=word)
     assert [each.ulps for each in found.programs] == [0.0, 0.0]
     assert not found.unexpected
-    honest = compiled_in_word.run
+    honest = in_word.run_compiled
 
     def wrong(*given: Any) -> Trajectory:
         run = honest(*given)
@@ -242,7 +242,7 @@ def test_compare_holds_fortran_against_the_twin(word: str, monkeypatch: pytest.M
         return replace(run, exact=numbers)
 
     if word != BINARY64:
-        monkeypatch.setattr(compiled_in_word, "run", wrong)
+        monkeypatch.setattr(in_word, "run_compiled", wrong)
         found = compare_programs(scene, listings, word=word)
         assert [each.differences for each in found.programs] == [("numbers of the word",)] * 2
         assert len(found.unexpected) == 2

@@ -35,7 +35,7 @@ from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left, short_repr
 from pyharness.model.values import boolean
-from pyharness.thesis.compiled_in_word import compiled_words
+from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import (
     BINARY64,
     IMPLEMENTATIONS,

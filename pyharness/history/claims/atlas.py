@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
-_POINTS = {HOLDS: POINTS[REPRODUCED], IN_PART: POINTS[PARTLY]}
+# The points of each code, with the code as index.
+_POINTS = np.zeros(len(_CODES) + 1)
+_POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
 _MAPS = 6
 _PERCENT = digits(".2f", 100.0)
@@ -58,10 +60,6 @@ class Atlas:
     def n_starts(self) -> int:
         """Return the number of starts."""
         return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
-
-    def choices(self) -> list[tuple[str, int]]:
-        """Return all pairs of reading and number of steps, in the order of `codes`."""
-        return list(product(self.readings, self.steps))
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
         """Return the total points of each start; `reading` and `steps` are indices."""
@@ -101,10 +99,7 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
     """Return the total points of several claims, for each start."""
-    values = np.zeros(len(_CODES) + 1)
-    for code, points in _POINTS.items():
-        values[code] = points
-    return np.asarray(sum(values[each] for each in codes))
+    return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
@@ -146,12 +141,12 @@ def atlas_report(atlas: Atlas) -> Report:
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
-    best = float(score.max())
+    best, n_choices = float(score.max()), len(atlas.readings) * len(atlas.steps)
     places = np.argwhere(score == best)
     sections: list[list[Any]] = [
         [
-            f"{atlas.n_starts} starts with {len(atlas.choices())} choices of reading and steps: "
-            f"{atlas.n_starts * len(atlas.choices())} scenes, {len(atlas.codes)} claims. A claim "
+            f"{atlas.n_starts} starts with {n_choices} choices of reading and steps: "
+            f"{atlas.n_starts * n_choices} scenes, {len(atlas.codes)} claims. A claim "
             "counts 1 where it is reproduced, 1/2 in part, 0 otherwise."
         ],
         [f"Claims, those first that tell most of a start ({first}; shares of all starts):", claims],
@@ -164,7 +159,7 @@ def atlas_report(atlas: Atlas) -> Report:
         ["Starts from which all claims about one case hold, at least in part:", _by_case(atlas)],
         ["Starts that the thesis shows, and (1, 1, 1), which is ours:", _shown(atlas, score)],
     ]
-    if len(atlas.choices()) > 1:
+    if n_choices > 1:
         sections += [
             ["Readings and steps:", _by_choice(atlas)],
             [
@@ -255,12 +250,11 @@ def _shown(atlas: Atlas, score: Any) -> Table:
 
 def _by_choice(atlas: Atlas) -> Table:
     rows = []
-    for k, reading in enumerate(atlas.readings):
-        for m, steps in enumerate(atlas.steps):
-            score = atlas.score(k, m)
-            most = float(score.max())
-            best, none = int((score == most).sum()), int(atlas.none_fails(k, m).sum())
-            rows.append((reading, steps, float(score.mean()), most, best, none))
+    for (k, reading), (m, steps) in product(enumerate(atlas.readings), enumerate(atlas.steps)):
+        score = atlas.score(k, m)
+        most = float(score.max())
+        best, none = int((score == most).sum()), int(atlas.none_fails(k, m).sum())
+        rows.append((reading, steps, float(score.mean()), most, best, none))
     columns = [
         *words("reading"), Column("steps"), Column("mean", digits(".4f")),
         Column("most", digits("g")), Column("starts with it"), Column("none fails"),

@@ -26,17 +26,18 @@ def _quotient(x: float, y: float) -> float:
 
 
 def _operator(
-    rule: str, of_floats: Callable[[float, float], float], sign: int = 1
+    rule: str, of_floats: Callable[[float, float], float], negates: bool = False
 ) -> Callable[["Number", Any], "Number"]:
-    """Return the operator of a rounding rule, which first multiplies the operand by `sign`."""
+    """Return the operator of a rounding rule, which may negate the operand first."""
 
     def operate(self: "Number", other: Any) -> "Number":
         own = self.__class__
         if other.__class__ is not own:
             other = own.word(other)
         if self.m and other.m:
-            return own(*getattr(own.rules, rule)(self.m, self.e, sign * other.m, other.e))
-        return self._special(of_floats, other if sign > 0 else -other)
+            m = -other.m if negates else other.m
+            return own(*getattr(own.rules, rule)(self.m, self.e, m, other.e))
+        return self._special(of_floats, -other if negates else other)
 
     return operate
 
@@ -61,7 +62,7 @@ class Number:
         self.m, self.e = m, e
 
     __add__ = __radd__ = _operator("add", operator.add)
-    __sub__ = _operator("add", operator.add, sign=-1)
+    __sub__ = _operator("add", operator.add, negates=True)
     __mul__ = __rmul__ = _operator("multiply", operator.mul)
     __truediv__ = _operator("divide", _quotient)
 

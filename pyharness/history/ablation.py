@@ -182,14 +182,18 @@ def entry_report(
     if effects:
         text += _effects(effects, entry["kind"] != "defect")
 
-    def record() -> dict[str, Any]:
-        found = []
-        for each in effects:
-            under = {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
-            found.append({"program": each.program, "case": each.case, **under})
-        return {"entry": entry, "effects": found}
-
-    return Report("defects", text, record)
+    return Report(
+        "defects",
+        text,
+        record=lambda: {
+            "entry": entry,
+            "effects": [
+                {"program": each.program, "case": each.case}
+                | {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
+                for each in effects
+            ],
+        },
+    )
 
 
 def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:

@@ -7,17 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import cache
 
-from pyharness.history.printed_page import (
-    SHOWN,
-    Fit,
-    compare_rows,
-    compared_steps,
-    has_rows,
-    printed_numbers,
-    rows_of_form,
-    split_page,
-    verdict,
-)
+from pyharness.history import printed_page
+from pyharness.history.printed_page import Fit, printed_numbers, split_page
 from pyharness.model.errors import InputError
 from pyharness.model.listing import Listing, names_of
 from pyharness.model.pipes import read_input
@@ -36,7 +27,7 @@ def read_page(path: str) -> list[list[str]]:
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
-    if not has_rows(found):
+    if not printed_page.has_rows(found):
         raise InputError(
             f"{where}: it has no row of numbers; give a page as a program printed it to TAPE6"
         )
@@ -61,15 +52,17 @@ def fits(
     for program in programs:
         for case in cases:
             head, (row, *_) = split_page(_lines(Listing.original(program), case, 1))
-            theirs = rows_of_form(lines, head, len(row))
+            theirs = printed_page.rows_of_form(lines, head, len(row))
             if not theirs:
                 continue
-            steps = compared_steps(len(theirs), case_scene(case).steps, card_steps(program))
+            given = case_scene(case).steps, card_steps(program)
+            steps = printed_page.compared_steps(len(theirs), *given)
             for name, listing in listings[program].items():
                 for word in WORD_NAMES:
                     progress(len(found), every, f"{program}, case {case}, {word}")
                     ours = split_page(_lines(listing, case, steps, word))[1]
-                    found.append(Fit(program, case, name, word, *compare_rows(theirs, ours)))
+                    compared = printed_page.compare_rows(theirs, ours)
+                    found.append(Fit(program, case, name, word, *compared))
     if not found:
         raise InputError(
             f"--listing-output: no page of {', '.join(programs)} in case "
@@ -107,9 +100,9 @@ def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
         [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]
         for each in found
     ]
-    text: list[Section] = [verdict(path, found), [Table(_TABLE, rows)]]
+    text: list[Section] = [printed_page.verdict(path, found), [Table(_TABLE, rows)]]
     if not best.is_whole:
-        first = [list(asdict(each).values()) for each in best.differences[:SHOWN]]
+        first = [list(asdict(each).values()) for each in best.differences[: printed_page.SHOWN]]
         text.append(["the first numbers that differ:", Table(_APART, first)])
     return Report(
         "verify",

@@ -5,7 +5,6 @@ again (`data/cards/second-reading.toml`). The numbers of misreadings that one or
 correct give an estimate of the uncorrected ones.
 """
 
-import random
 from collections.abc import Iterator
 from difflib import SequenceMatcher
 from math import comb
@@ -15,7 +14,7 @@ from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table, counted, digits, words
 from pyharness.model.report import numbers as columns
-from pyharness.thesis.cards import Card, chosen, deck, tight
+from pyharness.thesis.cards import Card, deck, tight
 from pyharness.thesis.collation import witness_lines
 
 _TAIL = 0.025  # probability beyond each end of a 95 % interval
@@ -84,14 +83,6 @@ def _probability(size: int, first: int, second: int, begin: int, end: int) -> fl
         for both in range(begin, min(end, second) + 1)
     )
     return ways / comb(size, second)
-
-
-def sample() -> list[Card]:
-    """Return the cards to be read a second time, ordered as in the decks."""
-    given = facts("cards/second-reading")
-    size = sum(len(given[program]) for program in PROGRAMS)
-    drawn = set(random.Random(given["seed"]).sample([*witness_lines()], size))
-    return [card for card in chosen(()) if card.name in drawn]
 
 
 def read_cards() -> Iterator[ReadCard]:

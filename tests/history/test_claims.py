@@ -16,7 +16,7 @@ from pyharness.history.claims.ledger import Judgement, claim, claims, judgement,
 from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
-from pyharness.history.family.members import Member
+from pyharness.history.family import Member
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, names_of, switches
 from pyharness.model.report import Report

@@ -12,8 +12,17 @@ import pytest
 from pyharness import InputError, Scene, case_scene
 from pyharness.checks.theory.tableau import tableau
 from pyharness.cli.main import main
-from pyharness.history.family.members import WEIGHTINGS, Member, integrate, predicted_order, run
-from pyharness.history.family.orders import SCHEMES, SLACK, family_members, order_table
+from pyharness.history.family import (
+    SCHEMES,
+    SLACK,
+    WEIGHTINGS,
+    Member,
+    family_members,
+    integrate,
+    order_table,
+    predicted_order,
+    run,
+)
 from pyharness.model.listing import Listing
 from pyharness.model.report import short
 from pyharness.model.trajectory import Array
@@ -281,7 +290,7 @@ def test_one_member_in_every_format(printed: Printed) -> None:
 
 
 def test_order_too_low_is_exit_code_1(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pyharness.history.family.orders.predicted_order", lambda member: 3)
+    monkeypatch.setattr("pyharness.history.family.predicted_order", lambda member: 3)
     assert main(["family", "--terms", "2"]) == 1
     told = "UNEXPECTED: collocation at points thesis, 2 terms, 1 corrections: order 2.0"
     assert told in capsys.readouterr().out

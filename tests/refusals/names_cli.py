@@ -10,7 +10,7 @@ import pytest
 from pyharness import ChangingMoments, Scene, subset, torques
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.theory.rotations import steady_rotations
-from pyharness.history.family.members import Member
+from pyharness.history.family import Member
 from pyharness.thesis.cards import chosen
 from pyharness.thesis.decks import deck_text
 from pyharness.thesis.vectors import answers

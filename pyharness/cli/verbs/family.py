@@ -3,8 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.family.members import POINTS, WEIGHTINGS, Member
-from pyharness.history.family.orders import family_report, order_table
+from pyharness.history.family import POINTS, WEIGHTINGS, Member, family_report, order_table
 from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 _OF_A_MEMBER = ("weighting", "terms", "points", "corrections")

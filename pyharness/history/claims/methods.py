@@ -14,7 +14,7 @@ from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import LITERALS, Laboratory, by_literals, distance, largest
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.verdicts import FALSE, NOT_TESTABLE, UNDECIDED, Judged, graded, judged
-from pyharness.history.family.members import WEIGHTINGS, Member, run
+from pyharness.history.family import WEIGHTINGS, Member, run
 from pyharness.history.lost import integrate
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS

@@ -18,7 +18,7 @@ from pyharness.engine.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
-from pyharness.history.family.members import Member, run
+from pyharness.history.family import Member, run
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 from pyharness.thesis.cards import deck

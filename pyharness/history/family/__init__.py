@@ -1,1 +1,0 @@
-"""The weighted residual methods, with derived and measured orders of convergence."""

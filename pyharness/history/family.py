@@ -209,14 +209,12 @@ def _stages(matrix: Array, rates: Array) -> Array:
     for j in range(1, matrix.shape[1]):
         np.multiply(matrix[:, j, None], side_by_side[j], out=product)
         total += product
-    found: Array = total.transpose(2, 0, 1)
-    return found
+    return np.asarray(total.transpose(2, 0, 1))
 
 
 def _sums(factors: Array, rates: Array) -> Array:
     """Return the products of factors (members, i, j) and rates (members, j, 3), without BLAS."""
-    total: Array = np.einsum("mij,mjk->mik", factors, rates)
-    return total
+    return np.asarray(np.einsum("mij,mjk->mik", factors, rates))
 
 
 def _rates(scene: Scene, torque: Array, omega: Array) -> Array:

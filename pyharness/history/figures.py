@@ -219,7 +219,12 @@ def figure_picture(finding: FigureFinding) -> Picture:
     figure.legend(
         handles, labels, loc="outside lower center", ncols=2, handlelength=5.0, frameon=False
     )
-    figure.suptitle(_heading(finding), fontsize=10)
+    plan, scene = finding.plan, finding.scene
+    title = f"{plan.title}. Case {scene.case}: {scene.name}; {plan.set} programs"
+    ends = any(curve.ending for curve in finding.curves)
+    note = f"Reference: {finding.reference.source}." + " Cross: the program ends." * ends
+    lines = [title, *textwrap.wrap(plan.caption, 98), note]
+    figure.suptitle("\n".join(lines), fontsize=10)
     return Picture(figure, curve_numbers(finding))
 
 
@@ -247,15 +252,6 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
     own = [row for row in curve_numbers(second).rows if row[1]]
     return Picture(figure, numbers(_NUMBERS, [*curve_numbers(first).rows, *own]))
-
-
-def _heading(finding: FigureFinding) -> str:
-    plan, scene = finding.plan, finding.scene
-    title = f"{plan.title}. Case {scene.case}: {scene.name}; {plan.set} programs"
-    note = f"Reference: {finding.reference.source}."
-    if any(curve.ending for curve in finding.curves):
-        note += " Cross: the program ends."
-    return "\n".join([title, *textwrap.wrap(plan.caption, 98), note])
 
 
 def _draw_known(axes: "Axes", finding: FigureFinding, row: int) -> None:

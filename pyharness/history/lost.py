@@ -11,6 +11,7 @@ tenth of the largest omega.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -183,10 +184,7 @@ def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
 
 
 def _value(coefficients: list[Any], at: Any) -> Any:
-    *others, value = coefficients
-    for x in reversed(others):
-        value = x + value * at
-    return value
+    return reduce(lambda value, x: x + value * at, reversed(coefficients))
 
 
 _ABBREVIATED = {"subdomain": "sub", "galerkin": "gal", "least-squares": "lsq"}

@@ -12,7 +12,7 @@ from pyharness.history.tei import CERTAINTY
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck, tight
-from pyharness.thesis.collation import Row, names_a_card, rows
+from pyharness.thesis.collation import names_a_card, rows
 
 CERTAINTIES = tuple(CERTAINTY)
 """The degrees of certainty of an inference, as in the apparatus."""
@@ -125,12 +125,9 @@ def _of_steps(found: list[Disagreement]) -> Iterator[str]:
     steps = {row.what: row for row in rows()}
     yield from (f"as_required: no step {name!r}" for name in required if name not in steps)
     for name, row in steps.items():
-        if _differs(row) and (name in named) == (name in required):
+        differs = row.thesis == "differs" or row.decks in ("differ", "names", "order")
+        if differs and (name in named) == (name in required):
             yield f"{name}: must be in a disagreement or as required, and not in both"
-
-
-def _differs(row: Row) -> bool:
-    return row.thesis == "differs" or row.decks in ("differ", "names", "order")
 
 
 def _statements(program: str, scanned_names: bool = False) -> list[str]:

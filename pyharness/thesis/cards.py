@@ -228,18 +228,14 @@ def parallels(card: Card) -> list[Card]:
     """
     if card.is_comment or not card.text[6:].strip():
         return []
-    return [
-        other
-        for program in PROGRAMS
-        if program != card.program
-        for other in _by_text(program).get(tight(card.text), [])
-    ]
+    same_text = _by_text().get(tight(card.text), [])
+    return [other for other in same_text if other.program != card.program]
 
 
 @cache
-def _by_text(program: str) -> dict[str, list[Card]]:
+def _by_text() -> dict[str, list[Card]]:
     found: dict[str, list[Card]] = {}
-    for card in deck(program).cards.values():
+    for card in (card for program in PROGRAMS for card in deck(program).cards.values()):
         found.setdefault(tight(card.text), []).append(card)
     return found
 

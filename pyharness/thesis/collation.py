@@ -154,7 +154,18 @@ class Row(NamedTuple):
 
 def rows() -> list[Row]:
     """Return the rows of the comparison, in the order of the operations in the decks."""
-    return [_row(each) for each in facts("cards/collation")["row"]]
+    found = []
+    for given in facts("cards/collation")["row"]:
+        thesis = "silent"
+        if "text" in given:
+            thesis = "agrees" if given["agrees"] else "differs"
+        found.append(
+            Row(
+                given["what"], given["cards"], _decks(given), thesis, given.get("text", ""),
+                given.get("says", ""), tuple(given.get("entries", ())), given.get("reason", ""),
+            )
+        )  # fmt: skip
+    return found
 
 
 def faults(found: list[Row]) -> list[str]:
@@ -200,17 +211,6 @@ def statements(program: str, cards: str) -> list[str]:
         else:
             found.append(tight(card.text[6:]))
     return found
-
-
-def _row(given: dict[str, Any]) -> Row:
-    cards = given["cards"]
-    thesis = "silent"
-    if "text" in given:
-        thesis = "agrees" if given["agrees"] else "differs"
-    return Row(
-        given["what"], cards, _decks(given), thesis, given.get("text", ""), given.get("says", ""),
-        tuple(given.get("entries", ())), given.get("reason", ""),
-    )  # fmt: skip
 
 
 def _decks(given: dict[str, Any]) -> str:

@@ -51,8 +51,7 @@ class Assignment:
 
 def claims() -> list[dict[str, Any]]:
     """Return all claims of the thesis on which we have a verdict."""
-    entries: list[dict[str, Any]] = facts("claims")["claim"]
-    return entries
+    return list(facts("claims")["claim"])
 
 
 def claim(identity: str) -> dict[str, Any]:

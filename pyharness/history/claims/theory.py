@@ -82,8 +82,7 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 def _omega(moments: Triple, state: Array) -> Array:
     """Return omega (rad/s) from a state: 3-1-3 angles (rad), then their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
-    rates: Array = momentum / np.array(moments)
-    return rates
+    return np.asarray(momentum / np.array(moments))
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
@@ -145,8 +144,7 @@ def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
 
 
 def _stepped(scene: Scene, method: str) -> Array:
-    omega: Array = solve(scene, scene.times(), method).omega[-1]
-    return omega
+    return np.asarray(solve(scene, scene.times(), method).omega[-1])
 
 
 def _power(
@@ -173,8 +171,7 @@ def _taylor_step(scene: Scene, order: int) -> Array:
             product += [x[1] * y[2], x[0] * y[2], x[0] * y[1]]
         terms.append((coefficients * product + (torque if n == 0 else 0.0)) / (n + 1))
     powers = scene.step_size ** np.arange(len(terms))
-    total: Array = powers @ np.array(terms)
-    return total
+    return np.asarray(powers @ np.array(terms))
 
 
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:

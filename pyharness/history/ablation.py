@@ -6,26 +6,16 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
-from itertools import zip_longest
 from typing import Any
 
 from pyharness.checks.compare.agreement import accuracy
+from pyharness.history.cards_report import HALF, beside
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, switches
 from pyharness.model.records import listing_record, scene_record
-from pyharness.model.report import (
-    Column,
-    Field,
-    Line,
-    Report,
-    Section,
-    Table,
-    numbers,
-    short,
-    words,
-)
+from pyharness.model.report import Column, Field, Report, Section, Table, numbers, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import heading
@@ -45,7 +35,6 @@ _SUBSETS = (
     *words("active"), Column("error of w", short, unit="rad/s"),
     Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
 )  # fmt: skip
-_HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 @dataclass(frozen=True)
@@ -178,7 +167,11 @@ def entry_report(
     fields = [Field(f"{name:10s} ", values[name]) for name in names if values.get(name)]
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "original" in entry:
-        text.append(_beside(entry, "original", "corrected"))
+        left, right = (
+            [head, "-" * HALF, *textwrap.wrap(entry[head], HALF)]
+            for head in ("original", "corrected")
+        )
+        text.append(beside(left, right))
     if effects:
         text += _effects(effects, entry["kind"] != "defect")
 
@@ -194,12 +187,6 @@ def entry_report(
             ],
         },
     )
-
-
-def _beside(texts: Mapping[str, str], *heads: str) -> list[str]:
-    columns = [[head, "-" * _HALF, *textwrap.wrap(texts[head], _HALF)] for head in heads]
-    pairs = zip_longest(*columns, fillvalue="")
-    return [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:

@@ -27,7 +27,7 @@ _DISAGREEMENTS = (
     *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
 )  # fmt: skip
 _SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
-_HALF = 48  # width, in characters, of each of two texts printed side by side
+HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
 def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
@@ -76,14 +76,12 @@ def scan_report(
     deviating = sum(bool(each.differences or each.lost) for each in cards)
     pairs = sum(len(each.differences) for each in cards)
     lost = sum(each.lost is not None for each in cards)
+    (read,) = (each["sha256"] for each in facts("cards/scan")["witness"])
+    which = "the text that was read" if digest == read else "another text"
     told = (
         f"{counted(len(cards), 'card')}, {lost} of them lost; {deviating} deviate in their text, "
         f"in {pairs} places, {sum(each.printed is not None for each in cards)} in their number; "
-        f"the scan has {counted(lines, 'line')}"
-    )
-    (read,) = (each["sha256"] for each in facts("cards/scan")["witness"])
-    told += (
-        "; it is " + ("the text that was read" if digest == read else "another text") + " (SHA-256)"
+        f"the scan has {counted(lines, 'line')}; it is {which} (SHA-256)"
     )
     end = "nothing is unexplained" if not (faults or undeclared) else (
         f"{len(faults) + len(undeclared)} unexplained"
@@ -150,24 +148,28 @@ def _block(card: Card) -> Section:
     for name, places in (("port", found.port), ("twin", found.twin)):
         texts = [f"{file}:{line} {text}" for file, line, text in places.get(card.number, ())]
         right += _named(name, texts or [missing])
-    pairs = zip_longest(left, right, fillvalue="")
-    lines = [Line(f"{a.ljust(_HALF)}   {b}".rstrip()) for a, b in pairs]
     entries = card.entries
     told = [
         Field(f"  {each['id']}: ", f"{each['kind']}, {each['certainty']}: {each['why']}")
         for each in facts("apparatus")["entry"]
         if each["id"] in entries
     ]
-    beside = ", ".join(each.name for each in parallels(card))
+    alike = ", ".join(each.name for each in parallels(card))
     return [
-        Line(f"{card.program} {card.number}" + (f"   (parallel: {beside})" if beside else "")),
-        *lines,
+        Line(f"{card.program} {card.number}" + (f"   (parallel: {alike})" if alike else "")),
+        *beside(left, right),
         *told,
     ]
 
 
+def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:
+    """Return the lines of two texts side by side; those of the left one have at most `HALF`."""
+    pairs = zip_longest(left, right, fillvalue="")
+    return [Line(f"{a.ljust(HALF)}   {b}".rstrip()) for a, b in pairs]
+
+
 def _named(name: str, texts: Iterable[str]) -> list[str]:
-    lines = [line for text in texts for line in textwrap.wrap(text, _HALF - 6)]
+    lines = [line for text in texts for line in textwrap.wrap(text, HALF - 6)]
     return [f"{name if not k else '':6s}{line}" for k, line in enumerate(lines)]
 
 

@@ -31,11 +31,8 @@ MOST_CORRECTIONS = 100
 # Above this condition number the points are so close that half the digits are lost.
 _WORST_CONDITION = 1e8
 SCHEMES: tuple[tuple[str, str | None], ...] = (
-    ("collocation", "thesis"),
-    ("collocation", "gauss"),
-    ("subdomain", None),
-    ("galerkin", None),
-    ("least-squares", None),
+    *(("collocation", points) for points in POINTS),
+    *((other, None) for other in WEIGHTINGS[1:]),
 )
 # `_LADDER` has the numbers of steps from 0 to the horizon; each is twice the number two places
 # before. A horizon is a fraction of the scene's end time. The first is so short that the leading
@@ -262,11 +259,9 @@ class OrderFinding:
         return self.settled and self.deviation < -SLACK
 
 
-def family_members(
-    terms: Sequence[int] = range(1, 6), corrections: Sequence[int] = range(1, 9)
-) -> list[Member]:
-    """Return a method for each combination of scheme (in `SCHEMES`), `terms` and `corrections`."""
-    return [Member(w, n, p, k) for w, p in SCHEMES for n in terms for k in corrections]
+def family_members() -> list[Member]:
+    """Return each scheme of `SCHEMES` with 1 to 5 terms and 1 to 8 corrections."""
+    return [Member(w, n, p, k) for w, p in SCHEMES for n in range(1, 6) for k in range(1, 9)]
 
 
 def order_table(

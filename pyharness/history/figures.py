@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SETS = {"original": Listing.original, "corrected": Listing.corrected}
-_CAPTIONS = {"original": "caption", "corrected": "corrected_caption"}
 ENDINGS = ("svg", "png", "csv")
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
 # Dash, width, marker and marker position distinguish the curves without colour.
@@ -120,7 +119,7 @@ def plans() -> list[FigurePlan]:
     return [
         FigurePlan(
             entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
-            entry[_CAPTIONS[each]], entry["source"],
+            entry["caption" if each == "original" else "corrected_caption"], entry["source"],
             entry.get("limit_of", "") if each == "original" else "",
         )
         for each in SETS

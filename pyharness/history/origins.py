@@ -14,9 +14,6 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck, tight
 from pyharness.thesis.collation import names_a_card, rows
 
-CERTAINTIES = tuple(CERTAINTY)
-"""The degrees of certainty of an inference, as in the apparatus."""
-
 
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
@@ -105,7 +102,7 @@ def _of_each(found: list[Disagreement]) -> Iterator[str]:
                 yield f"{each.id}: {name} names none of its cards"
         if each.origin not in origins():
             yield f"{each.id}: no origin {each.origin!r}"
-        if each.certainty not in CERTAINTIES:
+        if each.certainty not in CERTAINTY:
             yield f"{each.id}: no certainty {each.certainty!r}"
 
 

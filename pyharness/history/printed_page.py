@@ -115,11 +115,8 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
             if not (theirs := rows_of_form(lines, head, len(ours[0]))):
                 continue
             steps = compared_steps(len(theirs), int(each["steps"]), int(each["card_steps"]))
-            program, case, listing, word = (
-                each[key] for key in ("program", "case", "listing", "word")
-            )
-            compared = compare_rows(theirs, ours[:steps])
-            found.append(Fit(program, int(case), listing, word, *compared))
+            ran = each["program"], int(each["case"]), each["listing"], each["word"]
+            found.append(Fit(*ran, *compare_rows(theirs, ours[:steps])))
     return sorted(found, key=lambda each: len(each.differences))
 
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table, counted, digits, words
-from pyharness.model.report import numbers as columns
 from pyharness.thesis.cards import Card, deck, tight
 from pyharness.thesis.collation import witness_lines
 
@@ -142,7 +141,7 @@ def second_reading_report() -> Report:
     found, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]
-    rows = [[*each, each.uncorrected] for each in found]
+    table = Table(_COLUMNS, [[*each, each.uncorrected] for each in found])
     legend = (
         "first, second, both: number of misreadings of the scan in the sample that our text, the "
         "second reading, and both correct. estimate: Chapman's estimate of all misreadings in the "
@@ -158,7 +157,7 @@ def second_reading_report() -> Report:
         [
             [f"Sample: {len(cards)} of the {frame} cards in the scan, drawn with seed {seed}."],
             [legend],
-            [Table(_COLUMNS, rows)],
+            [table],
             [f"{counted(len(differing), 'card')} read differently:", *told],
         ],
         record=lambda: {
@@ -166,13 +165,7 @@ def second_reading_report() -> Report:
             "recaptures": [
                 {**each._asdict(), "uncorrected": each.uncorrected} for each in found
             ],
-            "disagreeing": [
-                {
-                    "card": each.card.name, "scan": each.scan, "first": each.first,
-                    "second": each.second,
-                }
-                for each in differing
-            ],
+            "disagreeing": [each._asdict() | {"card": each.card.name} for each in differing],
         },
-        data=columns("unit first second both estimate lower upper uncorrected", rows),
+        data=table,
     )  # fmt: skip

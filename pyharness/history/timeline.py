@@ -8,12 +8,6 @@ from typing import NamedTuple
 
 from pyharness.model.facts import facts
 
-CERTAINTIES = {
-    "certain": "the source names the date",
-    "probable": "the source reports the event, and its date follows from another entry",
-    "unknown": "no source dates the event",
-}
-"""The degrees of certainty of a date, with their meanings."""
 CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "removed entries"}
 """The fields of a revision that name apparatus entries, with their headings."""
 _MONTHS = (
@@ -26,7 +20,9 @@ class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
     `first` and `last` are months, as in ``1979-01``, or empty without a date; `why` explains an
-    uncertain one.
+    uncertain one. The date is ``certain`` if the source names it, ``probable`` if the source
+    reports the event and the date follows from another entry, and ``unknown`` if no source dates
+    the event.
     """
 
     id: str

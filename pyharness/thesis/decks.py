@@ -247,15 +247,13 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
     for name, values in (("moments", scene.moments), ("torque", torque), ("omega", scene.omega)):
         for axis, value in enumerate(values):
             number = first[name] + 10 * axis
+            # A whole number has no digit after its point.
+            written = repr(value).removesuffix("0") if value == int(value) else repr(value)
             left = deck(program).cards[number].text.partition("=")[0]
-            found[number] = f"{left}={_literal(value)}"
+            found[number] = f"{left}={written}"
     loop = deck(program).cards[first["steps"]].text
     found[first["steps"]] = re.sub(r",\d+,", f",{scene.steps},", loop)
     return found
-
-
-def _literal(value: float) -> str:
-    return f"{value!r}".removesuffix("0") if value == int(value) else repr(value)
 
 
 def solver_cards() -> int:

@@ -170,7 +170,13 @@ def run_many(
     inputs["body"] = inputs.pop(kind)
     if law.frame == "space" and inputs["torque_constant"].any():
         raise InputError(SPACE_TORQUE)
-    _check_ends(inputs["step_size"], scene.steps)
+    with np.errstate(over="ignore"):
+        ends = np.isfinite(inputs["step_size"] * scene.steps)
+    if not ends.all():
+        raise InputError(
+            f"step_size[{int(np.argmin(ends))}] times steps is not finite; use fewer or "
+            "smaller steps"
+        )
     check_bodies(scene, listing.program, n, effort)
     wanted = _steps(at, scene.steps)
     if n * len(wanted) > most_steps():
@@ -258,16 +264,6 @@ def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
         size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))
-
-
-def _check_ends(step_size: Array, steps: int) -> None:
-    with np.errstate(over="ignore"):
-        ends = np.isfinite(step_size * steps)
-    if not ends.all():
-        raise InputError(
-            f"step_size[{int(np.argmin(ends))}] times steps is not finite; use fewer or "
-            "smaller steps"
-        )
 
 
 def _steps(at: Sequence[SupportsIndex] | None, steps: int) -> NDArray[np.int32]:

@@ -48,15 +48,11 @@ class _Counter:
 
     def operate(self, name: str, left: Any, right: Any) -> "_Number":
         self.written += self.times[name]
-        key = (name, _identity(left), _identity(right))
+        key = (name, *(id(x) if isinstance(x, _Number) else float(x) for x in (left, right)))
         if key not in self.known:
             value = _OPERATIONS[name](_value(left), _value(right))
             self.known[key] = _Number(self, value)
         return self.known[key]
-
-
-def _identity(x: Any) -> Any:
-    return id(x) if isinstance(x, _Number) else float(x)
 
 
 def _value(x: Any) -> float:

@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.pipes import read_input
 from pyharness.model.schema import check_schema
-from pyharness.thesis.rounding import Pair, framed
-from pyharness.thesis.word import WORDS
+from pyharness.thesis.word import WORDS, Pair, framed
 
 OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
 _LARGEST = 1 << 24  # bytes of a file

@@ -1,6 +1,6 @@
 """A second implementation of the arithmetic of words: exact rationals, then the rounding rule.
 
-It uses nothing of `pyharness.thesis.rounding` or `cdc`: no shifts of integers, no frames. A
+It uses nothing of the rules in `pyharness.thesis.word`: no shifts of integers, no frames. A
 number is a fraction, and its unit is found by comparison with powers of two.
 """
 

@@ -56,11 +56,6 @@ class Atlas:
     heights: Array
     longitudes: Array
 
-    @property
-    def n_starts(self) -> int:
-        """Return the number of starts."""
-        return len(self.magnitudes) * len(self.heights) * len(self.longitudes)
-
     def score(self, reading: int = 0, steps: int = 0) -> Array:
         """Return the total points of each start; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
@@ -145,8 +140,8 @@ def atlas_report(atlas: Atlas) -> Report:
     places = np.argwhere(score == best)
     sections: list[list[Any]] = [
         [
-            f"{atlas.n_starts} starts with {n_choices} choices of reading and steps: "
-            f"{atlas.n_starts * n_choices} scenes, {len(atlas.codes)} claims. A claim "
+            f"{score.size} starts with {n_choices} choices of reading and steps: "
+            f"{score.size * n_choices} scenes, {len(atlas.codes)} claims. A claim "
             "counts 1 where it is reproduced, 1/2 in part, 0 otherwise."
         ],
         [f"Claims, those first that tell most of a start ({first}; shares of all starts):", claims],

@@ -87,15 +87,11 @@ class Combination:
 
 def evidence() -> Iterator[Combination]:
     """Yield every combination with its verdicts."""
-    for assumptions in combinations():
-        verdicts = {}
-        for entry in claims():
-            if entry["kind"] not in KINDS:
-                continue
-            verdict = _verdict(entry["id"], _relevant(entry, assumptions))
-            if verdict != NOT_TESTABLE:
-                verdicts[entry["id"]] = verdict
-        yield Combination(assumptions, verdicts)
+    scored = {entry["id"]: entry for entry in claims() if entry["kind"] in KINDS}
+    for chosen in combinations():
+        found = {name: _verdict(name, _relevant(entry, chosen)) for name, entry in scored.items()}
+        testable = {name: verdict for name, verdict in found.items() if verdict != NOT_TESTABLE}
+        yield Combination(chosen, testable)
 
 
 def combinations() -> list[Assumptions]:

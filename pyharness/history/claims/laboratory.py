@@ -126,6 +126,11 @@ def starts() -> list[Triple]:
     ]
 
 
+def start_text(start: Triple) -> str:
+    """Return an initial omega (rad/s) as text, as in ``0, 1, 10``."""
+    return ", ".join(f"{x:g}" for x in start)
+
+
 def distance(first: Array, second: Array) -> float:
     """Return the largest difference (rad/s) of any omega component, over the common rows."""
     n = min(len(first), len(second))

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from pyharness.history.claims import methods, rules, theory, verdicts
-from pyharness.history.claims.laboratory import Assumptions, Laboratory, starts
+from pyharness.history.claims.laboratory import Assumptions, Laboratory, start_text, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -103,8 +103,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
     for name in entry["assumptions"]:
         if name == "omega0":
             for start in starts():
-                shown = ", ".join(f"{x:g}" for x in start)
-                yield f"omega(0) = ({shown}) where not given", Assumptions(start=start)
+                text = start_text(start)
+                yield f"omega(0) = ({text}) where not given", Assumptions(start=start)
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):

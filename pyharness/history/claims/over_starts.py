@@ -153,11 +153,9 @@ def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     about = [_without_start(case_scene(case)) for case in range(1, 8)]
     if _without_start(batch.scene) not in about:
         return None
-    for is_original in (True, False):
-        one = Laboratory(is_original, assumptions)
-        if one.listing(batch.listing.program) == batch.listing:
-            return one
-    return None
+    both = (Laboratory(is_original, assumptions) for is_original in (True, False))
+    program = batch.listing.program
+    return next((one for one in both if one.listing(program) == batch.listing), None)
 
 
 def _without_start(scene: Scene) -> tuple[Any, ...]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from pyharness.history.claims.laboratory import start_text
 from pyharness.history.claims.ledger import Assignment, Judgement
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
 
@@ -121,9 +122,8 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
         starts = [each for each in assignments if each.case == case]
         lines = [f"Case {case}"]
         for each in starts:
-            start = ", ".join(f"{x:g}" for x in each.start)
             told = "all others hold" if each.holds else "they do not all hold"
-            lines.append(f"  ({start}): {told}")
+            lines.append(f"  ({start_text(each.start)}): {told}")
             lines += [f"      {verdict:20s}{name}" for name, verdict in each.verdicts.items()]
         text.append(list(map(Line, lines)))
         holding.append(sum(each.holds for each in starts))

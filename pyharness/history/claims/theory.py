@@ -237,9 +237,8 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
             # By these times the decaying part has vanished, and the growing part is still small.
-            times = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
-            if rate:
-                times = np.array([8.0, 10.0]) / rate
+            steady = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
+            times = np.array([8.0, 10.0]) / rate if rate else steady
             found = solve(replace(scene, omega=start), times, tolerance=1e-14).omega - each.omega
             sizes = np.linalg.norm(found, axis=1)
             name = f"case {case}, {each.place}"

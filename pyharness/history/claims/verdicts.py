@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pyharness.history.claims import rules
-from pyharness.history.claims.laboratory import Laboratory, distance, largest, starts
+from pyharness.history.claims.laboratory import Laboratory, distance, largest, start_text, starts
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.model.listing import Listing, names_of
-from pyharness.model.scene import Triple
 from pyharness.thesis.cells import subsets
 
 REPRODUCED = "reproduced"
@@ -81,12 +80,8 @@ def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     for start in starts():
         other = replace(lab, assumptions=replace(lab.assumptions, start=start))
         steps = other.run("runge-kutta", case).steps
-        found.numbers[f"runge-kutta from ({_shown(start)}): steps that it ran"] = float(steps)
+        found.numbers[f"runge-kutta from ({start_text(start)}): steps that it ran"] = float(steps)
     return found
-
-
-def _shown(start: Triple) -> str:
-    return ", ".join(f"{x:g}" for x in start)
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
@@ -200,6 +195,6 @@ def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     for start in starts():
         best = Laboratory(False, replace(lab.assumptions, start=start))
         ratio = best.error("two-term", case) / best.error("four-term", case)
-        numbers[f"from ({_shown(start)}): corrected two-term error over four-term"] = ratio
+        numbers[f"from ({start_text(start)}): corrected two-term error over four-term"] = ratio
     ratios = list(numbers.values())
     return graded(numbers, min(ratios) > worse, max(ratios) > same, FALSE)

@@ -10,7 +10,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   ! one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
   !f2py threadsafe
   use levels, only: taylor_solve
-  use problem, only: problem_t, request_t, solution_t
+  use problem, only: problem_t, request_nodes, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
   real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
@@ -52,12 +52,7 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
-  if (most > 0) then
-    solution%nodes => nodes
-    ends(1) = 0.0d0
-    solution%ends => ends
-    solution%at_nodes => at_nodes
-  end if
+  if (most > 0) call request_nodes(solution, nodes, ends, at_nodes)
   call taylor_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
                               cosines), &
                     request_t(omega0, tolerance, effort(1), times), solution)

@@ -7,7 +7,7 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   ! have one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
   !f2py threadsafe
   use levels, only: tape_solve
-  use problem, only: request_t, solution_t
+  use problem, only: request_nodes, request_t, solution_t
   use tape, only: tape_of
   implicit none
   integer(4), intent(in) :: n_numbers
@@ -35,12 +35,7 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
-  if (most > 0) then
-    solution%nodes => nodes
-    ends(1) = 0.0d0
-    solution%ends => ends
-    solution%at_nodes => at_nodes
-  end if
+  if (most > 0) call request_nodes(solution, nodes, ends, at_nodes)
   call tape_solve(tape_of(numbers), request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows
   status = solution%status

@@ -7,7 +7,8 @@ results, and solves Euler's equations by other methods.
 # The public names by module, which type checkers read in `__init__.pyi`. Modules are imported at
 # their first use, so that a program loads only those that it needs, and Ctrl-C is handled before.
 _SUBMODULES = {
-    "checks.compare.comparison": ("Comparison", "compare_methods", "compare_programs"),
+    "checks.compare.comparison": ("compare_methods", "compare_programs"),
+    "checks.compare.findings": ("Comparison",),
     "engine.scene_reader": ("read_scene",),
     "engine.trajectory_reader": ("load",),
     "model.changing": ("ChangingInertia", "ChangingMoments"),

@@ -3,9 +3,9 @@ from typing import Any
 
 from pyharness import events as events
 from pyharness import torques as torques
-from pyharness.checks.compare.comparison import Comparison as Comparison
 from pyharness.checks.compare.comparison import compare_methods as compare_methods
 from pyharness.checks.compare.comparison import compare_programs as compare_programs
+from pyharness.checks.compare.findings import Comparison as Comparison
 from pyharness.engine.compiled_call import get_include as get_include
 from pyharness.engine.many import solve_many as solve_many
 from pyharness.engine.prepared import prepare as prepare

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 WEEKLY = ROOT / "tests/campaigns"
 MARK = "\npytestmark = pytest.mark.campaign\n"
 SECONDS = 23.0
-# All tests of a chunk may be campaigns, and then none is left. Failures are counted one by one.
+# A chunk may have campaigns only. Failures are counted one by one.
 _WELL = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED, pytest.ExitCode.TESTS_FAILED)
 # Tests of a file that no test names, by the beginning of its path. Those of a package follow.
 USERS = {

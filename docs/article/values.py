@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.compare.comparison import Comparison, ProgramFinding, compare_programs
+from pyharness.checks.compare.comparison import compare_programs
+from pyharness.checks.compare.findings import Comparison, ProgramFinding
 from pyharness.edition import ledger, story
 from pyharness.edition.decks import TITLES
 from pyharness.edition.package_runs import FAULTS_CASE

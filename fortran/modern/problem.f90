@@ -7,6 +7,8 @@ module problem
   implicit none(type, external)
   private
 
+  public :: request_nodes
+
   type, public :: problem_t
     real(dp) :: coefficients(3)                    !! A, B, C, without unit
     real(dp) :: constant(3)                        !! torque over moment, 1/s2
@@ -78,5 +80,20 @@ module problem
     real(dp) :: growth                             !! error amplification; negative: unknown
     real(dp) :: spent                              !! steps of all integrations
   end type solution_t
+
+contains
+
+  subroutine request_nodes(solution, nodes, ends, at_nodes)
+    !! Request the unknowns at nodes of each step.
+    type(solution_t), intent(inout) :: solution
+    real(dp), intent(in), target, contiguous :: nodes(:)            !! in parts of a step
+    real(dp), intent(inout), target, contiguous :: ends(:)          !! one more than steps, s
+    real(dp), intent(inout), target, contiguous :: at_nodes(:, :, :) !! (unknowns, nodes, steps)
+
+    ends(1) = 0.0_dp
+    solution%nodes => nodes
+    solution%ends => ends
+    solution%at_nodes => at_nodes
+  end subroutine request_nodes
 
 end module problem

@@ -27,7 +27,7 @@ from pyharness.bench.ensemble_contenders import (
     draw,
     own_ensembles,
 )
-from pyharness.bench.measure import Call, Say, timed
+from pyharness.bench.loop import Call, Say, timed
 from pyharness.checks.compare.timing import Clock, batch_seconds, seconds, silenced
 from pyharness.engine.plan import FINEST
 from pyharness.engine.prepared import prepare

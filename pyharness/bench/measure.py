@@ -6,19 +6,18 @@ affects all alike; the median counts.
 """
 
 import math
-import statistics
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from time import perf_counter
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from pyharness.bench.contenders import Maker, SceneContender
+from pyharness.bench.loop import Call, Say, timed
 from pyharness.checks.compare.candidates import End, Ready, not_finite
-from pyharness.checks.compare.timing import SLOW, Clock, ended_after, seconds, silenced
+from pyharness.checks.compare.timing import Clock, ended_after, silenced
 from pyharness.model.attitude import IDENTITY, angle_between
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
@@ -27,9 +26,6 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.bounded import ErrorBound, bound_of, joined
 from pyharness.truth.reference import Reference, reference
-
-_Timed = TypeVar("_Timed")
-Say = Callable[[str], None]  # receives the current part of a task
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0  # end times T, s
@@ -50,51 +46,6 @@ _FAILURES = 12  # number of successive settings without result after which finer
 _PROOF_EFFORT = 10.0
 _ROUNDS = 9  # number of rounds in which calls are timed
 _BATCH = 1e-3  # s; calls faster than this are batched
-
-
-class Task(Protocol):
-    """A unit of measurement, such as a workload; messages name it by `place`."""
-
-    @property
-    def place(self) -> str: ...  # noqa: D102
-
-
-_Task = TypeVar("_Task", bound=Task)
-
-
-@dataclass(frozen=True)
-class Call(Generic[_Timed]):
-    """A call to be timed, and the row that records its time."""
-
-    run: Callable[[], object] | None  # None if the call failed and is not timed
-    clock: Clock
-    row: Callable[..., _Timed]  # makes the row from the keyword argument `seconds` (s or None)
-
-
-def timed(
-    tasks: Sequence[_Task],
-    calls: Callable[[_Task, Say], Iterable[Call[_Timed]]],
-    progress: Progress,
-    length: float,
-    rounds: int,
-    statistic: Callable[[Sequence[float]], float] = statistics.median,
-    slow: float = SLOW,
-) -> Iterator[_Timed]:
-    """Yield the rows of the calls that `calls` prepares for each task.
-
-    The last four parameters are those of `pyharness.checks.compare.timing.seconds`.
-    """
-    for number, task in enumerate(tasks):
-
-        def say(text: str, number: int = number, place: str = task.place) -> None:
-            progress(number, len(tasks), f"{place}: {text}")
-
-        found = list(calls(task, say))
-        runs = [each.run for each in found if each.run]
-        clocks = [each.clock for each in found if each.run]
-        times = iter(seconds(runs, length, rounds, say, statistic, clocks, slow))
-        for each in found:
-            yield each.row(seconds=next(times) if each.run else None)
 
 
 @dataclass(frozen=True)

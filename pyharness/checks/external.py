@@ -33,6 +33,34 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
+__all__ = ["external_checks", "problems"]
+
+# The finest tolerance that a method claims is used, except where that would take too long.
+_TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
+_SOLVED = (
+    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
+    "quick", "dop853", "lsoda", "radau", "rk45",
+)  # fmt: skip
+_FEWEST_STEPS, _MOST_STEPS = 4, 2**16
+_HALF_ULP = 2.0**-53
+# A number is rounded when it is read, and again when a method uses it.
+_ROUNDING = 2.0 * _HALF_ULP
+_STEP_ASIDE = 2.0**-30
+# A method must solve every problem that it accepts: `auto` chooses a suitable method, and
+# `closed-form` evaluates a formula.
+_MAY_NOT_REFUSE = ("auto", "closed-form")
+
+_PUBLISHED = Basis(
+    "derived",
+    "difference from a published result: its accuracy, the method's error, and rounded data",
+    "first-order effects of rounding each number; for programs, twice the error that the last "
+    "halving of the step shows (`checks/external.py`)",
+)
+
+_Row = TypeVar("_Row")
+# Result of a method at one time: omega, and a bound on the error of each component (rad/s).
+_Result = tuple[Array, float]
+
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
     """Yield copies of the scene, each with one nonzero number multiplied by 1 + `part`."""
@@ -62,35 +90,6 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
         if x:
             first, second, third = np.array(triple) * (1.0 + part * (np.arange(3) == axis))
             yield float(first), float(second), float(third)
-
-
-__all__ = ["external_checks", "problems"]
-
-# The finest tolerance that a method claims is used, except where that would take too long.
-_TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
-_SOLVED = (
-    "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
-    "quick", "dop853", "lsoda", "radau", "rk45",
-)  # fmt: skip
-_FEWEST_STEPS, _MOST_STEPS = 4, 2**16
-_HALF_ULP = 2.0**-53
-# A number is rounded when it is read, and again when a method uses it.
-_ROUNDING = 2.0 * _HALF_ULP
-_STEP_ASIDE = 2.0**-30
-# A method must solve every problem that it accepts: `auto` chooses a suitable method, and
-# `closed-form` evaluates a formula.
-_MAY_NOT_REFUSE = ("auto", "closed-form")
-
-_PUBLISHED = Basis(
-    "derived",
-    "difference from a published result: its accuracy, the method's error, and rounded data",
-    "first-order effects of rounding each number; for programs, twice the error that the last "
-    "halving of the step shows (`checks/external.py`)",
-)
-
-_Row = TypeVar("_Row")
-# Result of a method at one time: omega, and a bound on the error of each component (rad/s).
-_Result = tuple[Array, float]
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:

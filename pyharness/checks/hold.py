@@ -55,6 +55,16 @@ STEPS = Basis(
 """Basis of limits from the promised errors of the steps."""
 
 
+# Our methods that run at two tolerances: a middling one, and one near the finest, where rounding
+# shows.
+OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
+ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
+_SERIES = ("taylor", "auto", "prepared-auto")
+_TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
+_ROWS = 10  # rows of a program's run that are compared with the true solution
+FORMS = ("closed-form", "auto")
+
+
 def steps_of(name: str, run_steps: int, evaluations: int) -> float:
     """Return how often omega is rounded: 0 if compensated; for SciPy's methods an estimate."""
     if name in SCIPY_METHODS:
@@ -85,16 +95,6 @@ def _series(name: str) -> tuple[float, ...]:
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
     found = SCHEMES[name].scheme(Series(equal), constant(ones))[:, 0]
     return tuple(found.tolist())
-
-
-# Our methods that run at two tolerances: a middling one, and one near the finest, where rounding
-# shows.
-OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
-ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
-_SERIES = ("taylor", "auto", "prepared-auto")
-_TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
-_ROWS = 10  # rows of a program's run that are compared with the true solution
-FORMS = ("closed-form", "auto")
 
 
 def truth_of(scene: Scene, time: float, flow: Conditioning | None = None) -> Truth:

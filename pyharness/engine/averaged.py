@@ -29,6 +29,32 @@ _PHASES = 8  # angles psi, in a revolution, of initial perturbations
 _MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
 
 
+NODES = 20  # in a macro-step
+_TURN = 2.0 * math.pi
+_FEWEST = 100  # revolutions in a macro-step
+_MOST_STEPS = 3000  # some ten seconds
+# The last macro-step exceeds the rest by this fraction and these revolutions, because the time at
+# its end is only estimated.
+_BEYOND, _TURNS_BEYOND = 0.02, 3
+# Factors on the length of a macro-step after a failure, and on the length of the next one after a
+# success at the first and at a later attempt.
+_SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
+# First length of a macro-step, relative to the angle over which the motion changes.
+_RELATIVE = 1.3
+_APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
+_WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
+# With enough angles, the oscillation has the relative error exp(-_DIGITS / 2), means exp(-_DIGITS).
+_DIGITS = 56.0
+_FEWEST_ANGLES, _MOST_ANGLES = 16, 512
+# Highest frequency of a torque wave, relative to the frequency of the motion.
+_FASTEST = 0.02
+# Largest relative error of a macro-step: _SHARE of the tolerance, but at least _FLOOR, because of
+# rounding errors.
+_SHARE, _FLOOR = 0.05, 1e-15
+_ROWS_AT_ONCE = 1000
+_LARGEST_PHASE = 1e15  # rad
+
+
 class Done(NamedTuple):
     """A completed macro-step."""
 
@@ -81,32 +107,6 @@ def _estimate_end(
         amplified = np.abs(back[:, :3] @ each.by_omega)
         growth = max(growth, float(amplified.sum(axis=-1).max()))
     return float(np.abs(measured).max()), growth
-
-
-NODES = 20  # in a macro-step
-_TURN = 2.0 * math.pi
-_FEWEST = 100  # revolutions in a macro-step
-_MOST_STEPS = 3000  # some ten seconds
-# The last macro-step exceeds the rest by this fraction and these revolutions, because the time at
-# its end is only estimated.
-_BEYOND, _TURNS_BEYOND = 0.02, 3
-# Factors on the length of a macro-step after a failure, and on the length of the next one after a
-# success at the first and at a later attempt.
-_SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
-# First length of a macro-step, relative to the angle over which the motion changes.
-_RELATIVE = 1.3
-_APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
-_WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
-# With enough angles, the oscillation has the relative error exp(-_DIGITS / 2), means exp(-_DIGITS).
-_DIGITS = 56.0
-_FEWEST_ANGLES, _MOST_ANGLES = 16, 512
-# Highest frequency of a torque wave, relative to the frequency of the motion.
-_FASTEST = 0.02
-# Largest relative error of a macro-step: _SHARE of the tolerance, but at least _FLOOR, because of
-# rounding errors.
-_SHARE, _FLOOR = 0.05, 1e-15
-_ROWS_AT_ONCE = 1000
-_LARGEST_PHASE = 1e15  # rad
 
 
 def averaged(

@@ -25,6 +25,17 @@ from pyharness.engine.averaged_coordinates import Coordinates, Torque
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import points, to_coefficients
 
+MOST_SWEEPS = 12
+_LEAST_SWEEPS = 3
+_MORE_NODES, _MORE_ANGLES = 4, 8  # additional ones of the sweeps that measure the error
+_FEWEST_ANGLES = 16
+_DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
+# Relative change of a sweep at which the iteration has converged; and the largest change that
+# rounding errors may cause.
+_CONVERGED, _ROUNDED = 1e-15, 1e-12
+_MOST_NEWTON = 10
+_CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
+
 
 class Slow(NamedTuple):
     """The n Chebyshev points from 0 to 1, their weights, and matrices of shape (n, n)."""
@@ -104,18 +115,6 @@ def between_angles(count: int, at: Array) -> Array:
     found: Array = np.sin(count * half) * np.cos(half) / (count * sine)
     found[hit] = 1.0
     return found
-
-
-MOST_SWEEPS = 12
-_LEAST_SWEEPS = 3
-_MORE_NODES, _MORE_ANGLES = 4, 8  # additional ones of the sweeps that measure the error
-_FEWEST_ANGLES = 16
-_DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
-# Relative change of a sweep at which the iteration has converged; and the largest change that
-# rounding errors may cause.
-_CONVERGED, _ROUNDED = 1e-15, 1e-12
-_MOST_NEWTON = 10
-_CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
 
 
 class NotResolvedError(Exception):

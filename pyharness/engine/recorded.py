@@ -25,6 +25,17 @@ from pyharness.model.tape import (
 )
 from pyharness.model.trajectory import Array
 
+_KINDS = {
+    "linear": (Operations.LINEAR, 1),
+    "product": (Operations.PRODUCT, 1),
+    "quotient": (Operations.QUOTIENT, 1),
+    "sqrt": (Operations.SQRT, 1),
+    "exp": (Operations.EXP, 2),
+    "tanh": (Operations.TANH, 3),
+    "sine": (Operations.SINE_COSINE, 3),
+    "table": (Operations.TABLE, 1),
+}
+
 
 def table_values(table: Table, times: Any) -> Array:
     """Return the values of a table at an array of times (s)."""
@@ -56,18 +67,6 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
             inputs = inputs_of(times[row : row + 1], state[row : row + 1])
             outputs[row] = float_outputs(tape, [float(each[0]) for each in inputs])
     return outputs
-
-
-_KINDS = {
-    "linear": (Operations.LINEAR, 1),
-    "product": (Operations.PRODUCT, 1),
-    "quotient": (Operations.QUOTIENT, 1),
-    "sqrt": (Operations.SQRT, 1),
-    "exp": (Operations.EXP, 2),
-    "tanh": (Operations.TANH, 3),
-    "sine": (Operations.SINE_COSINE, 3),
-    "table": (Operations.TABLE, 1),
-}
 
 
 def system(scene: Scene) -> Tape:

@@ -16,6 +16,9 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.torque_law import TorqueLaw
 
+STEP_NODES = 0.5 + 0.5 * POINTS  # in parts of a step
+MOST_STEPS = 20_000  # that `sol` has; it limits the memory
+
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
     """Return the time derivatives of n states: omega (rad/s), (n, 3), or with quaternion, (n, 7).
@@ -41,10 +44,6 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     if attitude.size:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
     return found
-
-
-STEP_NODES = 0.5 + 0.5 * POINTS  # in parts of a step
-MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:

@@ -287,10 +287,10 @@ def test_times_before_a_zero_are_solved() -> None:
     assert states.omega[0] == pytest.approx(solve(SHRINKING, 19.0).omega[-1], rel=1e-11)
     assert np.isnan(states.omega[1]).all()
     assert states.ended.tolist() == ["complete", "refused"]
-    start = np.array([SHRINKING.omega] * 2)
+    starts = np.array([SHRINKING.omega] * 2)
     for attitude in (False, True):
         solver: Any = prepare(SHRINKING, attitude=attitude)
-        *_, status = solver.many(start, [10.0, 21.0])
+        *_, status = solver.many(starts, [10.0, 21.0])
         assert status.tolist() == [Statuses.COMPLETE, Statuses.REFUSED]
         with pytest.raises(InputError, match="21 s is not before it"):
             solver(SHRINKING.omega, 21.0)

@@ -15,6 +15,7 @@ from pyharness import Scene, case_scene, solve
 from pyharness.bench import measure as bench
 from pyharness.checks import judge
 from pyharness.checks.compare import comparison
+from pyharness.checks.compare.findings import Comparison
 from pyharness.engine import registry
 from pyharness.engine.reference_bound import trajectory_bound
 from pyharness.model.attitude import angle_between
@@ -255,7 +256,7 @@ def test_verbs_warn_of_a_wrong_reference(
     assert "WARNING" not in printed(command)
     monkeypatch.setattr(MODULES[command], "reference", _wrong_by(1e-7))
     if command.startswith("compare") and "--method" in command:
-        monkeypatch.setattr(comparison.Comparison, "unexpected", ())
+        monkeypatch.setattr(Comparison, "unexpected", ())
     text = printed(command)
     for words in ("WARNING: the estimate of the reference (", "is below its", "proved"):
         assert words in text

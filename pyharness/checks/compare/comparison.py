@@ -8,16 +8,14 @@ import itertools
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
-from pyharness.checks.compare.agreement import Accuracy, accuracy, differences, distance
+from pyharness.checks.compare.agreement import accuracy, differences, distance
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
-from pyharness.checks.compare.orders import Order, measured_order
+from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
+from pyharness.checks.compare.orders import measured_order
 from pyharness.checks.compare.timing import seconds as timed
-from pyharness.checks.theory.conditioning import LIVELY
 from pyharness.engine.from_rows import attitude_from_rows
 from pyharness.engine.registry import (
     METHODS,
@@ -26,14 +24,12 @@ from pyharness.engine.registry import (
     check_torque,
     requested_tolerance,
 )
-from pyharness.engine.sensitivity import is_sensitive, motion_growth
+from pyharness.engine.sensitivity import motion_growth
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset, switchable
-from pyharness.model.report import short
 from pyharness.model.scene import Scene, checked_scene
-from pyharness.model.trajectory import ROUNDING, Trajectory, digits_left, short_repr
 from pyharness.model.values import boolean
 from pyharness.thesis.in_word import compiled_words
 from pyharness.thesis.programs import (
@@ -43,149 +39,11 @@ from pyharness.thesis.programs import (
     checked_word,
     work_of,
 )
-from pyharness.truth.bounded import ErrorBound, bound_of
+from pyharness.truth.bounded import bound_of
 from pyharness.truth.reference import Reference, reference
 
-# Largest relative error that rounding causes in any method, divided by the error amplification.
-_ROUNDING = 4e-15
 _TIMING_BATCHES = 3
 _TIMING_SECONDS = 3e-4
-
-
-@dataclass(frozen=True, eq=False)
-class ProgramFinding:
-    """The results of one listing, and their differences from the reference and the twin."""
-
-    listing: Listing
-    trajectory: Trajectory
-    accuracy: Accuracy
-    ulps: float | None  # distance of Fortran and the twin; None if only the twin was run
-    differences: tuple[str, ...]  # names of the results in which Fortran and the twin differ
-    order: Order | None  # measured for a corrected program in binary64 only
-    seconds_per_step: float
-
-    __repr__ = short_repr
-
-    @property
-    def who(self) -> str:
-        """Return the program's name and its listing's label, as in ``two-term original``."""
-        return f"{self.listing.program} {self.listing.label}"
-
-
-@dataclass(frozen=True, eq=False)
-class MethodFinding:
-    """The results of one method, or the reason of its failure."""
-
-    method: str
-    tolerance: float
-    trajectory: Trajectory | None
-    accuracy: Accuracy | None
-    seconds: float
-    failure: str = ""
-
-    __repr__ = short_repr
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """The results of `compare_programs` or `compare_methods` for one scene.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene, with the initial attitude if attitudes were requested.
-    lipschitz : float or None
-        The constant of the Runge-Kutta program's stop test, 1/s; None without programs.
-    reference : Reference
-        The reference solution and the estimate of its error.
-    bound : ErrorBound
-        The error of the reference, proved or estimated; no other result depends on it.
-    programs : tuple of ProgramFinding
-        The results of the programs, one for each listing.
-    methods : tuple of MethodFinding
-        The results of the methods: SciPy's, or those requested.
-    growth : float or None
-        The error amplification, if it is known: the largest norm of the state-transition matrix of
-        omega from any earlier time to the last.
-    word : str
-        The arithmetic of the programs, as in ``binary64``.
-    """
-
-    scene: Scene
-    lipschitz: float | None
-    reference: Reference
-    bound: ErrorBound
-    programs: tuple[ProgramFinding, ...]
-    methods: tuple[MethodFinding, ...]
-    growth: float | None
-    word: str = BINARY64
-
-    __repr__ = short_repr
-
-    @property
-    def digits(self) -> float | None:
-        """Return the decimal digits that remain after amplified rounding in binary64, or None."""
-        return None if self.growth is None else digits_left(ROUNDING * self.growth)
-
-    @property
-    def tolerance(self) -> float:
-        """Return the smallest relative tolerance of the methods."""
-        return min(each.tolerance for each in self.methods)
-
-    @property
-    def is_sensitive(self) -> bool:
-        """Return whether the amplified rounding error exceeds 0.3 times `tolerance`."""
-        return is_sensitive(self.growth, self.tolerance)
-
-    @property
-    def unexpected(self) -> tuple[str, ...]:
-        """Return a sentence for each unexpected result.
-
-        With programs, a result is unexpected if Fortran and twin differ, or a corrected program
-        misses its order. Without programs, it is unexpected if a method's error exceeds the limit
-        that follows from its tolerance, or rows are missing.
-        """
-        found = [] if self.programs else [*filter(None, map(self._excess, self.methods))]
-        for each in self.programs:
-            if each.differences:
-                told = ", ".join(each.differences)
-                found.append(f"{each.who}: Fortran and twin differ in {told}")
-            if each.order is not None and each.order.state == "misses":
-                told = f"{each.order}, due {each.order.due}"
-                found.append(
-                    f"{each.who}: does not converge to the reference as the step is halved: {told}"
-                )
-        return tuple(found)
-
-    def _excess(self, one: MethodFinding) -> str:
-        if one.trajectory is None or one.accuracy is None:
-            return ""
-        rows, due = len(one.trajectory.time), len(self.reference.time)
-        if rows < due:
-            return f"{one.method}: ends after {rows} of {due} times, {one.trajectory.ended}"
-        if METHODS[one.method].is_fixed_step or self.growth is None:
-            return ""
-        largest = float(np.abs(np.vstack([self.scene.omega, self.reference.omega])).max())
-        made = one.tolerance * (self.growth if self.growth > LIVELY else 1.0)
-        made += _ROUNDING * self.growth
-        errors = {"omega": (max(one.accuracy.omega), made * largest + self.reference.error)}
-        if one.accuracy.angle is not None:
-            errors["attitude"] = one.accuracy.angle, made + self.reference.angle_error
-        told = [
-            f"error of {name} {short(error)}, limit {short(limit)}"
-            for name, (error, limit) in errors.items()
-            if not error <= limit
-        ]
-        return f"{one.method}: {'; '.join(told)}" if told else ""
-
-    @property
-    def not_judged(self) -> tuple[str, ...]:
-        """Return a sentence for each corrected program whose order could not be determined."""
-        return tuple(
-            f"{each.who}: {each.order}"
-            for each in self.programs
-            if each.order is not None and not each.order.is_judged
-        )
 
 
 def compare_programs(

@@ -1,12 +1,10 @@
-"""The report of `compare`: tables, verdict and data, and a picture of omega and its errors."""
+"""The report of `compare`: tables, verdict and data."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from pyharness.checks.compare.agreement import Accuracy
-from pyharness.checks.compare.comparison import Comparison, MethodFinding, ProgramFinding
-from pyharness.engine.report import mark_end
+from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
+from pyharness.checks.compare.picture import comparison_picture
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -14,13 +12,13 @@ from pyharness.model.records import (
     listing_record,
     scene_record,
 )
-from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short, words
+from pyharness.model.report import Column, Report, Table, digits, numbers, short, words
 from pyharness.model.scene_report import heading, sensitive
-from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
+from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import BINARY64
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _PROGRAMS_LEGEND = (
@@ -248,125 +246,3 @@ def _run(run: Trajectory, accuracy: Accuracy) -> dict[str, Any]:
         "angle_error": accuracy.angle,
         "momentum_in_space": accuracy.momentum_in_space,
     }
-
-
-# Dashes and widths distinguish the lines without colour.
-_STYLES: dict[str, dict[str, Any]] = {
-    "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
-    "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
-    "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
-}
-_REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# A line does not show a trajectory of a single row, so that it is drawn as a marker. The markers
-# can be distinguished even at the same point.
-_MARKERS: dict[str, dict[str, Any]] = {
-    "reference": {"marker": "s", "markersize": 11.0},
-    "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
-    "custom": {"marker": "D", "markersize": 5.0, "markerfacecolor": "none"},
-    "corrected": {"marker": ".", "markersize": 5.0},
-}
-
-
-class _Curve(NamedTuple):
-    name: str  # program or method, which has a column of panels
-    label: str  # version of the program; empty for a method
-    trajectory: Trajectory
-    accuracy: Accuracy
-
-
-def _curves(comparison: Comparison) -> list[_Curve]:
-    return [
-        _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
-        for each in comparison.programs
-    ] or [
-        _Curve(each.method, "", each.trajectory, each.accuracy)
-        for each in comparison.methods
-        if each.trajectory is not None and each.accuracy is not None
-    ]
-
-
-def comparison_picture(comparison: Comparison) -> Picture:
-    """Return a picture with one column per program or method.
-
-    Its panels show the components of omega and their largest error (rad/s), and the error of the
-    attitude (rad) if it is compared.
-    """
-    from matplotlib.figure import Figure
-
-    curves = _curves(comparison)
-    names = list(dict.fromkeys(each.name for each in curves))
-    figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
-    truth = comparison.reference
-    bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
-    shape = 3 + len(bounds), len(names)
-    axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
-    for column, name in enumerate(names):
-        axes[0, column].set_title(name)
-        axes[-1, column].set_xlabel("time (s)")
-        for row in range(3):
-            _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
-        for each in curves:
-            if each.name != name:
-                continue
-            run, label = each.trajectory, each.label
-            for row in range(3):
-                _line(axes[row, column], run.time, run.omega[:, row], label)
-            for row, error in enumerate((each.accuracy.error, each.accuracy.turned), 3):
-                if error is not None:
-                    shown = np.isfinite(error) & (error > 0.0)
-                    _line(axes[row, column], run.time[: len(error)][shown], error[shown], label)
-    ended = [each for each in curves if each.trajectory.ended not in WITH_ALL_ROWS]
-    for row in range(3):
-        axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
-        _frame(axes[row, 0], truth.omega[:, row])
-        for each in ended:
-            mark_end(axes[row, names.index(each.name)], each.trajectory, row)
-    labels = ("error of any $\\omega$ (rad/s)", "error of attitude (rad)")
-    for row, (bound, label) in enumerate(zip(bounds, labels, strict=False), 3):
-        axes[row, 0].set_yscale("log")
-        axes[row, 0].set_ylabel(label)
-        for column in range(len(names)):
-            axes[row, column].axhline(bound, color="black", linewidth=0.8)
-            axes[row, column].grid(visible=True, linewidth=0.3)
-        bottom, top = axes[row, 0].get_ylim()
-        axes[row, 0].set_ylim(max(bottom, 1e-17), min(top, 1e4))
-    axes[0, 0].legend(loc="best", handlelength=4)
-    note = "x: the integration stopped or overflowed; at the edge: out of view" if ended else ""
-    title = (f"{heading(comparison.scene)[0]}; thin line: error of the reference", note)
-    return Picture(figure, _numbers(comparison), title)
-
-
-def _numbers(comparison: Comparison) -> Table:
-    truth, names = comparison.reference, "method listing time omega1 omega2 omega3 error"
-    bounds = [truth.error]
-    if truth.attitude is not None:
-        names += " angle_error"
-        bounds.append(truth.angle_error)
-    rows = [
-        ["reference", "", t, *omega, *bounds]
-        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
-    ]
-    for each in _curves(comparison):
-        run, name = each.trajectory, [each.name, each.label]
-        errors = each.accuracy.error[:, None]
-        if each.accuracy.turned is not None:
-            errors = np.column_stack([errors, each.accuracy.turned])
-        n = len(errors)
-        found = np.column_stack([run.time[:n], run.omega[:n], errors])
-        rows += [[*name, *row] for row in found.tolist()]
-    return numbers(names, rows)
-
-
-def _line(axes: "Axes", time: np.ndarray, values: np.ndarray, label: str) -> None:
-    style = _REFERENCE if label == "reference" else _STYLES[label or "corrected"]
-    marker = _MARKERS[label or "corrected"] if len(time) == 1 else {}
-    axes.plot(time, values, label=label or "method", **style, **marker)
-
-
-def _frame(axes: "Axes", truth: np.ndarray) -> None:
-    if not len(truth):
-        return
-    low, high = float(truth.min()), float(truth.max())
-    margin = max(0.6 * (high - low), 0.05 * max(abs(low), abs(high)), 1e-12)
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(max(bottom, low - margin), min(top, high + margin))

@@ -14,7 +14,9 @@ from pyharness import case_scene
 from pyharness.checks.compare import comparison as room
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
 from pyharness.checks.compare.comparison import compare_programs, listings_for
-from pyharness.checks.compare.report import comparison_picture, comparison_report, verdict
+from pyharness.checks.compare.findings import Comparison
+from pyharness.checks.compare.picture import comparison_picture
+from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.engine.registry import SCIPY_METHODS
 from pyharness.engine.report import trajectory_report
 from pyharness.model.attitude import product
@@ -26,12 +28,12 @@ from pyharness.views.pictures import saved
 from pyharness.views.render import json_text, render
 
 
-def _text(found: room.Comparison) -> str:
+def _text(found: Comparison) -> str:
     return render(comparison_report(found), "table")
 
 
 @pytest.fixture(scope="module")
-def case_2() -> room.Comparison:
+def case_2() -> Comparison:
     return compare_programs(case_scene(2))
 
 
@@ -51,7 +53,7 @@ def test_all_is_as_expected_in_every_case() -> None:
         assert (found.programs[0].accuracy.momentum is not None) == torque_free
 
 
-def test_table_says_which_variable_stopped_the_run(case_2: room.Comparison) -> None:
+def test_table_says_which_variable_stopped_the_run(case_2: Comparison) -> None:
     lines = _text(case_2).splitlines()
     row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
     assert row.split()[2:5] == ["25", "V2", "3305>500"]
@@ -67,9 +69,7 @@ def test_table_of_what_failed_and_of_large_quotients_fits() -> None:
     assert max(map(len, text.splitlines())) <= 100
 
 
-def test_methods_keep_to_their_tolerance_and_the_reference_to_its_error(
-    case_2: room.Comparison,
-) -> None:
+def test_methods_keep_to_their_tolerance_and_the_reference_to_its_error(case_2: Comparison) -> None:
     assert [each.method for each in case_2.methods] == list(SCIPY_METHODS)
     for each in case_2.methods:
         assert each.accuracy is not None
@@ -172,7 +172,7 @@ def test_compare_shows_attitudes_where_they_are_asked_for() -> None:
     assert picture.numbers.columns[-1].head == "angle_error"
 
 
-def test_compare_asks_for_no_attitude_by_itself(case_2: room.Comparison) -> None:
+def test_compare_asks_for_no_attitude_by_itself(case_2: Comparison) -> None:
     assert case_2.reference.attitude is None
     turned = compare_programs(replace(case_scene(2), attitude=(0.0, 1.0, 0.0, 0.0)))
     assert turned.scene.attitude is None
@@ -208,7 +208,7 @@ def test_a_difference_and_a_missed_order_are_unexpected(monkeypatch: pytest.Monk
         assert "UNEXPECTED" in _text(found)
 
 
-def test_views_carry_the_same_numbers(case_2: room.Comparison) -> None:
+def test_views_carry_the_same_numbers(case_2: Comparison) -> None:
     report = comparison_report(case_2)
     table = list(csv.DictReader(io.StringIO(render(report, "csv"))))
     record = json.loads(render(report, "json"))
@@ -227,7 +227,7 @@ def test_number_that_is_not_finite_is_null() -> None:
 
 
 @pytest.mark.campaign
-def test_picture_and_its_numbers(case_2: room.Comparison) -> None:
+def test_picture_and_its_numbers(case_2: Comparison) -> None:
     files = saved(comparison_picture(case_2), "x.svg", "x.pdf")
     for name, start in (("x.svg", b"<?xml"), ("x.pdf", b"%PDF")):
         assert files[name].startswith(start)

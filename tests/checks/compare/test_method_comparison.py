@@ -13,8 +13,9 @@ import pytest
 
 from pyharness import Scene, case_scene, compare_methods, read_scene, torques
 from pyharness.checks.compare.agreement import accuracy
-from pyharness.checks.compare.comparison import Comparison
-from pyharness.checks.compare.report import comparison_picture, comparison_report, verdict
+from pyharness.checks.compare.findings import Comparison
+from pyharness.checks.compare.picture import comparison_picture
+from pyharness.checks.compare.report import comparison_report, verdict
 from pyharness.cli.main import main
 from pyharness.engine.registry import SCIPY_METHODS
 from pyharness.model.expressions import parsed

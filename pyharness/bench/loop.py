@@ -1,0 +1,57 @@
+"""The loop of all measurements: a task's calls are prepared, then timed in interleaved rounds."""
+
+import statistics
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+from pyharness.checks.compare.timing import SLOW, Clock, seconds
+from pyharness.model.progress import Progress
+
+_Row = TypeVar("_Row")
+Say = Callable[[str], None]  # receives the current part of a task
+
+
+class Task(Protocol):
+    """A unit of measurement, such as a workload; messages name it by `place`."""
+
+    @property
+    def place(self) -> str: ...  # noqa: D102
+
+
+_Task = TypeVar("_Task", bound=Task)
+
+
+@dataclass(frozen=True)
+class Call(Generic[_Row]):
+    """A call to be timed, and the row that records its time."""
+
+    run: Callable[[], object] | None  # None if the call failed and is not timed
+    clock: Clock
+    row: Callable[..., _Row]  # makes the row from the keyword argument `seconds` (s or None)
+
+
+def timed(
+    tasks: Sequence[_Task],
+    calls: Callable[[_Task, Say], Iterable[Call[_Row]]],
+    progress: Progress,
+    length: float,
+    rounds: int,
+    statistic: Callable[[Sequence[float]], float] = statistics.median,
+    slow: float = SLOW,
+) -> Iterator[_Row]:
+    """Yield the rows of the calls that `calls` prepares for each task.
+
+    The last four parameters are those of `pyharness.checks.compare.timing.seconds`.
+    """
+    for number, task in enumerate(tasks):
+
+        def say(text: str, number: int = number, place: str = task.place) -> None:
+            progress(number, len(tasks), f"{place}: {text}")
+
+        found = list(calls(task, say))
+        runs = [each.run for each in found if each.run]
+        clocks = [each.clock for each in found if each.run]
+        times = iter(seconds(runs, length, rounds, say, statistic, clocks, slow))
+        for each in found:
+            yield each.row(seconds=next(times) if each.run else None)

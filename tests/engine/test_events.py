@@ -11,7 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pyharness import Scene, TorqueLaw, case_scene, load, solve
+from pyharness.engine.event_fits import Solution
+from pyharness.engine.event_functions import event_functions
 from pyharness.events import crosses, extremum, flip, rest, tilt
+from pyharness.model.dense_output import Pieces
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.torques import damping, opaque, pulses
 from tests.campaigns.event_campaign import BODY, KINDS, Tally, campaign, planted, run
@@ -434,3 +437,16 @@ def test_jumps_are_the_crossings_of_their_level() -> None:
         found = solve(scene, 20.0, events=both).t_events
         assert found is not None
         assert found[0] == pytest.approx(found[1], abs=1e-6)
+
+
+def test_noise_is_the_error_of_omega_and_of_the_time() -> None:
+    """3 w1 + 2 t, with omega's error 1e-11 of the largest |omega| so far, and rounding of t."""
+    scene = Scene("", (1.0, 0.5, -2.0), moments=(1.0, 2.0, 2.5), torque=damping(0.1))
+    sol = solve(scene, 8.0, dense_output=True).sol
+    assert sol is not None
+    assert isinstance(sol.states, Pieces)
+    (g,) = event_functions(lambda t, w: 3.0 * w[0] + 2.0 * t, attitude=False)
+    times = np.array([1.0, 4.0, 7.5])
+    for tolerance, own in ((1e-11, 1e-11), (1e-3, 1e-10), (0.0, 2.0**-50)):
+        noise = Solution(sol.states, sol, tolerance).noise(g, times)
+        assert noise == pytest.approx(own * 3.0 * 2.0 + 2.0**-50 * 2.0 * times, rel=0.01)

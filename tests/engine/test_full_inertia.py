@@ -182,7 +182,7 @@ def test_a_matrix_in_an_array_is_refused_alone() -> None:
 
 
 def test_a_needle_beyond_double_double_in_an_array() -> None:
-    """Of Fibonacci numbers f, f[75] f[77] - f[76]**2 = 1: the least moment is 1e-16 kg m2."""
+    """Fibonacci numbers have f[75] f[77] - f[76]**2 = 1: the least moment is 1e-16 kg m2."""
     f = [0.0, 1.0]
     while len(f) < 78:
         f.append(f[-2] + f[-1])

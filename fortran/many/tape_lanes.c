@@ -200,6 +200,9 @@ static void set_values(struct group *g)
       out[1][0] = shrunk * shrunk;
       break;
     case TABLE: set_table(g, operation[1] - 1, out[0]); break;
+    case LOG: out[0][0] = each_of(log, x); break;
+    case ATAN: out[0][0] = each_of(atan, x); break;
+    case ASIN: out[0][0] = each_of(asin, x); break;
     default:
       if (operation[2] > 0) {
         set_wave(g, tape->coefficients[tape->starts[operation[2] - 1] - 1], out[0], out[1]);
@@ -286,6 +289,12 @@ static void expand(struct group *g)
         out[0][k] = convolved(out[1], out[2], k, 0, k - 1) / whole;
         out[1][k] = -convolved(out[0], out[0], k, 0, k);
         break;
+      case LOG:
+      case ATAN:
+      case ASIN:
+        out[1][k] = whole * x[k];
+        out[0][k] = convolved(y, out[1], k, 0, k - 1) / whole;
+        break;
       default: /* a table */
         break;
       }
@@ -363,6 +372,9 @@ static void set_noise(struct group *g, lanes *noise)
     case EXP: sum = value * (2.0 + x); break;
     case TANH: sum = 2.0 * value + g->a[out + 1][0] * x; break;
     case TABLE: sum = 2.0 * value; break;
+    case LOG:
+    case ATAN:
+    case ASIN: sum = 2.0 * value + absolute(g->a[second][0]) * x; break;
     default: /* An angle proportional to time has no rounding error. */
       sum = 2.0 + (operation[2] > 0 ? all_of(0.0) : absolute(g->a[out + 1][0]) * x);
       g->noises[out + 1] = 2.0 + (operation[2] > 0 ? all_of(0.0) : value * x);
@@ -429,6 +441,9 @@ static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][MOST_UN
         v[out] = m[out + 1] * v[first];
         v[out + 1] = -2.0 * m[out] * v[out];
         break;
+      case LOG:
+      case ATAN:
+      case ASIN: v[out] = m[second] * v[first]; break;
       default: break;
       }
     }
@@ -765,6 +780,9 @@ static int order_for(const struct bodies *all, int *factors)
 {
   /* Measured: a lower order has shorter steps, whose other work costs more. */
   int order = 1 + (int)ceil(-0.7 * log(all->tolerance / 20.0)), least = LEAST_ORDER;
+  /* A step would have to end at a switch in one lane and not in others. */
+  for (int n = 0; n < all->tape.n_operations; n++)
+    if (all->tape.operations[n][0] == SWITCH || all->tape.operations[n][0] == FLOOR) return 0;
   for (int i = 0; i < all->n_slots; i++) factors[i] = 1;
   const int most = most_factors(&all->tape, factors);
   /* A product of many factors may not show in its first terms: see tape_powers.f90. */

@@ -5,14 +5,16 @@ module tape_march
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: request_t, solution_t
-  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW
+  use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
-                         sum_perturbations, VARIATION_TOLERANCE
+                         slot_gradient, sum_perturbations, VARIATION_TOLERANCE
+  use tape_switches, only: begin_switches, change_switch => change, CROSSES, IS_CHANGED, next_crossing, &
+                           operand_error, resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -33,6 +35,9 @@ module tape_march
   real(dp), parameter :: MOST_ROUNDING = 1e3_dp
   ! Largest sum of the terms of a step, relative, unless the tolerance allows more.
   real(dp), parameter :: MOST_CANCELLED = 1e3_dp
+  integer, parameter :: CORRECTIONS = 4 ! of the step that ends at a switch
+  ! Relative distance from a switch that an error may bridge; at least, of rounding errors.
+  real(dp), parameter :: NEAR = 1e-13_dp
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -51,19 +56,23 @@ module tape_march
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
     real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
     logical :: finest = .false. ! whether the local tolerance is the smallest
+    logical :: grazes = .false. ! whether an error may decide if a switch changes
+    real(dp) :: slides_at = 0.0_dp ! s
+    integer :: slides_on = 0       ! number of the switch
   end type outcome_t
 
   public :: march
 
 contains
 
-  subroutine march(tape, request, attitude, attempt, s, solution, found)
+  subroutine march(tape, request, attitude, attempt, s, switches, solution, found)
     !! Integrate once from 0 to the last of the times: rows, their number and the status.
     type(tape_t), intent(in) :: tape
     type(request_t), intent(in) :: request
     real(dp), intent(in) :: attitude(4)       !! at time 0
     type(attempt_t), intent(in) :: attempt
     type(series_t), intent(inout) :: s        !! working storage
+    type(switches_t), intent(inout) :: switches !! those of the tape
     type(solution_t), intent(inout) :: solution
     type(outcome_t), intent(out) :: found
     type(transitions_t) :: transitions
@@ -83,7 +92,10 @@ contains
     logical :: has_values                     ! whether terms 0 of all slots are known
     integer :: is_short
     logical :: is_low                         ! whether the order must be raised
+    real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
+    real(dp) :: whole_step                    ! s: h without switches
     integer :: i, n, n_before, order, tries, last_term
+    integer :: verdict                        ! of `next_crossing`
     type(step_limit_t) :: limit
 
     n = tape%n_unknowns
@@ -101,6 +113,11 @@ contains
     s%v(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
+    do i = 1, switches%n
+      call derivatives_at(tape, t, y, t_end, s, rates)
+      call begin_switches(i, switches, s)
+    end do
+    verdict = STAYS
     scale = maxval(abs(request%omega))
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
     ! The first step is a guess: a radian. From rest it is the whole time.
@@ -129,7 +146,7 @@ contains
           solution%status = OVERFLOW
           exit
         end if
-        s%a = 0.0_dp
+        s%a(1:, :) = 0.0_dp
         s%h = 0.0625_dp*s%h
         cycle
       end if
@@ -159,6 +176,7 @@ contains
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
       call converge(tape, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
+      if (switches%n > 0) call resolve_switches(switches, s, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)
@@ -167,9 +185,21 @@ contains
       else
         call two_sum(t(1), factor*s%h + t(2), t_next(1), t_next(2))
       end if
+      if (switches%n > 0) then
+        whole_step = factor*s%h
+        call next_crossing(max(NEAR, attempt%tolerance), switches, s, factor, verdict)
+        if (verdict == SLIDES) then
+          found%slides_at = t(1)
+          found%slides_on = switches%first
+          solution%status = SLIDING
+          exit
+        end if
+        if (verdict == IS_CHANGED) cycle
+        if (verdict == CROSSES) call end_at_switch()
+      end if
       call estimate_truncation()
       call noise_of(tape, s, noise)
-      if (.not. is_continued()) then
+      if (.not. is_continued_to_switch()) then
         is_rejected = .true.
         tries = tries + 1
         if (tries > MOST_TRIES) then
@@ -188,7 +218,9 @@ contains
       do i = 1, n
         sum_of_noise(i) = sum_of_noise(i) + (noise(i)*factor*s%h)**2
       end do
+      if (switches%n > 0) call check_touch()
       call take_step()
+      if (switches%n > 0) call cross()
       found%steps = found%steps + 1
       if (.not. maxval(abs(y)) <= huge(s%h)) then
         solution%status = OVERFLOW
@@ -207,10 +239,11 @@ contains
       call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
       if (is_full) call begin_block()
       t = t_next
-      has_values = size(tape%table_starts) == 1
+      has_values = size(tape%table_starts) == 1 .and. verdict /= CROSSES
       from_rest = .not. scale > 0.0_dp
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
+      if (verdict == CROSSES) s%h = whole_step
       if (abs(s%h) > abs(rest)) s%h = rest
       call check_steps(found%steps, t(1), rest, arrives, limit, found%ahead, solution%status)
       if (solution%status /= COMPLETE) exit
@@ -399,12 +432,92 @@ contains
       end if
       rounded = max(1.0_dp, maxval(weights*(size_of_terms + noise*abs(factor*s%h))))
       call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
+      rates = derivatives
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
       defect = weights*abs(factor*s%h*derivatives - slope)
       ! NaN is not allowed.
       is_continued = all(defect <= allowed)
       if (is_continued) found%least = max(found%least, maxval(defect)/(s%order + 1))
     end function is_continued
+
+    subroutine end_at_switch()
+      !! Let the step end where a switch changes.
+      arrives = .false.
+      at_end = .false.
+      call two_sum(t(1), factor*s%h + t(2), t_next(1), t_next(2))
+    end subroutine end_at_switch
+
+    logical function is_continued_to_switch()
+      !! Return whether the series continue; correct the end of a step at a switch, because the
+      !! series of an operand has one term less than those of the unknowns.
+      real(dp) :: correction, before
+      integer :: tries
+
+      is_continued_to_switch = is_continued()
+      if (verdict /= CROSSES) return
+      before = factor
+      do tries = 1, CORRECTIONS
+        if (.not. is_continued_to_switch) return
+        correction = -operand_error(switches%first, switches, s)/switches%slope
+        if (.not. abs(correction) <= 0.01_dp*before) then
+          ! A root that is nearly double is not corrected, a wrong series rejected.
+          is_continued_to_switch = abs(correction) <= sqrt(epsilon(factor)) .or. &
+                                   .not. abs(correction) <= huge(factor)
+          return
+        end if
+        factor = factor + correction
+        call end_at_switch()
+        call estimate_truncation()
+        is_continued_to_switch = is_continued()
+        if (abs(correction) <= 2.0_dp*epsilon(factor)*factor) return
+      end do
+    end function is_continued_to_switch
+
+    subroutine check_touch()
+      !! Notice that an operand nearly crosses a level where the rates would jump: an error decides.
+      real(dp) :: other(tape%n_unknowns), here(tape%n_unknowns), zero(tape%n_unknowns)
+      real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
+      real(dp) :: nearly
+
+      if (switches%touches < 0.0_dp) return
+      slots = s%a(0, switches%slots)
+      call evaluate(switches%touches, at, zero)
+      at = y + (at + y_low)
+      call two_sum(t(1), switches%touches*s%h + t(2), at_time(1), at_time(2))
+      call derivatives_at(tape, at_time, at, s%h, s, here)
+      associate (value => s%a(0, switches%slots(switches%touching)))
+        value = merge(0.0_dp, 1.0_dp, value > 0.5_dp)
+      end associate
+      call derivatives_at(tape, at_time, at, s%h, s, other)
+      s%a(0, switches%slots) = slots
+      nearly = sqrt(max(NEAR, attempt%tolerance))
+      if (maxval(weights*abs(other - here))*abs(factor*s%h)*nearly > request%tolerance) then
+        found%grazes = .true.
+      end if
+    end subroutine check_touch
+
+    subroutine cross()
+      !! Change the switches at the end of the step. A perturbation changes the time at which the
+      !! rates jump (Leine and Nijmeijer 2004, section 7.2).
+      real(dp) :: gradient(tape%n_unknowns), after(tape%n_unknowns), jump(tape%n_unknowns)
+      real(dp) :: slope, blur
+      integer :: i
+
+      switches%on_level = 0
+      if (verdict /= CROSSES) return
+      call slot_gradient(s%arrays, switches%operands(switches%first), gradient)
+      slope = switches%slope/s%h
+      blur = s%noise(switches%operands(switches%first))/slope
+      do i = 1, switches%n
+        if (switches%crosses(i) /= 0) call change_switch(i, switches%crosses(i), switches, s)
+      end do
+      call derivatives_at(tape, t_next, y + y_low, s%h, s, after)
+      jump = after - rates
+      do i = 1, SIDE_BY_SIDE
+        lanes(i, :n) = lanes(i, :n) + jump*(dot_product(gradient, lanes(i, :n))/slope)
+      end do
+      sum_of_noise = sum_of_noise + (jump*blur)**2
+    end subroutine cross
 
     subroutine take_step()
       !! Advance the unknowns, the error and the perturbations to the end of the step.

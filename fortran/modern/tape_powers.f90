@@ -4,7 +4,7 @@ module tape_powers
   !! therefore so short that the mean order of a product's terms is below that of the series, unless
   !! the product stays invisible. The mean order of a product is the sum of those of its factors.
   use kinds, only: dp
-  use operations, only: LINEAR, PRODUCT, QUOTIENT, SQUARE_ROOT => SQRT, TABLE
+  use operations, only: LINEAR, PRODUCT, QUOTIENT, SELECT_OF => SELECT, SQUARE_ROOT => SQRT, TABLE
   use tape, only: tape_t
   implicit none(type, external)
   private
@@ -58,6 +58,11 @@ contains
           do i = tape%starts(first), tape%starts(first + 1) - 1
             factors = max(factors, powers%factors(tape%slots(i)))
           end do
+        else if (tape%operations(1, n) == SELECT_OF) then
+          ! Of both combinations.
+          do i = tape%starts(second), tape%starts(second + 2) - 1
+            factors = max(factors, powers%factors(tape%slots(i)))
+          end do
         end if
       end associate
     end do
@@ -92,7 +97,7 @@ contains
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n))
         select case (tape%operations(1, n))
-        case (PRODUCT, LINEAR, TABLE)
+        case (PRODUCT, LINEAR, TABLE, SELECT_OF)
           cycle
         case (QUOTIENT)
           scales(first) = max(0.0_dp, scales(first))
@@ -126,6 +131,10 @@ contains
           divisors(second) = merged(divisors(second), of_result)
         case (LINEAR)
           do i = tape%starts(first), tape%starts(first + 1) - 1
+            divisors(tape%slots(i)) = merged(divisors(tape%slots(i)), of_result)
+          end do
+        case (SELECT_OF)
+          do i = tape%starts(second), tape%starts(second + 2) - 1
             divisors(tape%slots(i)) = merged(divisors(tape%slots(i)), of_result)
           end do
         case default

@@ -5,8 +5,9 @@ module tape_series
   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
-  use operations, only: EXPONENTIAL => EXP, LINEAR, PRODUCT, QUOTIENT, SINE_COSINE, &
-                        SQUARE_ROOT => SQRT, TABLE, TANGENT => TANH
+  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, &
+                        FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, SELECT_OF => SELECT, SINE_COSINE, &
+                        SQUARE_ROOT => SQRT, SWITCH, TABLE, TANGENT => TANH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_powers, only: find_powers, powers_t
@@ -100,6 +101,15 @@ module tape_series
       integer(c_int), intent(out) :: is_short  !! not 0: all terms do not suffice
     end function perturb_tape
 
+    subroutine slot_gradient(tape, slot, gradient) bind(c, name="slot_gradient_level")
+      !! Compute the derivatives of term 0 of a slot by the unknowns.
+      import :: c_int, dp, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      integer(c_int), intent(in), value :: slot
+      real(dp), intent(out) :: gradient(tape%n_unknowns)
+    end subroutine slot_gradient
+
     real(dp) function vary_tape(block, h, order, factor, weights, tolerance) &
       bind(c, name="vary_tape_level")
       !! Compute the terms of derivatives with respect to parameters, as many as they need, and
@@ -125,8 +135,8 @@ module tape_series
     end subroutine sum_perturbations
   end interface
 
-  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, sum_perturbations, &
-            vary_tape
+  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, slot_gradient, &
+            sum_perturbations, vary_tape
 
 contains
 
@@ -342,6 +352,17 @@ contains
           a(0, out + 1) = (2.0_dp/(exp(abs(a(0, first))) + exp(-abs(a(0, first)))))**2
         case (TABLE)
           call set_table_terms(tape, first, a(0, TIME_SLOT), t_low, h, a(:, out))
+        case (LOGARITHM)
+          a(0, out) = log(a(0, first))
+        case (ARCTANGENT)
+          a(0, out) = atan(a(0, first))
+        case (ARCSINE)
+          a(0, out) = asin(a(0, first))
+        case (SWITCH, FLOOR_OF)
+          ! The caller sets the result.
+          cycle
+        case (SELECT_OF)
+          a(0, out) = value_of(tape, chosen(tape, n, a), a)
         case default
           if (second > 0) then
             call sine_cosine_of(tape%coefficients(tape%starts(second)), a(0, TIME_SLOT), t_low, &
@@ -354,6 +375,16 @@ contains
       end associate
     end do
   end subroutine set_values_with
+
+  pure integer function chosen(tape, n, a)
+    !! Return the combination that an operation SELECT chooses.
+    type(tape_t), intent(in) :: tape
+    integer, intent(in) :: n !! number of the operation
+    real(dp), intent(in) :: a(0:LAST_TERM, tape%n_slots)
+
+    chosen = tape%operations(3, n)
+    if (a(0, tape%operations(2, n)) == 0.0_dp) chosen = chosen + 1
+  end function chosen
 
   pure subroutine set_table_terms(tape, number, t, t_low, h, terms)
     !! Compute the terms of a table, which are those of a cubic polynomial.
@@ -421,6 +452,12 @@ contains
           s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out)) + s%a(0, out + 1)*s%noise(first)
         case (TABLE)
           s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out))
+        case (LOGARITHM, ARCTANGENT, ARCSINE)
+          s%noise(out) = EPSILON_OF_FUNCTION*abs(s%a(0, out)) + abs(s%a(0, second))*s%noise(first)
+        case (SWITCH, FLOOR_OF)
+          s%noise(out) = 0.0_dp
+        case (SELECT_OF)
+          s%noise(out) = of_combination(chosen(tape, n, s%a))
         case default
           s%noise(out) = EPSILON_OF_FUNCTION
           s%noise(out + 1) = EPSILON_OF_FUNCTION

@@ -5,10 +5,11 @@ module tape_solve
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use problem, only: request_t, solution_t
-  use statuses, only: COMPLETE, GAVE_UP, SENSITIVE
+  use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING
   use tape, only: tape_t
   use tape_march, only: attempt_t, march, outcome_t
   use tape_series, only: allocate_series, series_t
+  use tape_switches, only: find_switches, switches_t
   implicit none(type, external)
   private
 
@@ -40,6 +41,8 @@ contains
     type(solution_t), pointer :: solution
     real(dp), allocatable, target :: memory(:)
     type(series_t) :: s
+    type(switches_t) :: switches
+    integer :: failed
     type(attempt_t) :: attempt
     type(outcome_t) :: outcome
     real(dp) :: attitude(4)
@@ -68,6 +71,8 @@ contains
     end if
     call allocate_series(tape, 1, memory, s, fits)
     if (.not. fits) return
+    call find_switches(tape, switches, failed)
+    if (failed /= 0) return
     cost = max(1.0_dp, tape%n_slots/CHEAP_SLOTS)
     most = min(4e18_dp, request%effort*(MOST_STEPS/cost))
     attempt%stride = 1 + int(STEPS_BETWEEN_LOOKS/cost, int64)
@@ -76,7 +81,7 @@ contains
     planned = PLANNED_GROWTH
     do
       attempt%most_steps = most - spent
-      call march(tape, request, attitude, attempt, s, solution, outcome)
+      call march(tape, request, attitude, attempt, s, switches, solution, outcome)
       spent = spent + real(outcome%steps, dp)
       if (.not. outcome%error <= NO_DIGIT) outcome%error = NO_DIGIT
       if (solution%status /= COMPLETE .or. outcome%finest) exit
@@ -99,9 +104,11 @@ contains
     solution%error = max(outcome%error, error) + blurred
     solution%growth = outcome%growth
     solution%spent = spent
-    if (solution%status == COMPLETE .and. blurred > UNSURE*request%tolerance) then
+    if (solution%status == COMPLETE &
+        .and. (outcome%grazes .or. blurred > UNSURE*request%tolerance)) then
       solution%status = SENSITIVE
     end if
+    if (solution%status == SLIDING) solution%needed = outcome%slides_at
     if (solution%status == GAVE_UP) then
       ! If the error is too large already, another integration with shorter steps will be needed.
       if (outcome%error > request%tolerance) outcome%ahead = ANOTHER*outcome%ahead

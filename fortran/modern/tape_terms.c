@@ -112,6 +112,9 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
       add_pair(tape, out + 2, out + 1);
       add_pair(tape, out, out);
       break;
+    case LOG:
+    case ATAN:
+    case ASIN: add_pair(tape, out + 1, second); break;
     default: break;
     }
   }
@@ -150,6 +153,13 @@ static inline double combined(const struct tape *tape, int n, int k, const serie
   for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
     sum += tape->coefficients[i] * a[tape->slots[i] - 1][k];
   return sum;
+}
+
+/* Return the combination that SELECT chooses: the second operand, or the next one. */
+static inline int chosen(const struct tape *tape, const int *operation)
+{
+  const series *const a = tape->a;
+  return operation[2] - 1 + (a[operation[1] - 1][0] == 0.0);
 }
 
 /* Compute the terms of all slots below the order, and those of the unknowns up to it. Inputs are
@@ -193,7 +203,15 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
         out[k] = (*sum++ + angle[k] * out[TERMS]) / k;
         out[TERMS + k] = -*sum++ - 2.0 * out[k] * out[0];
         break;
-      default: /* a table */
+      case LOG:
+      case ATAN:
+      case ASIN:
+        angle = out + TERMS;
+        angle[k] = k * x[k];
+        out[k] = (*sum++ + angle[k] * y[0]) / k;
+        break;
+      case SELECT: out[k] = combined(tape, chosen(tape, operation), k, a); break;
+      default: /* a table, or a switch */
         break;
       }
     }
@@ -281,12 +299,18 @@ static void perturb(const struct tape *tape, double h, int k)
     case TANH:
       x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
       break;
+    case LOG:
+    case ATAN:
+    case ASIN:
+      x = convolved_one(v[first], a[second], k) + loaded(v[first][k]) * a[second][0];
+      break;
+    case SELECT: x = perturbed(tape, chosen(tape, operation), k, (const perturbations *)v); break;
     case SINE_COSINE:
       x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
       store(v[out + 1][k], -x);
       x = convolved_one(v[first], a[out + 1], k) + loaded(v[first][k]) * a[out + 1][0];
       break;
-    default: /* a table, which has no perturbation */
+    default: /* a table or a switch, which have no perturbation */
       x = (lanes){0.0};
       break;
     }
@@ -370,8 +394,10 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     const int is_rate = n >= tape->n_operations;
     const int *operation = tape->operations[is_rate ? 0 : n];
     const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
-    if (is_rate || operation[0] == LINEAR) {
-      const int c = is_rate ? derivatives + n - tape->n_operations : first;
+    if (is_rate || operation[0] == LINEAR || operation[0] == SELECT) {
+      const int c = is_rate                  ? derivatives + n - tape->n_operations
+                    : operation[0] == LINEAR ? first
+                                             : chosen(tape, operation);
       double *to = is_rate ? jacobian[n - tape->n_operations] : v[out];
       for (int p = 0; p < columns; p += IN_REGISTER) {
         reg sum = {0.0};
@@ -393,15 +419,28 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     case EXP: by_first = m[out]; break;
     case SINE_COSINE: by_first = m[out + 1], of_second = -m[out]; break;
     case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first; break;
-    default: break; /* a table depends on the time alone */
+    case LOG:
+    case ATAN:
+    case ASIN: by_first = m[second]; break;
+    default: break; /* a table depends on the time alone, and a switch is constant */
     }
-    const int from = operation[0] == TABLE ? 0 : first;
+    const int is_constant = operation[0] == TABLE || operation[0] == SWITCH || operation[0] == FLOOR;
+    const int from = is_constant ? 0 : first;
     for (int p = 0; p < columns; p += IN_REGISTER) {
       const reg x = *(reg *)(v[from] + p);
       *(reg *)(v[out] + p) = by_first * x + by_second * *(reg *)(v[other] + p);
       if (of_second) *(reg *)(v[out + 1] + p) = of_second * x;
     }
   }
+}
+
+/* Compute the derivatives of term 0 of a slot by the unknowns. */
+void OF_LEVEL(slot_gradient, LEVEL)(const struct tape *tape, int slot, double *gradient)
+{
+  const struct work *work = tape->work;
+  row jacobian[MOST_UNKNOWNS] __attribute__((aligned(64)));
+  set_jacobian(tape, SIDE_BY_SIDE, 1.0, 0.0, jacobian);
+  memcpy(gradient, work->tangents[slot - 1], tape->n_unknowns * sizeof *gradient);
 }
 
 /* Compute term k + 1 of the perturbations of the unknowns, with the Jacobian as a polynomial of the

@@ -33,6 +33,7 @@ MODULES = (
     "tape_growth",
     "tape_series",
     "tape_plan",
+    "tape_switches",
     "tape_march",
     "tape_solve",
     "tape_step",

@@ -196,8 +196,19 @@ def heyoka_functions() -> Functions[Any]:
     def table(_: Table, time: Any) -> Any:
         raise InputError("heyoka can't evaluate a table; allowed: a torque without tables")
 
+    def chosen(condition: Any, first: Any, second: Any) -> Any:
+        return heyoka.select(heyoka.gt(condition, heyoka.expression(0.0)), first, second)
+
+    def refused(_: Any) -> Any:
+        raise InputError("heyoka can't evaluate a floor; allowed: a torque without floor")
+
     elementary = heyoka.sqrt, heyoka.exp, heyoka.tanh, heyoka.sin, heyoka.cos
-    return Functions(heyoka.expression, *elementary, table)
+    others = heyoka.log, heyoka.atan, heyoka.asin
+    one, zero = heyoka.expression(1.0), heyoka.expression(0.0)
+    return Functions(
+        heyoka.expression, *elementary, table, *others, lambda x: chosen(x, one, zero), refused,
+        chosen,
+    )  # fmt: skip
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:

@@ -93,7 +93,7 @@ def trajectory_of(
 
     It has no `error` and `growth` if the last time was not reached.
     """
-    ended = ENDS[status] if ENDS[status] in WITH_ALL_ROWS else "overflow"
+    ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
     more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
     attitude = None if attitudes is None else attitudes.T[:n_rows]
     return rows_trajectory(

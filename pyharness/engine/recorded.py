@@ -15,6 +15,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import (
     N_INPUTS,
+    SWITCHES,
     TIME,
     Functions,
     Linear,
@@ -34,6 +35,12 @@ _KINDS = {
     "tanh": (Operations.TANH, 3),
     "sine": (Operations.SINE_COSINE, 3),
     "table": (Operations.TABLE, 1),
+    "log": (Operations.LOG, 2),
+    "atan": (Operations.ATAN, 2),
+    "asin": (Operations.ASIN, 2),
+    "switch": (Operations.SWITCH, 1),
+    "floor": (Operations.FLOOR, 1),
+    "select": (Operations.SELECT, 1),
 }
 
 
@@ -47,7 +54,10 @@ def table_values(table: Table, times: Any) -> Array:
     return found
 
 
-ARRAYS: Functions[Any] = Functions(float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values)
+ARRAYS: Functions[Any] = Functions(
+    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values, np.log, np.arctan, np.arcsin,
+    lambda x: np.where(x > 0.0, 1.0, 0.0), np.floor, lambda h, x, y: np.where(h > 0.0, x, y),
+)  # fmt: skip
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
@@ -94,6 +104,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     frequencies: dict[int, int] = {}  # numbers of combinations proportional to time, by slot
     waves: dict[int, int] = {}
     tables: list[Table] = []
+    n_switches = 0
 
     def combined(linear: Linear) -> int:
         terms = [(places[slot], coefficient) for slot, coefficient in linear.terms]
@@ -113,6 +124,12 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
         if table is not None:
             tables.append(table)
             first = len(tables)
+        if kind in SWITCHES:
+            n_switches += 1
+            second = n_switches
+        if kind == "select":
+            # The second combination follows the first.
+            second, _ = (combined(Linear(0.0, ((slot, 1.0),))) for slot in operands[1:])
         if code == Operations.SINE_COSINE:
             if operands[0] == TIME and TIME not in frequencies:
                 frequencies[TIME] = combined(Linear(0.0, ((TIME, 1.0),)))

@@ -59,6 +59,8 @@ def undefined_operation(
     for kind, operands, *_ in tape.operations:
         if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
             continue
+        if kind == "log" and not values[operands[0]] > 0.0:
+            return "the logarithm or power of a number that is not positive; write abs(x)**p"
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
             return (
                 "the square root of a number that becomes 0 or negative; write a smooth function, "

@@ -16,7 +16,8 @@ from scipy.integrate import DenseOutput, OdeSolver
 from pyharness.engine.recorded import kernel_tape
 from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.errors import InputError
-from pyharness.model.symbols import Recorder, called_once, recorded_twice
+from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.symbols import Recorder, recorded_twice
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
 from pyharness.model.values import number
@@ -206,7 +207,7 @@ def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
         # A single equation may return a number.
         rates = called_once(
             lambda t, y: np.ravel(np.array(fun(t, y), dtype=object)),
-            (time, np.array(state, dtype=object)),
+            (time, symbol_array(state)),
             recorder,
             f"a function of (t, y) that returns {n} numbers",
         )

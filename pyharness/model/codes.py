@@ -16,6 +16,7 @@ class Statuses:
     SENSITIVE = 6  # all rows are present, but the amplified rounding error exceeds the tolerance
     UNCHECKED = 7  # all rows are present, but SciPy may have passed a short change of the torque
     SINGULAR = 8  # the torque is undefined at the end, although neither it nor omega is infinite
+    SLIDING = 9  # a switch of the torque would change back and forth without end
 
 
 class Methods:
@@ -88,3 +89,12 @@ class Operations:
     SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
     TANH = 8  # slots: the tangent, its derivative, and the weighted terms of the argument
+    # The second operand is the derivative. Slots: the function, the weighted terms of the argument.
+    LOG = 9
+    ATAN = 10
+    ASIN = 11
+    # The second operand is the number of the switch. The result is constant in a step.
+    SWITCH = 12  # 1 where the operand is positive, else 0
+    FLOOR = 13
+    # One of two combinations, numbers operand 2 and the next: the first where operand 1 is not 0.
+    SELECT = 14

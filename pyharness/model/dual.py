@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.model.symbols import MOST_OPERATIONS, Recorder
-from pyharness.model.tape import Functions, Table, Tape, evaluate
+from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
+from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
 # Factors on the limit of operations of a recorded torque: _MORE for a tape that no kernel reads,
 # _FEWER for one that a kernel reads, whose memory is proportional to their number.
@@ -118,6 +118,15 @@ def _of_duals(
     return called
 
 
+def _selected(condition: Any, first: Any, second: Any) -> Any:
+    if not isinstance(condition, Dual):
+        return selected(condition, first, second)
+    count, choose = len(condition.slopes), SYMBOLS.select
+    one, other = dual(first, count), dual(second, count)
+    slopes = [choose(condition.value, *each) for each in zip(one.slopes, other.slopes, strict=True)]
+    return Dual(choose(condition.value, one.value, other.value), slopes)
+
+
 def _of_table(table: Table, time: Dual) -> Dual:
     slopes = tuple((c1, 2.0 * c2, 3.0 * c3, 0.0) for _, c1, c2, c3 in table.pieces)
     return time.chained(
@@ -133,4 +142,10 @@ _DUALS: Functions[Any] = Functions(
     _of_duals(math.sin, np.sin, lambda x, _: np.cos(x)),
     _of_duals(math.cos, np.cos, lambda x, _: -1.0 * np.sin(x)),
     _of_table,
+    _of_duals(math.log, np.log, lambda x, _: 1.0 / x),
+    _of_duals(math.atan, np.arctan, lambda x, _: 1.0 / (1.0 + x * x)),
+    _of_duals(math.asin, np.arcsin, lambda x, _: 1.0 / np.sqrt(1.0 + -1.0 * (x * x))),
+    _of_duals(step, SYMBOLS.switch, lambda x, _: 0.0),
+    _of_duals(whole, SYMBOLS.floor, lambda x, _: 0.0),
+    _selected,
 )

@@ -121,6 +121,7 @@ def ending(trajectory: Trajectory) -> str:
     endings = {
         "overflow": "overflow: the rows end before the first omega that is not finite",
         "singular": f"singular: {trajectory.reason}",
+        "sliding": f"sliding: {trajectory.reason}",
         "unchecked": "unchecked: a short change of the torque may have been passed",
         "event": "ended by a terminal event",
         "sensitive": sensitive(trajectory.growth, trajectory.digits),

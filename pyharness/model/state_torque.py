@@ -12,7 +12,8 @@ import numpy as np
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of
-from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, called_once, recorded_twice
+from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
 from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
 from pyharness.model.values import Triple, converted, three_floats, triple
@@ -147,7 +148,7 @@ def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
 
 def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] = ()) -> Tape:
     time, *state = recorder.inputs()
-    omega, attitude = (np.array(each, dtype=object) for each in (state[:3], state[3:7]))
+    omega, attitude = map(symbol_array, (state[:3], state[3:7]))
     values = dict(zip(names, state[7:], strict=True))
     return recorder.tape(list(function(time, omega, attitude, **values)))
 

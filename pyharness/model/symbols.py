@@ -5,9 +5,11 @@ change its coefficients. Any other operation has a slot for its result, only one
 """
 
 import math
-import re
+import sys
+import sysconfig
 from collections.abc import Callable, Sequence
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +23,12 @@ from pyharness.model.tape import (
     Operation,
     Table,
     Tape,
+    arcsine,
     exponential,
+    logarithm,
     slots_of,
+    step,
+    whole,
 )
 from pyharness.model.values import converted
 
@@ -30,7 +36,12 @@ from pyharness.model.values import converted
 # time.
 MOST_OPERATIONS = 2000
 _MOST_POWER = 1000
-_ALLOWED = "+ - * /, integer powers, sqrt, sin, cos, tan, exp, sinh, cosh, tanh of NumPy"
+_ALLOWED = (
+    "+ - * / ** and NumPy's elementary functions, where, clip, minimum, maximum, sign, abs, floor, "
+    "heaviside, interp"
+)
+# Frames that are not the user's.
+_LIBRARIES = sysconfig.get_path("purelib"), str(Path(__file__).parents[1])
 
 
 class Recorder:
@@ -48,15 +59,16 @@ class Recorder:
         self._most, self._n_inputs, self._instead = most, n_inputs, instead
         self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
+        self.was_converted = False  # whether a symbol was to become a float
 
     def inputs(self) -> list["Symbol"]:
         """Return a symbol for each input: time, omega, attitude, and any parameters."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
-    def refusal(self, what: str) -> InputError:
-        """Return the exception for an operation that can't be recorded."""
-        allowed = f"allowed: {_ALLOWED}, or {self._instead}"
-        return InputError(f"{self.place}: {what} can't be recorded; {allowed}")
+    def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
+        """Return the exception for an operation that can't be recorded; say what to `write`."""
+        allowed = f"allowed: {write}, or {self._instead}"
+        return InputError(f"{self.place}: {what} can't be recorded{_line()}; {allowed}")
 
     def impure(self) -> InputError:
         """Return the exception for a function that depends on more than its arguments."""
@@ -225,14 +237,17 @@ class Symbol:
         return other / self
 
     def __pow__(self, power: Any) -> "Symbol":
-        """Record and return an integer power, or the power 0.5."""
-        exponent = converted(power) if not isinstance(power, Symbol) else None
-        if not isinstance(exponent, float):
-            raise self.recorder.refusal("a power that is not a number")
-        if exponent == 0.5:
-            return self.sqrt()
-        if exponent != int(exponent) or abs(exponent) > _MOST_POWER:
-            raise self.recorder.refusal(f"the power {exponent:g}")
+        """Record and return a power; that of a negative number is defined for integers alone."""
+        if isinstance(power, Symbol):
+            return (power * self.log()).exp()
+        exponent = converted(power)
+        if not isinstance(exponent, float) or not math.isfinite(exponent):
+            raise self.recorder.refusal("a power that is not a finite number")
+        if abs(exponent) <= _MOST_POWER and exponent % 1.0 == 0.5:
+            root = self.sqrt()
+            return root if exponent == 0.5 else self ** (exponent - 0.5) * root
+        if exponent % 1.0 or abs(exponent) > _MOST_POWER:
+            return (exponent * self.log()).exp()
         result, square, left = Symbol(self.recorder, 1.0, {}), self, abs(int(exponent))
         while left:
             if left % 2:
@@ -243,16 +258,32 @@ class Symbol:
         return 1.0 / result if exponent < 0.0 else result
 
     def __rpow__(self, base: Any) -> "Symbol":
-        """Refuse a power whose exponent is a symbol."""
-        raise self.recorder.refusal("a power that is not a number")
+        """Record and return a power of a positive number."""
+        number = converted(base)
+        if not isinstance(number, float) or not number > 0.0:
+            raise self.recorder.refusal("a power of a number that is not positive")
+        return (self * math.log(number)).exp()
 
-    def _apply(self, kind: str, function: Callable[[float], float]) -> "Symbol":
-        if not self._terms:
-            return Symbol(self.recorder, function(self._constant), {})
+    def _own_slot(self) -> int:
+        """Return a slot whose value is that of this symbol."""
         slot, factor = self._slot()
         if factor != 1.0:
             slot = self.recorder.slot(Operation("linear", (), self.linear()))
-        return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, (slot,))): 1.0})
+        return slot
+
+    def _apply(
+        self,
+        kind: str,
+        function: Callable[[float], float],
+        derivative: "Callable[[Symbol], Symbol] | None" = None,
+    ) -> "Symbol":
+        """Return a function of this symbol; the kernel needs the `derivative` of some."""
+        if not self._terms:
+            return Symbol(self.recorder, function(self._constant), {})
+        operands = (self._own_slot(),)
+        if derivative is not None:
+            operands = (*operands, derivative(self)._own_slot())
+        return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, operands)): 1.0})
 
     # NumPy calls the methods with these names for np.sqrt(symbol) and so on.
     def sqrt(self) -> "Symbol":
@@ -278,6 +309,96 @@ class Symbol:
         """Return the tangent."""
         return self.sin() / self.cos()
 
+    def log(self) -> "Symbol":
+        """Return the natural logarithm."""
+        return self._apply("log", logarithm, lambda x: 1.0 / x)
+
+    def log1p(self) -> "Symbol":
+        """Return the natural logarithm of 1 + x."""
+        return (1.0 + self).log()
+
+    def log2(self) -> "Symbol":
+        """Return the logarithm to base 2."""
+        return self.log() / math.log(2.0)
+
+    def log10(self) -> "Symbol":
+        """Return the logarithm to base 10."""
+        return self.log() / math.log(10.0)
+
+    def exp2(self) -> "Symbol":
+        """Return 2**x."""
+        return (self * math.log(2.0)).exp()
+
+    def expm1(self) -> "Symbol":
+        """Return exp(x) - 1."""
+        return self.exp() - 1.0
+
+    def square(self) -> "Symbol":
+        """Return the square."""
+        return self * self
+
+    def cbrt(self) -> "Symbol":
+        """Return the real cube root."""
+        return self.sign() * (abs(self).log() / 3.0).exp()
+
+    def arctan(self) -> "Symbol":
+        """Return the angle (rad) whose tangent is this symbol."""
+        return self._apply("atan", math.atan, lambda x: 1.0 / (1.0 + x * x))
+
+    def arcsin(self) -> "Symbol":
+        """Return the angle (rad) whose sine is this symbol."""
+        return self._apply("asin", arcsine, lambda x: 1.0 / (1.0 - x * x).sqrt())
+
+    def arccos(self) -> "Symbol":
+        """Return the angle (rad) whose cosine is this symbol."""
+        return 0.5 * math.pi - self.arcsin()
+
+    def arcsinh(self) -> "Symbol":
+        """Return the number whose hyperbolic sine is this symbol."""
+        return (self + (self * self + 1.0).sqrt()).log()
+
+    def arctan2(self, x: Any) -> "Symbol":
+        """Return the angle (rad) of the point (x, self); not defined where x < 0 and self = 0."""
+        # Half the angle, because a quotient by x would not be defined where x is 0.
+        return 2.0 * (self / ((self * self + x * x).sqrt() + x)).arctan()
+
+    def switch(self) -> "Condition | bool":
+        """Return the condition that this symbol is positive; bool if it is constant."""
+        if not self._terms:
+            return self._constant > 0.0
+        slot, factor = self._slot()
+        if factor < 0.0:
+            slot = self._own_slot()
+        return Condition(
+            self.recorder, 0.0, {self.recorder.slot(Operation("switch", (slot,))): 1.0}
+        )
+
+    def floor(self) -> "Symbol":
+        """Return the largest whole number up to this symbol."""
+        return self._apply("floor", whole)
+
+    __floor__ = floor
+
+    def ceil(self) -> "Symbol":
+        """Return the smallest whole number from this symbol on."""
+        return -(-self).floor()
+
+    __ceil__ = ceil
+
+    def trunc(self) -> "Symbol":
+        """Return the whole number next to this symbol on the side of 0."""
+        return self.sign() * abs(self).floor()
+
+    __trunc__ = trunc
+
+    def rint(self) -> "Symbol":
+        """Return the nearest whole number."""
+        return (self + 0.5).floor()
+
+    def sign(self) -> "Symbol":
+        """Return 1 if this symbol is positive, else -1."""
+        return 2.0 * (self > 0.0) - 1.0
+
     def sinh(self) -> "Symbol":
         """Return the hyperbolic sine."""
         return 0.5 * (self.exp() - (-self).exp())
@@ -290,9 +411,13 @@ class Symbol:
         """Return the hyperbolic tangent."""
         return self._apply("tanh", math.tanh)
 
+    def is_time(self) -> bool:
+        """Return whether this symbol is the time."""
+        return not self._constant and self._terms == {TIME: 1.0}
+
     def of_table(self, table: Table) -> "Symbol":
         """Return a table at this symbol; raise InputError unless the symbol is the time."""
-        if self._constant or self._terms != {TIME: 1.0}:
+        if not self.is_time():
             raise InputError(
                 f"{self.recorder.place}: a table of anything but the time can't be recorded"
             )
@@ -303,34 +428,70 @@ class Symbol:
         """Return the symbol itself, because it is real."""
         return self
 
-    def __lt__(self, other: object) -> bool:
-        """Refuse a comparison."""
-        raise self.recorder.refusal("a comparison of the state")
+    @_of_symbols
+    def __gt__(self, other: "Symbol") -> Any:
+        """Record and return the condition that this symbol is larger."""
+        return (self - other).switch()
 
-    __eq__ = __le__ = __gt__ = __ge__ = __lt__
+    @_of_symbols
+    def __lt__(self, other: "Symbol") -> Any:
+        """Record and return the condition that this symbol is smaller."""
+        return (other - self).switch()
+
+    @_of_symbols
+    def __ge__(self, other: "Symbol") -> Any:
+        """Record and return the condition that this symbol is not smaller."""
+        return negated((other - self).switch())
+
+    @_of_symbols
+    def __le__(self, other: "Symbol") -> Any:
+        """Record and return the condition that this symbol is not larger."""
+        return negated((self - other).switch())
+
+    def __eq__(self, other: object) -> Any:
+        """Refuse the comparison, which is false but for instants."""
+        raise self.recorder.refusal("a comparison with == or !=", "< and > in numpy.where")
+
+    __ne__ = __eq__
 
     def __bool__(self) -> bool:
         """Refuse the use as a condition."""
-        raise self.recorder.refusal("a branch that depends on the state")
+        raise self.recorder.refusal(
+            "a branch (if, while, and, or, not) on time or state",
+            "numpy.where(condition, x, y), &, | and ~",
+        )
 
     def __abs__(self) -> "Symbol":
-        """Refuse the absolute value, which has no derivative at 0."""
-        raise self.recorder.refusal("an absolute value")
+        """Record and return the absolute value."""
+        return select(self > 0.0, self, -self)
 
     def __float__(self) -> float:
         """Refuse the conversion to a number."""
+        self.recorder.was_converted = True
         raise self.recorder.refusal(
-            "a conversion of the state to a float, as in functions of math, or in an assignment to "
-            "an array of floats,"
+            "a conversion of time or state to a float, by float(), scipy or an array of floats,",
+            "functions of numpy",
         )
 
     __int__ = __index__ = __complex__ = __round__ = __float__
 
-    def __mod__(self, other: object) -> "Symbol":
-        """Refuse the remainder."""
-        raise self.recorder.refusal("a remainder")
+    @_of_symbols
+    def __floordiv__(self, other: "Symbol") -> "Symbol":
+        """Record and return the quotient, rounded down."""
+        return (self / other).floor()
 
-    __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
+    def __rfloordiv__(self, value: Any) -> "Symbol":
+        """Record and return a number divided by this symbol, rounded down."""
+        return (value / self).floor()
+
+    @_of_symbols
+    def __mod__(self, other: "Symbol") -> "Symbol":
+        """Record and return the remainder, which has the sign of the divisor."""
+        return self - other * (self / other).floor()
+
+    def __rmod__(self, value: Any) -> "Symbol":
+        """Record and return the remainder of a number."""
+        return value - self * (value / self).floor()
 
     def __getattr__(self, name: str) -> Any:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""
@@ -338,6 +499,67 @@ class Symbol:
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")
+
+
+class Condition(Symbol):
+    """A symbol that is 1 where a condition holds, else 0."""
+
+    __slots__ = ()
+
+    def __and__(self, other: Any) -> Any:
+        """Return the condition that both hold."""
+        return _condition(select(self, other, False))
+
+    def __or__(self, other: Any) -> Any:
+        """Return the condition that one holds at least."""
+        return _condition(select(self, True, other))
+
+    def __xor__(self, other: Any) -> Any:
+        """Return the condition that exactly one holds."""
+        return _condition(select(self, negated(other), other))
+
+    def __invert__(self) -> "Condition":
+        """Return the condition that this one does not hold."""
+        return _condition(1.0 - self)
+
+    __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
+
+
+def _condition(value: Symbol) -> Condition:
+    return Condition(value.recorder, value._constant, value._terms)
+
+
+def negated(condition: Any) -> Any:
+    """Return the condition that `condition` does not hold."""
+    return ~condition if isinstance(condition, Condition) else not condition
+
+
+def select(condition: Any, first: Any, second: Any) -> Any:
+    """Return `first` where the condition holds, else `second`; numbers or symbols."""
+    if not isinstance(condition, Symbol):
+        return first if condition else second
+    if not isinstance(condition, Condition):
+        raise condition.recorder.refusal("a number as a condition", "a comparison")
+    one, other = (
+        condition._other(float(x) if isinstance(x, (bool, np.bool_)) else x)
+        for x in (first, second)
+    )
+    if one is None or other is None:
+        raise condition.recorder.refusal("an array in a choice of numbers", "numpy.where")
+    if one.linear() == other.linear():
+        return one
+    operands = tuple(each._own_slot() for each in (condition, one, other))
+    recorder = condition.recorder
+    return Symbol(recorder, 0.0, {recorder.slot(Operation("select", operands)): 1.0})
+
+
+def _line() -> str:
+    """Return the user's function and line that called."""
+    frame = sys._getframe(2)
+    while frame.f_back and frame.f_code.co_filename.startswith(_LIBRARIES):
+        frame = frame.f_back
+    name = frame.f_code.co_name
+    return f" (line {frame.f_lineno}, in {printable(name)})"
 
 
 def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Recorder]) -> Tape:
@@ -348,31 +570,23 @@ def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Re
     return first
 
 
-def called_once(
-    function: Callable[..., Any], given: Sequence[Any], recorder: Recorder, allowed: str
-) -> list[Any]:
-    """Return the components that a user's function returns for symbols.
-
-    Raise InputError if the function raises an exception; `allowed` describes allowed functions.
-    """
-    try:
-        return list(function(*given))
-    except InputError:
-        raise
-    except Exception as error:
-        missing = re.search(r"no callable (\w+) method", str(error))
-        if missing:
-            raise recorder.refusal(f"{missing[1]} of the state") from None
-        raise InputError(
-            f"{recorder.place}: the function raised {type(error).__name__}: "
-            f"{printable(str(error))}; allowed: {allowed}"
-        ) from error
+def _switched(x: Any) -> Any:
+    return x.switch() if isinstance(x, Symbol) else step(x)
 
 
-# Functions that evaluate a tape in symbols of a recorder. A constant remains a float.
+def _floor(x: Any) -> Any:
+    return x.floor() if isinstance(x, Symbol) else whole(x)
+
+
+def _selected(condition: Any, x: Any, y: Any) -> Any:
+    known = isinstance(condition, Condition) or not isinstance(condition, Symbol)
+    return select(condition if known else _condition(condition), x, y)
+
+
 SYMBOLS: Functions[Any] = Functions(
-    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table)
-)
+    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
+    np.log, np.arctan, np.arcsin, _switched, _floor, _selected,
+)  # fmt: skip
 
 
 def _without_unused(

@@ -21,6 +21,8 @@ TIME = 0
 OMEGA = (1, 2, 3)
 ATTITUDE = (4, 5, 6, 7)
 N_INPUTS = 8
+# The kinds of operations whose results are constant but where a root of the operand is crossed.
+SWITCHES = ("switch", "floor")
 
 
 class Linear(NamedTuple):
@@ -42,7 +44,12 @@ class Table(NamedTuple):
 
 
 class Operation(NamedTuple):
-    """An operation of a tape: "linear", "table", or another kind on one or two slots."""
+    """An operation of a tape: "linear", "table", or another kind on one to three slots.
+
+    "log", "atan" and "asin" have the slot of their derivative as second operand. "switch" is 1
+    where its operand is positive, else 0; "select" is its second operand where its first, 0 or 1,
+    is 1, else its third.
+    """
 
     kind: str
     operands: tuple[int, ...]
@@ -69,6 +76,11 @@ class Tape:
     def needs_attitude(self) -> bool:
         """Whether the function depends on the attitude."""
         return not self.inputs.isdisjoint(ATTITUDE)
+
+    @property
+    def n_switches(self) -> int:
+        """The number of switches, each of which divides the states into two or more regions."""
+        return sum(each.kind in SWITCHES for each in self.operations)
 
     @property
     def breaks(self) -> list[float]:
@@ -98,6 +110,12 @@ class Functions(Generic[T]):
     sine: Callable[[T], T]
     cosine: Callable[[T], T]
     table: Callable[[Table, T], T]  # the value of a table at a time
+    log: Callable[[T], T]
+    atan: Callable[[T], T]
+    asin: Callable[[T], T]
+    switch: Callable[[T], T]
+    floor: Callable[[T], T]
+    select: Callable[[T, T, T], T]
 
 
 def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
@@ -130,6 +148,8 @@ def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> lis
             values.append(values[operands[0]] * values[operands[1]])
         elif kind == "quotient":
             values.append(values[operands[0]] / values[operands[1]])
+        elif kind == "select":
+            values.append(functions.select(*(values[each] for each in operands)))
         else:
             values.append(getattr(functions, kind)(values[operands[0]]))
     return values
@@ -147,6 +167,33 @@ def exponential(x: float) -> float:
         return math.inf
 
 
+def logarithm(x: float) -> float:
+    """Return log(x); minus infinity at 0 and NaN below."""
+    if x > 0.0:
+        return math.log(x)
+    return -math.inf if x == 0.0 else math.nan
+
+
+def arcsine(x: float) -> float:
+    """Return asin(x), or NaN beyond 1."""
+    return math.asin(x) if abs(x) <= 1.0 else math.nan
+
+
+def step(x: float) -> float:
+    """Return 1 if x is positive, else 0."""
+    return 1.0 if x > 0.0 else 0.0
+
+
+def whole(x: float) -> float:
+    """Return the largest whole number up to x."""
+    return float(math.floor(x)) if math.isfinite(x) else math.nan
+
+
+def selected(condition: float, first: float, second: float) -> float:
+    """Return `first` if the condition is not 0, else `second`."""
+    return first if condition else second
+
+
 def _value(table: Table, time: float) -> float:
     piece = max(0, bisect_right(table.breaks, time) - 1)
     c0, c1, c2, c3 = table.pieces[piece]
@@ -155,7 +202,10 @@ def _value(table: Table, time: float) -> float:
 
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.
-FLOATS: Functions[float] = Functions(float, _sqrt, exponential, math.tanh, sine, cosine, _value)
+FLOATS: Functions[float] = Functions(
+    float, _sqrt, exponential, math.tanh, sine, cosine, _value, logarithm, math.atan, arcsine, step,
+    whole, selected,
+)  # fmt: skip
 # Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
 _LARGE_ARGUMENT = 210.0
 # Replacements for small arguments, by kind.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 ROUNDING = 2.0**-53
 # The ways to end a run (`Trajectory.ended`) with all requested rows present.
 WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
-ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "event")
+ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "sliding", "event")
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
 STOP_VARIABLES = ("U1", "U2", "U3", "V1", "V2", "V3", "U", "UV")
 _WIDTH, _LINES = 100, 10
@@ -105,12 +105,13 @@ class Trajectory(Conversions):
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
         Numbers of steps (for SciPy's methods and the reference, of rows) and right-hand sides.
-    ended : {"complete", "sensitive", "unchecked", "stopped", "overflow", "singular", "event"}
+    ended : str
         How the integration ended. Endings with all rows are "complete"; "sensitive" if the
         amplified rounding error exceeds the tolerance; and "unchecked" if the series that bounds
         SciPy's steps does not reach the end. SciPy may then have stepped over a short change of a
         recorded torque. Early endings are "stopped" by the Lipschitz test, "overflow", "singular"
-        for an undefined torque, and a terminal "event".
+        for an undefined torque, "sliding" where a switch of the torque would change back and forth
+        without end, and a terminal "event".
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
@@ -121,7 +122,7 @@ class Trajectory(Conversions):
         The error amplification: the largest norm of the state-transition matrices of omega to the
         end.
     reason : str or None
-        The time and the operation at which a recorded torque is undefined.
+        The time and the operation at which a recorded torque is undefined, or slides.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
@@ -222,7 +223,7 @@ class Trajectory(Conversions):
             )
         if self.ended == "event":
             return "A terminal event ended the integration; the rows end before it or at it."
-        if self.ended in ("overflow", "singular"):
+        if self.ended in ("overflow", "singular", "sliding"):
             last = f"the last row is at t = {self.time[-1]:g} s" if len(self.time) else "no row"
             reason = self.reason or "omega or the torque became infinite or NaN"
             return f"{reason[0].upper()}{reason[1:]}; {last}."

@@ -54,8 +54,13 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 # The number of operands by kind of operation.
-_OPERANDS = {"product": 2, "quotient": 2} | {
-    each.name: 1 for each in fields(Functions) if each.name not in ("number", "table")
+_OPERANDS = {each.name: 1 for each in fields(Functions) if each.name not in ("number", "table")} | {
+    "product": 2,
+    "quotient": 2,
+    "log": 2,
+    "atan": 2,
+    "asin": 2,
+    "select": 3,
 }
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from flint import acb, arb, fmpq
 
 from pyharness.model.dual import Dual
+from pyharness.model.errors import InputError
 from pyharness.model.tape import Functions, Table
 from pyharness.truth.enclosed import Balls
 
@@ -60,6 +61,19 @@ def _cosine(x: Any) -> Any:
     return x.chained(_cosine(x.value), -1.0 * _sine(x.value)) if isinstance(x, Dual) else x.cos()
 
 
+def _log(x: Any) -> Any:
+    if isinstance(x, Dual):
+        return x.chained(_log(x.value), 1 / x.value)
+    return x.log(analytic=True) if isinstance(x, acb) else x.log()
+
+
+def _refuse(*_: Any) -> Any:
+    raise InputError(
+        "no enclosure is proved for a torque with arctan, arcsin, floor or a switch; allowed: "
+        "other functions"
+    )
+
+
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
     """Return the functions of tapes (recorded operations) for a step after or before `time` (s).
 
@@ -74,4 +88,5 @@ def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
         s = at - arb(each.breaks[piece])
         return c0 + s * (c1 + s * (c2 + s * c3))
 
-    return Functions(arb, _sqrt, _exp, _tanh, _sine, _cosine, table)
+    functions = _sqrt, _exp, _tanh, _sine, _cosine, table, _log
+    return Functions(arb, *functions, *[_refuse] * 5)

@@ -128,6 +128,13 @@ def _bounded(value: Any) -> _Bounded:
     return value if isinstance(value, _Bounded) else _Bounded(value, 0.0)
 
 
+def _selected(condition: Any, first: Any, second: Any) -> _Bounded:
+    is_first, one, other = _bounded(condition).value > 0.0, _bounded(first), _bounded(second)
+    return _Bounded(
+        np.where(is_first, one.value, other.value), np.where(is_first, one.error, other.error)
+    )
+
+
 _BOUNDS: Functions[Any] = Functions(
     float,
     lambda x: x.chained(np.sqrt(x.value), 0.5 / np.sqrt(x.value)),
@@ -137,4 +144,10 @@ _BOUNDS: Functions[Any] = Functions(
     lambda x: x.chained(np.sin(x.value), 1.0),
     lambda x: x.chained(np.cos(x.value), 1.0),
     lambda table, time: time.chained(table_values(table, time.value), 0.0),
+    lambda x: x.chained(np.log(x.value), 1.0 / x.value),
+    lambda x: x.chained(np.arctan(x.value), 1.0 / (1.0 + x.value**2)),
+    lambda x: x.chained(np.arcsin(x.value), 1.0 / np.sqrt(1.0 - x.value**2)),
+    lambda x: x.chained(np.where(x.value > 0.0, 1.0, 0.0), 0.0),
+    lambda x: x.chained(np.floor(x.value), 0.0),
+    _selected,
 )

@@ -1,0 +1,386 @@
+module tape_switches
+  !! Switches of a tape: operations whose results are constant in a step, because it ends where the
+  !! operand crosses one of its levels (Hairer, Norsett and Wanner 1993, section II.6). Term 0 of a
+  !! switch is its result: 0 or 1 of SWITCH, a whole number of FLOOR.
+  use kinds, only: dp
+  use operations, only: FLOOR_OF => FLOOR, SWITCH
+  use tape, only: tape_t
+  use tape_series, only: LAST_TERM, series_t
+  implicit none(type, external)
+  private
+
+  integer, parameter :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
+  integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
+  ! Largest of the last two terms of an operand, over the sum of all.
+  real(dp), parameter :: SMALL_TERMS = 1e-5_dp
+  real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
+  real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
+  real(dp), parameter :: NARROWEST = 2.0_dp**(-40) ! interval without a decision, over the step
+  integer, parameter :: MOST_CUTS = 100
+
+  type, public :: switches_t
+    integer :: n = 0
+    integer, allocatable :: slots(:), operands(:) !! of each switch
+    logical, allocatable :: is_floor(:)
+    integer, allocatable :: on_level(:)  !! LOWER or UPPER where the step begins there, else 0
+    integer, allocatable :: crosses(:)   !! the level that the operand crosses at the step's end
+    logical, allocatable :: is_turned(:) !! changed since the last step, because it did not move
+    ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
+    integer :: first
+    real(dp) :: slope
+    real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
+    integer :: touching   !! its switch
+  end type switches_t
+
+  public :: begin_switches, change, find_switches, next_crossing, operand_error, resolve_switches
+
+contains
+
+  pure subroutine find_switches(tape, switches, failed)
+    !! Find the switches of a tape.
+    type(tape_t), intent(in) :: tape
+    type(switches_t), intent(inout) :: switches
+    integer, intent(out) :: failed !! not 0 if there is not enough memory
+    integer :: i, n
+
+    failed = 0
+    switches%n = count(tape%operations(1, :) == SWITCH .or. tape%operations(1, :) == FLOOR_OF)
+    if (switches%n == 0) return
+    allocate (switches%slots(switches%n), switches%operands(switches%n), &
+              switches%is_floor(switches%n), switches%on_level(switches%n), &
+              switches%crosses(switches%n), &
+              switches%is_turned(switches%n), stat=failed)
+    if (failed /= 0) return
+    switches%is_turned = .false.
+    i = 0
+    do n = 1, tape%n_operations
+      if (tape%operations(1, n) /= SWITCH .and. tape%operations(1, n) /= FLOOR_OF) cycle
+      i = i + 1
+      switches%is_floor(i) = tape%operations(1, n) == FLOOR_OF
+      switches%operands(i) = tape%operations(2, n)
+      switches%slots(i) = tape%operations(4, n)
+    end do
+    switches%on_level = 0
+  end subroutine find_switches
+
+  pure subroutine begin_switches(switch_number, switches, s)
+    !! Set the result of a switch by the value of its operand. On a level it is the upper one.
+    integer, intent(in) :: switch_number
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    real(dp) :: level
+
+    associate (i => switch_number, operand => s%a(0, switches%operands(switch_number)))
+      if (switches%is_floor(i)) then
+        level = real(floor(min(1e9_dp, max(-1e9_dp, operand))), dp)
+        switches%on_level(i) = merge(LOWER, 0, operand == level)
+      else
+        level = merge(1.0_dp, 0.0_dp, operand >= 0.0_dp)
+        switches%on_level(i) = merge(LOWER, 0, operand == 0.0_dp)
+      end if
+      s%a(0, switches%slots(i)) = level
+    end associate
+  end subroutine begin_switches
+
+  pure subroutine resolve_switches(switches, s, factor)
+    !! Reduce the factor on the step until the last terms of all operands are small.
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+    real(dp), intent(inout) :: factor
+    real(dp) :: total, power, last
+    integer :: i, k, tries
+
+    do i = 1, switches%n
+      associate (terms => s%a(:, switches%operands(i)))
+        do tries = 1, MOST_CUTS
+          total = 0.0_dp
+          last = 0.0_dp
+          power = 1.0_dp
+          do k = 0, s%order - 1
+            total = total + power*abs(terms(k))
+            if (k >= s%order - 2) last = max(last, power*abs(terms(k)))
+            power = factor*power
+          end do
+          if (.not. last > SMALL_TERMS*total) exit
+          factor = 0.75_dp*factor
+        end do
+      end associate
+    end do
+  end subroutine resolve_switches
+
+  pure subroutine next_crossing(nearly, switches, s, factor, verdict)
+    !! Find the first level that an operand crosses in a step, and shorten the step to it.
+    real(dp), intent(in) :: nearly  !! relative distance from a level that counts as a touch
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    real(dp), intent(inout) :: factor
+    integer, intent(out) :: verdict
+    real(dp) :: roots(2, switches%n), terms(0:LAST_TERM), root, touch
+    integer :: i, level, sign_of_level
+
+    verdict = STAYS
+    switches%first = 0
+    switches%touches = -1.0_dp
+    switches%crosses = 0
+    roots = 2.0_dp*factor
+    do i = 1, switches%n
+      ! It may have crossed a level together with another one.
+      do level = LOWER, UPPER
+        if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
+        terms = terms_from(i, level, switches, s)
+        if ((terms(0) < 0.0_dp) .eqv. (level == LOWER)) switches%on_level(i) = level
+      end do
+      if (switches%on_level(i) /= 0) then
+        if (.not. leaves(i)) then
+          call turn_back(i, switches, s, verdict)
+          if (verdict /= STAYS) return
+        end if
+      end if
+      do level = LOWER, UPPER
+        if (.not. has_level(i, level)) cycle
+        sign_of_level = merge(1, -1, level == LOWER)
+        call first_root(terms_from(i, level, switches, s), s%order, sign_of_level, &
+                        switches%on_level(i) == level, factor, nearly, root, touch)
+        roots(level, i) = root
+        if (touch >= 0.0_dp .and. root > factor) then
+          switches%touches = touch
+          switches%touching = i
+        end if
+      end do
+    end do
+    switches%is_turned = .false.
+    root = minval(roots)
+    if (root > factor) return
+    verdict = CROSSES
+    do i = 1, switches%n
+      do level = LOWER, UPPER
+        if (roots(level, i) <= root*(1.0_dp + TOGETHER)) then
+          if (switches%first == 0) switches%first = i
+          switches%crosses(i) = level
+        end if
+      end do
+    end do
+    if (switches%touches > root) switches%touches = -1.0_dp
+    factor = root
+    switches%slope = slope_at(switches%first, factor)
+
+  contains
+
+    pure logical function has_level(i, level)
+      integer, intent(in) :: i, level
+
+      has_level = switches%is_floor(i) .or. (s%a(0, switches%slots(i)) > 0.5_dp .eqv. level == LOWER)
+    end function has_level
+
+    pure logical function leaves(i)
+      !! Return whether an operand on a level moves to the side of its result.
+      integer, intent(in) :: i
+      real(dp) :: terms(0:LAST_TERM), total, power
+      integer :: k
+
+      leaves = .true.
+      terms = terms_from(i, switches%on_level(i), switches, s)
+      total = 0.0_dp
+      power = 1.0_dp
+      do k = 1, s%order - 1
+        power = power*factor
+        terms(k) = power*terms(k)
+        total = total + abs(terms(k))
+      end do
+      do k = 1, s%order - 1
+        if (abs(terms(k)) > ZERO_TERM*total) then
+          leaves = (terms(k) > 0.0_dp) .eqv. (switches%on_level(i) == LOWER)
+          return
+        end if
+      end do
+    end function leaves
+
+    pure real(dp) function slope_at(i, part)
+      !! Return the derivative of an operand by the part of the step.
+      integer, intent(in) :: i
+      real(dp), intent(in) :: part
+      integer :: k
+
+      slope_at = 0.0_dp
+      do k = s%order - 1, 1, -1
+        slope_at = part*slope_at + k*s%a(k, switches%operands(i))
+      end do
+    end function slope_at
+
+  end subroutine next_crossing
+
+  pure subroutine turn_back(i, switches, s, verdict)
+    !! Change the result of a switch whose operand does not move to its side. If it has been changed
+    !! before, both sides push towards the level: the solution slides along it.
+    integer, intent(in) :: i
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    integer, intent(out) :: verdict
+
+    if (switches%is_turned(i)) then
+      verdict = SLIDES
+      switches%first = i
+      return
+    end if
+    verdict = IS_CHANGED
+    call change(i, switches%on_level(i), switches, s)
+    switches%is_turned(i) = .true.
+  end subroutine turn_back
+
+  pure subroutine change(i, level, switches, s)
+    !! Change the result of a switch whose operand crosses a level.
+    integer, intent(in) :: i, level
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+
+    associate (value => s%a(0, switches%slots(i)))
+      value = value + merge(-1.0_dp, 1.0_dp, level == LOWER)
+      switches%on_level(i) = merge(UPPER, LOWER, level == LOWER)
+    end associate
+  end subroutine change
+
+  pure real(dp) function operand_error(i, switches, s)
+    !! Return the distance of an operand's term 0 from the level that it crosses.
+    integer, intent(in) :: i
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+
+    operand_error = s%a(0, switches%operands(i)) - level_of(i, switches%crosses(i), switches, s)
+  end function operand_error
+
+  pure real(dp) function level_of(i, level, switches, s)
+    integer, intent(in) :: i, level
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+
+    level_of = 0.0_dp
+    if (switches%is_floor(i)) then
+      level_of = s%a(0, switches%slots(i)) + merge(0.0_dp, 1.0_dp, level == LOWER)
+    end if
+  end function level_of
+
+  pure function terms_from(i, level, switches, s) result(terms)
+    !! Return the terms of an operand, less a level.
+    integer, intent(in) :: i, level
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+    real(dp) :: terms(0:LAST_TERM)
+
+    terms = s%a(:, switches%operands(i))
+    terms(0) = terms(0) - level_of(i, level, switches, s)
+  end function terms_from
+
+  pure subroutine first_root(given, order, side, from_root, most, nearly, root, touch)
+    !! Find the first place in a step where a polynomial changes its sign to that opposite to `side`.
+    !! Bounds of the Taylor polynomials around the middle of an interval show that it has no root, or
+    !! is monotonic; other intervals are halved.
+    real(dp), intent(in) :: given(0:LAST_TERM)
+    integer, intent(in) :: order        !! number of the terms
+    integer, intent(in) :: side         !! sign at the beginning
+    logical, intent(in) :: from_root    !! whether the first term is zero
+    real(dp), intent(in) :: most, nearly
+    real(dp), intent(out) :: root       !! above `most` if there is none
+    real(dp), intent(out) :: touch      !! where the polynomial is nearly zero, else -1
+    real(dp) :: c(0:LAST_TERM), d(0:LAST_TERM), low, high, width, r, total, spread, bend, power
+    integer :: degree, k
+
+    root = 2.0_dp*most
+    touch = -1.0_dp
+    degree = order - 1
+    c = side*given
+    if (from_root) then
+      degree = degree - 1
+      c(:degree) = c(1:degree + 1)
+    end if
+    total = sum_of(c, most)
+    if (c(0) > total - c(0) .or. total == 0.0_dp) return
+    low = 0.0_dp
+    width = most
+    do while (low < most)
+      high = min(most, low + width)
+      r = 0.5_dp*(high - low)
+      d(:degree) = shifted(c(:degree), low + r)
+      spread = 0.0_dp
+      bend = 0.0_dp
+      power = r
+      do k = 1, degree
+        spread = spread + power*abs(d(k))
+        if (k > 1) bend = bend + k*(power/r)*abs(d(k))
+        power = power*r
+      end do
+      if (d(0) > spread) then
+        if (abs(d(1)) <= bend .and. d(0) <= nearly*total) touch = low + r
+        low = high
+        width = 2.0_dp*width
+      else if (degree > 0 .and. abs(d(1)) > bend .or. r <= NARROWEST*most) then
+        if (r <= NARROWEST*most) touch = low + r
+        if (value_of(c(:degree), high) < 0.0_dp) then
+          root = bisected(c(:degree), low, high)
+          return
+        end if
+        low = high
+        width = 2.0_dp*width
+      else
+        width = r
+      end if
+    end do
+
+  contains
+
+    pure real(dp) function sum_of(c, part)
+      real(dp), intent(in) :: c(0:), part
+      integer :: k
+
+      sum_of = 0.0_dp
+      do k = degree, 0, -1
+        sum_of = part*sum_of + abs(c(k))
+      end do
+    end function sum_of
+
+  end subroutine first_root
+
+  pure real(dp) function value_of(c, x)
+    real(dp), intent(in) :: c(0:), x
+    integer :: k
+
+    value_of = 0.0_dp
+    do k = ubound(c, 1), 0, -1
+      value_of = x*value_of + c(k)
+    end do
+  end function value_of
+
+  pure function shifted(c, x) result(d)
+    !! Return the coefficients of a polynomial around x (Horner's scheme).
+    real(dp), intent(in) :: c(0:), x
+    real(dp) :: d(0:ubound(c, 1))
+    integer :: j, k
+
+    d = c
+    do k = 0, ubound(c, 1) - 1
+      do j = ubound(c, 1) - 1, k, -1
+        d(j) = d(j) + x*d(j + 1)
+      end do
+    end do
+  end function shifted
+
+  pure real(dp) function bisected(c, below, above)
+    !! Return the root between a place where a polynomial is not negative and one where it is.
+    real(dp), intent(in) :: c(0:), below, above
+    real(dp) :: low, high
+    integer :: tries
+
+    low = below
+    high = above
+    do tries = 1, MOST_CUTS
+      bisected = low + 0.5_dp*(high - low)
+      if (bisected <= low .or. bisected >= high) exit
+      if (value_of(c, bisected) < 0.0_dp) then
+        high = bisected
+      else
+        low = bisected
+      end if
+    end do
+    bisected = high
+  end function bisected
+
+end module tape_switches

@@ -1,0 +1,360 @@
+"""NumPy's functions of arrays that hold symbols, while a function is recorded.
+
+NumPy has no hook for choices, comparisons and linear algebra of objects, nor for the result of
+numpy.zeros. While a user's function is recorded, these functions are therefore replaced in the
+modules numpy, numpy.linalg and math. Calls from other threads, and without symbols, are passed on.
+"""
+
+import math
+import operator
+import re
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from pyharness.model.errors import InputError, printable
+from pyharness.model.symbols import Recorder, Symbol, negated, select
+from pyharness.model.tape import Table
+
+_MOST_PIECES = 200  # of a table of the state
+
+_lock = threading.Lock()
+_installed = 0
+_here = threading.local()
+_originals: list[tuple[Any, str, Any]] = []
+
+
+@contextmanager
+def replaced_functions(with_targets: bool) -> Iterator[None]:
+    """Replace NumPy's functions in this thread; `with_targets` also numpy.zeros and numpy.empty."""
+    global _installed
+    before = getattr(_here, "targets", None)
+    with _lock:
+        if _installed == 0:
+            _install()
+        _installed += 1
+    _here.targets = with_targets
+    try:
+        yield
+    finally:
+        _here.targets = before
+        with _lock:
+            _installed -= 1
+            if _installed == 0:
+                _restore()
+
+
+def _install() -> None:
+    for module, functions in _REPLACEMENTS:
+        for name, function in functions.items():
+            original = getattr(module, name)
+            _originals.append((module, name, original))
+            setattr(module, name, _Replaced(original, function))
+    for name in _WRAPPED:
+        original = getattr(np, name)
+        _originals.append((np, name, original))
+        setattr(np, name, _Wrapped(original))
+    for name, value in (("zeros", 0.0), ("empty", 0.0), ("ones", 1.0)):
+        original = getattr(np, name)
+        _originals.append((np, name, original))
+        setattr(np, name, _Target(original, value))
+
+
+def _restore() -> None:
+    while _originals:
+        module, name, original = _originals.pop()
+        setattr(module, name, original)
+
+
+class _Replaced:
+    """A function of arrays with symbols, in the place of the original, whose attributes it has."""
+
+    def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
+        self._original, self._function = original, function
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        if getattr(_here, "targets", None) is None or not any(map(_has_symbol, given)):
+            return self._original(*given, **named)
+        return self._function(*given, **named)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._original, name)
+
+
+class _Target(_Replaced):
+    """A function that returns a new array, of objects where symbols will be assigned to it."""
+
+    def __init__(self, original: Callable[..., Any], value: float) -> None:
+        super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        found = self._function if getattr(_here, "targets", None) else self._original
+        return found(*given, **named)
+
+
+def _has_symbol(value: Any) -> bool:
+    if isinstance(value, (list, tuple)):
+        return any(map(_has_symbol, value))
+    if isinstance(value, np.ndarray):
+        return value.dtype == object and any(isinstance(x, Symbol) for x in value.flat)
+    return isinstance(value, Symbol)
+
+
+class SymbolArray(np.ndarray[Any, Any]):
+    """An array of symbols, whose comparisons are arrays of conditions instead of truth values."""
+
+    def _compared(self, name: str, other: Any) -> Any:
+        return np.frompyfunc(getattr(operator, name), 2, 1)(self, other)
+
+    def __lt__(self, other: Any) -> Any:
+        """Return where each element is smaller."""
+        return self._compared("lt", other)
+
+    def __le__(self, other: Any) -> Any:
+        """Return where each element is not larger."""
+        return self._compared("le", other)
+
+    def __gt__(self, other: Any) -> Any:
+        """Return where each element is larger."""
+        return self._compared("gt", other)
+
+    def __ge__(self, other: Any) -> Any:
+        """Return where each element is not smaller."""
+        return self._compared("ge", other)
+
+    def clip(self, *given: Any, **named: Any) -> Any:
+        """Return the elements, limited to an interval."""
+        return _clip(self, *given, **named)
+
+
+def symbol_array(values: Any) -> Any:
+    """Return symbols and numbers as an array."""
+    return np.array(values, dtype=object).view(SymbolArray)
+
+
+class _Wrapped(_Replaced):
+    """A function whose result, an array of symbols, compares as `SymbolArray`."""
+
+    def __init__(self, original: Callable[..., Any]) -> None:
+        super().__init__(original, lambda *given, **named: _viewed(original(*given, **named)))
+
+
+def _viewed(found: Any) -> Any:
+    is_array = isinstance(found, np.ndarray) and found.dtype == object
+    return found.view(SymbolArray) if is_array else found
+
+
+def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
+    """Return a function of arrays of objects; a scalar result is no array."""
+    loop = np.frompyfunc(function, count, 1)
+
+    def called(*given: Any) -> Any:
+        found = loop(
+            *(np.asarray(x, dtype=object) if isinstance(x, (list, tuple)) else x for x in given)
+        )
+        return _viewed(found)
+
+    return called
+
+
+def _of_symbol(name: str, function: Callable[[float], float]) -> Callable[[Any], Any]:
+    def called(x: Any) -> Any:
+        return getattr(x, name)() if isinstance(x, Symbol) else function(x)
+
+    return _by_element(called, 1)
+
+
+def _largest(x: Any, y: Any) -> Any:
+    return select(x > y, x, y)
+
+
+def _smallest(x: Any, y: Any) -> Any:
+    return select(x < y, x, y)
+
+
+def _limited(x: Any, low: Any, high: Any) -> Any:
+    found = x if low is None else _largest(x, low)
+    return found if high is None else _smallest(found, high)
+
+
+def _clip(x: Any, a_min: Any = None, a_max: Any = None, **named: Any) -> Any:
+    low, high = named.get("min", a_min), named.get("max", a_max)
+    return _by_element(_limited, 3)(x, low, high)
+
+
+def _where(condition: Any, *values: Any) -> Any:
+    return _by_element(select, 3)(condition, *values)
+
+
+def _heaviside(x: Any, at_zero: Any) -> Any:
+    return select(x > 0.0, 1.0, 0.0)
+
+
+def _arctan2(y: Any, x: Any) -> Any:
+    if not isinstance(y, Symbol) and not isinstance(x, Symbol):
+        return math.atan2(y, x)
+    return (y if isinstance(y, Symbol) else 0.0 * x + y).arctan2(x)
+
+
+def _hypot(x: Any, y: Any) -> Any:
+    return (x * x + y * y) ** 0.5
+
+
+def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
+    """Return the broken line through points, constant beyond them unless told otherwise."""
+    places, values = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
+
+    def piecewise(at: Any) -> Any:
+        if not isinstance(at, Symbol):
+            return np.interp(at, places, values)
+        if at.is_time() and left is right is None:
+            slopes = [*np.diff(values) / np.diff(places), 0.0]
+            pieces = [(values[0], 0.0), *zip(values, slopes, strict=True)]
+            breaks = (float(places[0]) - 1.0, *map(float, places))
+            return at.of_table(
+                Table(breaks, tuple((float(c), float(d), 0.0, 0.0) for c, d in pieces))
+            )
+        if len(places) > _MOST_PIECES:
+            raise at.recorder.refusal(
+                f"interp of {len(places)} points",
+                f"at most {_MOST_PIECES} points, torques.table for a function of time",
+            )
+        found = _limited(at, places[0], places[-1]) * 0.0 + values[0]
+        for k in range(len(places) - 1):
+            slope = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
+            if slope:
+                found = found + slope * (_limited(at, places[k], places[k + 1]) - places[k])
+        if left is not None:
+            found = select(at < places[0], float(left), found)
+        if right is not None:
+            found = select(at > places[-1], float(right), found)
+        return found
+
+    return _by_element(piecewise, 1)(x)
+
+
+def _extreme(choose: Callable[[Any, Any], Any]) -> Callable[..., Any]:
+    def called(values: Any, axis: Any = None) -> Any:
+        array = np.asarray(values, dtype=object)
+        return np.frompyfunc(choose, 2, 1).reduce(
+            array.ravel() if axis is None else array, axis=axis or 0
+        )
+
+    return called
+
+
+def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:
+    array = np.asarray(x, dtype=object)
+    if ord not in (None, 2) or (ord == 2 and array.ndim > 1 and axis is None):
+        raise _symbol_in(array).recorder.refusal(f"the norm of order {ord}", "the Euclidean norm")
+    total = np.sum(array * array, axis=axis, keepdims=keepdims)
+    return total**0.5
+
+
+def _solve(matrix: Any, right: Any) -> Any:
+    """Return the solution of a linear system by Cramer's rule, or by the inverse of numbers."""
+    return _inverse(matrix) @ np.asarray(right, dtype=object)
+
+
+def _inverse(matrix: Any) -> Any:
+    array = np.asarray(matrix)
+    if not _has_symbol(array):
+        return np.linalg.inv(array.astype(float))
+    if array.shape not in ((1, 1), (2, 2), (3, 3)):
+        raise _symbol_in(array).recorder.refusal(
+            f"the inverse of a matrix of shape {array.shape}", "matrices of at most three rows"
+        )
+    n = len(array)
+    cofactors = np.empty((n, n), dtype=object)
+    for i in range(n):
+        for j in range(n):
+            cofactors[i, j] = (-1.0) ** (i + j) * _determinant(
+                np.delete(np.delete(array, i, 0), j, 1)
+            )
+    return cofactors.T / (array[0] @ cofactors[0])
+
+
+def _determinant(matrix: Any) -> Any:
+    if len(matrix) == 0:
+        return 1.0
+    if len(matrix) == 1:
+        return matrix[0, 0]
+    return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+
+
+def _symbol_in(array: Any) -> Symbol:
+    return next(x for x in np.asarray(array, dtype=object).flat if isinstance(x, Symbol))
+
+
+def called_once(
+    function: Callable[..., Any], given: Sequence[Any], recorder: Recorder, allowed: str
+) -> list[Any]:
+    """Return the components that a user's function returns for symbols.
+
+    Raise InputError if the function raises an exception; `allowed` describes allowed functions.
+    """
+    for with_targets in (False, True):
+        try:
+            with replaced_functions(with_targets):
+                return list(function(*given))
+        except InputError:
+            if with_targets or not recorder.was_converted:
+                raise
+        except Exception as error:
+            missing = re.search(r"no callable (\w+) method", str(error))
+            if missing:
+                raise recorder.refusal(f"{missing[1]} of the state") from None
+            raise InputError(
+                f"{recorder.place}: the function raised {type(error).__name__}: "
+                f"{printable(str(error))}; allowed: {allowed}"
+            ) from error
+    raise AssertionError
+
+
+_WRAPPED = (
+    "array", "asarray", "cross", "dot", "inner", "outer", "matmul", "einsum", "stack",
+    "concatenate", "hstack", "vstack", "column_stack", "roll", "diff", "ravel", "reshape",
+)  # fmt: skip
+_ELEMENTARY = {
+    "sqrt": math.sqrt, "exp": math.exp, "sin": math.sin, "cos": math.cos, "tan": math.tan,
+    "sinh": math.sinh, "cosh": math.cosh, "tanh": math.tanh, "log": math.log, "log1p": math.log1p,
+    "log2": math.log2, "log10": math.log10, "exp2": lambda x: 2.0**x, "expm1": math.expm1,
+    "cbrt": lambda x: math.copysign(abs(x) ** (1.0 / 3.0), x), "floor": math.floor,
+    "ceil": math.ceil, "trunc": math.trunc,
+}  # fmt: skip
+_ARCS = {"sin": math.asin, "cos": math.acos, "tan": math.atan, "sinh": math.asinh}
+_CHOICES: dict[str, Callable[..., Any]] = {
+    "where": _where, "clip": _clip, "heaviside": _by_element(_heaviside, 2),
+    "maximum": _by_element(_largest, 2), "minimum": _by_element(_smallest, 2),
+    "fmax": _by_element(_largest, 2), "fmin": _by_element(_smallest, 2),
+    "max": _extreme(_largest), "min": _extreme(_smallest), "amax": _extreme(_largest),
+    "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
+    "hypot": _by_element(_hypot, 2), "sign": _of_symbol("sign", np.sign),
+    "fabs": _by_element(abs, 1), "logical_and": _by_element(lambda x, y: x & y, 2),
+    "logical_or": _by_element(lambda x, y: x | y, 2), "logical_not": _by_element(negated, 1),
+}  # fmt: skip
+_OF_NUMPY = (
+    {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}
+    | {f"arc{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
+    | {"rint": _of_symbol("rint", round)}
+    | _CHOICES
+)
+_OF_MATH = (
+    {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items() if hasattr(math, name)}
+    | {f"a{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
+    | {
+        "atan2": _by_element(_arctan2, 2),
+        "fabs": _by_element(abs, 1),
+        "hypot": _by_element(_hypot, 2),
+        "pow": _by_element(lambda x, y: x**y, 2),
+        "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
+    }
+)
+_REPLACEMENTS = (
+    (np, _OF_NUMPY),
+    (np.linalg, {"norm": _norm, "solve": _solve, "inv": _inverse}),
+    (math, _OF_MATH),
+)

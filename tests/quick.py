@@ -179,8 +179,12 @@ class Counter:
 
     def pytest_collection_finish(self) -> None:
         """Set the alarm; an alarm during the collection would be an error of collection."""
-        # Again and again, because a test may catch the exception; it then fails without fault.
-        signal.setitimer(signal.ITIMER_REAL, max(self.left(), 0.5), 0.5)
+        signal.setitimer(signal.ITIMER_REAL, max(self.left(), 0.5))
+
+    def pytest_runtest_logstart(self) -> None:
+        """End before the next test, where one has caught the exception of the alarm."""
+        if self.left() <= 0.0:
+            pytest.exit("the time is up", returncode=0)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Count each test that passed, and every failed part of a test."""

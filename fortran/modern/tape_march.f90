@@ -37,7 +37,7 @@ module tape_march
   real(dp), parameter :: MOST_CANCELLED = 1e3_dp
   integer, parameter :: CORRECTIONS = 4 ! of the step that ends at a switch
   ! Relative distance from a switch that an error may bridge; at least, of rounding errors.
-  real(dp), parameter :: NEAR = 1e-13_dp
+  real(dp), parameter :: NEAR = 1e-13_dp, MOST_NEAR = 1e-5_dp
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -94,6 +94,7 @@ contains
     logical :: is_low                         ! whether the order must be raised
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
+    real(dp) :: nearly                        ! relative distance from a switch that is a touch
     integer :: i, n, n_before, order, tries, last_term
     integer :: verdict                        ! of `next_crossing`
     type(step_limit_t) :: limit
@@ -118,6 +119,7 @@ contains
       call begin_switches(i, switches, s)
     end do
     verdict = STAYS
+    nearly = min(MOST_NEAR, max(NEAR, attempt%tolerance))
     scale = maxval(abs(request%omega))
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
     ! The first step is a guess: a radian. From rest it is the whole time.
@@ -176,7 +178,7 @@ contains
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
       call converge(tape, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
-      if (switches%n > 0) call resolve_switches(switches, s, factor)
+      if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)
@@ -187,7 +189,7 @@ contains
       end if
       if (switches%n > 0) then
         whole_step = factor*s%h
-        call next_crossing(max(NEAR, attempt%tolerance), switches, s, factor, verdict)
+        call next_crossing(nearly, switches, s, factor, verdict)
         if (verdict == SLIDES) then
           found%slides_at = t(1)
           found%slides_on = switches%first
@@ -454,15 +456,14 @@ contains
       integer :: tries
 
       is_continued_to_switch = is_continued()
-      if (verdict /= CROSSES) return
+      ! The root of a touch can't be corrected.
+      if (verdict /= CROSSES .or. switches%touches >= 0.0_dp) return
       before = factor
       do tries = 1, CORRECTIONS
         if (.not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
         if (.not. abs(correction) <= 0.01_dp*before) then
-          ! A root that is nearly double is not corrected, a wrong series rejected.
-          is_continued_to_switch = abs(correction) <= sqrt(epsilon(factor)) .or. &
-                                   .not. abs(correction) <= huge(factor)
+          is_continued_to_switch = .false.
           return
         end if
         factor = factor + correction
@@ -477,7 +478,6 @@ contains
       !! Notice that an operand nearly crosses a level where the rates would jump: an error decides.
       real(dp) :: other(tape%n_unknowns), here(tape%n_unknowns), zero(tape%n_unknowns)
       real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
-      real(dp) :: nearly
 
       if (switches%touches < 0.0_dp) return
       slots = s%a(0, switches%slots)
@@ -490,8 +490,7 @@ contains
       end associate
       call derivatives_at(tape, at_time, at, s%h, s, other)
       s%a(0, switches%slots) = slots
-      nearly = sqrt(max(NEAR, attempt%tolerance))
-      if (maxval(weights*abs(other - here))*abs(factor*s%h)*nearly > request%tolerance) then
+      if (maxval(weights*abs(other - here))*abs(factor*s%h)*sqrt(nearly) > request%tolerance) then
         found%grazes = .true.
       end if
     end subroutine check_touch

@@ -3,10 +3,12 @@ module tape_step
   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_ptr
   use kinds, only: dp
   use problem, only: step_request_t, step_t
-  use statuses, only: COMPLETE, OVERFLOW
+  use statuses, only: COMPLETE, OVERFLOW, SLIDING
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_plan, only: converge, fitting, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
+  use tape_switches, only: begin_switches, find_levels, find_switches, IS_CHANGED, &
+                           next_crossing, resolve_switches, SLIDES, switches_t
   implicit none(type, external)
   private
 
@@ -24,8 +26,8 @@ module tape_step
 contains
 
   subroutine step_tape(tape_at, request_at, step_at) bind(c, name="step_tape_level")
-    !! Compute the terms of a step, as long as the tolerances allow. The status is COMPLETE, or
-    !! OVERFLOW if no step is short enough.
+    !! Compute the terms of a step, as long as the tolerances allow, or until a switch changes. The
+    !! status is COMPLETE, OVERFLOW if no step is short enough, or SLIDING.
     ! Addresses of a tape_t, a step_request_t and a step_t, passed through C.
     type(c_ptr), intent(in), value :: tape_at, request_at, step_at
     type(tape_t), pointer :: tape
@@ -52,7 +54,8 @@ contains
     type(step_t), intent(inout) :: step
     real(dp), allocatable :: tolerances(:)
     real(dp) :: factor
-    integer :: failed, i, k
+    type(switches_t) :: switches
+    integer :: failed, i, k, verdict
     logical :: is_rejected ! whether a longer step was rejected
 
     step%status = OVERFLOW
@@ -64,16 +67,25 @@ contains
     step%order = s%order
     s%h = request%trial
     is_rejected = .false.
+    call find_switches(tape, switches, failed)
+    if (failed /= 0) return
+    s%a = 0.0_dp
+    do i = 1, switches%n
+      call derivatives_at(tape, [request%t, 0.0_dp], request%state, s%h, s, step%state)
+      call begin_switches(i, switches, s)
+    end do
     do while (step%expansions < MOST_TRIES)
       ! The steps shrink to nothing before a singularity. The first trial may be short by chance.
       if (step%expansions > 0 .and. abs(s%h) <= spacing(request%t) &
           .and. abs(s%h) < abs(request%longest)) return
-      s%a = 0.0_dp
+      ! Term 0 of a switch is its result.
+      s%a(1:, :) = 0.0_dp
       s%a(0, TIME_SLOT) = request%t
       s%a(1, TIME_SLOT) = s%h
       s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = request%state
       call expand(tape, 0.0_dp, .false., s)
       step%expansions = step%expansions + 1
+      if (switches%n > 0 .and. step%expansions == 1) call find_levels(switches, s)
       factor = fitting(tape, s%order, LOCAL_TOLERANCE, 1.0_dp/tolerances, s%a)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
@@ -83,6 +95,15 @@ contains
       if (is_rejected) factor = min(1.0_dp, factor)
       factor = min(factor, request%longest/s%h)
       call converge(tape, s%order, minval(tolerances), s%a, s%powers, factor)
+      if (switches%n > 0) then
+        call resolve_switches(LOCAL_TOLERANCE*max(1e-12_dp, request%relative), switches, s, factor)
+        call next_crossing(0.0_dp, switches, s, factor, verdict)
+        if (verdict == SLIDES) then
+          step%status = SLIDING
+          return
+        end if
+        if (verdict == IS_CHANGED) cycle
+      end if
       step%h = factor*s%h
       ! The quotient of the two was rounded.
       if (abs(step%h) >= (1.0_dp - 4.0_dp*epsilon(s%h))*abs(request%longest)) then

@@ -11,8 +11,6 @@ module tape_switches
 
   integer, parameter :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
-  ! Largest of the last two terms of an operand, over the sum of all.
-  real(dp), parameter :: SMALL_TERMS = 1e-5_dp
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
   real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
   real(dp), parameter :: NARROWEST = 2.0_dp**(-40) ! interval without a decision, over the step
@@ -32,7 +30,8 @@ module tape_switches
     integer :: touching   !! its switch
   end type switches_t
 
-  public :: begin_switches, change, find_switches, next_crossing, operand_error, resolve_switches
+  public :: begin_switches, change, find_levels, find_switches, next_crossing, operand_error, &
+            resolve_switches
 
 contains
 
@@ -82,8 +81,30 @@ contains
     end associate
   end subroutine begin_switches
 
-  pure subroutine resolve_switches(switches, s, factor)
+  pure subroutine find_levels(switches, s)
+    !! Find the operands that are on a level but for rounding errors, at the beginning of a step.
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(in) :: s
+    real(dp) :: terms(0:LAST_TERM), level
+    integer :: i
+
+    do i = 1, switches%n
+      terms = terms_from(i, LOWER, switches, s)
+      level = merge(0.0_dp, anint(terms(0)), .not. switches%is_floor(i))
+      switches%on_level(i) = 0
+      if (abs(terms(0) - level) > ZERO_TERM*sum(abs(terms(:s%order - 1)))) cycle
+      switches%on_level(i) = LOWER
+      if (switches%is_floor(i)) then
+        if (level > 0.5_dp) switches%on_level(i) = UPPER
+      else if (s%a(0, switches%slots(i)) < 0.5_dp) then
+        switches%on_level(i) = UPPER
+      end if
+    end do
+  end subroutine find_levels
+
+  pure subroutine resolve_switches(relative, switches, s, factor)
     !! Reduce the factor on the step until the last terms of all operands are small.
+    real(dp), intent(in) :: relative !! largest of the last two terms, over the sum of all
     type(switches_t), intent(in) :: switches
     type(series_t), intent(in) :: s
     real(dp), intent(inout) :: factor
@@ -101,7 +122,7 @@ contains
             if (k >= s%order - 2) last = max(last, power*abs(terms(k)))
             power = factor*power
           end do
-          if (.not. last > SMALL_TERMS*total) exit
+          if (.not. last > relative*total) exit
           factor = 0.75_dp*factor
         end do
       end associate
@@ -163,8 +184,25 @@ contains
     if (switches%touches > root) switches%touches = -1.0_dp
     factor = root
     switches%slope = slope_at(switches%first, factor)
+    ! Two roots that nearly coincide are a touch.
+    if (abs(switches%slope)*factor <= sqrt(nearly)*size_at(switches%first, factor)) then
+      switches%touches = factor
+      switches%touching = switches%first
+    end if
 
   contains
+
+    pure real(dp) function size_at(i, part)
+      !! Return the sum of the absolute terms of an operand.
+      integer, intent(in) :: i
+      real(dp), intent(in) :: part
+      integer :: k
+
+      size_at = 0.0_dp
+      do k = s%order - 1, 0, -1
+        size_at = part*size_at + abs(s%a(k, switches%operands(i)))
+      end do
+    end function size_at
 
     pure logical function has_level(i, level)
       integer, intent(in) :: i, level

@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from pyharness.engine.recorded import outputs_at
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, kind_of
+from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.symbols import Recorder, recorded_twice
+from pyharness.model.tape import Tape
 from pyharness.model.values import converted
 
 _FUNCTIONS_ALLOWED = (
@@ -18,6 +22,10 @@ _FUNCTIONS_ALLOWED = (
 # Largest relative difference of values for one time and for many, due to rounding.
 _AGREEMENT = 1e-10
 _CHECKED = 9  # values that are compared
+
+
+# Omega, attitude and the derivative of omega, whose columns are the times.
+_Columns = tuple[Array, Array, Array | None]
 
 
 @dataclass(eq=False)
@@ -49,6 +57,7 @@ class EventFunction:
     event: Event
     limit: float
     is_vectorized: bool | None = None
+    _tapes: list[Tape | None] = field(default_factory=list, repr=False)  # at most one
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
         """Return the values at n times (s), shape (n,); raise InputError if one is not finite."""
@@ -56,6 +65,8 @@ class EventFunction:
         found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
         if found is None:
             self.is_vectorized = False
+            found = self._of_tape(times, states, columns)
+        if found is None:
             found = np.array([self._of_one(k, times, *columns) for k in range(len(times))])
         wrong = np.flatnonzero(~np.isfinite(found))
         if wrong.size:
@@ -78,14 +89,48 @@ class EventFunction:
                 raise
             return None
         if self.is_vectorized is None:
-            some = np.unique(np.linspace(0, len(times) - 1, _CHECKED).astype(int))
-            each = np.array([self._of_one(k, times, omega, attitude, rates) for k in some])
-            scale = _AGREEMENT * np.abs(each).max()
-            if not np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)):
+            if not self._is_confirmed(found, times, (omega, attitude, rates)):
                 return None
             # Agreement at few times does not show that the function accepts arrays.
             self.is_vectorized = True if len(times) > _CHECKED else None
         return found
+
+    def _is_confirmed(self, found: Array, times: Array, columns: _Columns) -> bool:
+        """Return whether values agree with those of single calls at a few times."""
+        some = np.unique(np.linspace(0, len(times) - 1, _CHECKED).astype(int))
+        each = np.array([self._of_one(k, times, *columns) for k in some])
+        scale = _AGREEMENT * np.abs(each).max()
+        return bool(np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)))
+
+    def _of_tape(self, times: Array, states: Array, columns: _Columns) -> Array | None:
+        """Return the values by a record of the function; None if it can't be recorded."""
+        is_new = not self._tapes
+        if is_new:
+            self._tapes.append(self._recorded())
+        (tape,) = self._tapes
+        if tape is None:
+            return None
+        found: Array = outputs_at(tape, times, states)[:, 0]
+        if is_new and not self._is_confirmed(found, times, columns):
+            self._tapes[0] = None
+            return None
+        return found
+
+    def _recorded(self) -> Tape | None:
+        if self.event.needs_rates:
+            return None
+
+        def record(recorder: Recorder) -> Tape:
+            time, *state = recorder.inputs()
+            omega, attitude = symbol_array(state[:3]), symbol_array(state[3:])
+            given = time, omega, attitude, None
+            (value,) = called_once(lambda *x: [self.event.function(*x)], given, recorder, "")
+            return recorder.tape([value])
+
+        try:
+            return recorded_twice(record, Recorder)
+        except InputError:
+            return None
 
     def _of_one(
         self, k: int, times: Array, omega: Array, attitude: Array, rates: Array | None

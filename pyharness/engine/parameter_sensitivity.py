@@ -20,7 +20,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import is_opaque
+from pyharness.model.state_torque import has_switches, is_opaque
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
 
@@ -52,6 +52,11 @@ def checked_names(
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
     if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
+    if has_switches(scene.torque):
+        raise InputError(
+            f"{place}: the torque has switches; allowed: a torque without where, clip, minimum, "
+            "maximum, sign, abs, floor and comparisons"
+        )
     values = parameters_of(scene)
     known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}

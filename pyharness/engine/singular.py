@@ -60,7 +60,10 @@ def undefined_operation(
         if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
             continue
         if kind == "log" and not values[operands[0]] > 0.0:
-            return "the logarithm or power of a number that is not positive; write abs(x)**p"
+            return (
+                "the logarithm or power of a number that becomes 0 or negative; write a smooth "
+                "function, or use a method of SciPy"
+            )
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
             return (
                 "the square root of a number that becomes 0 or negative; write a smooth function, "

@@ -15,6 +15,7 @@ from pyharness.engine.problem import (
 )
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
+from pyharness.engine.taylor_step import SLIDING
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
@@ -74,7 +75,7 @@ def taylor(
         times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
     )
     if found.ended == "sliding":
-        found = replace(found, reason=sliding_reason(work[1]))
+        found = replace(found, reason=str(TimedError(SLIDING, work[1])))
     kept = others[0] if others else 0
     if not 0 < kept <= most or not found.has_all_rows:
         return found
@@ -82,15 +83,6 @@ def taylor(
     if times[-1] < 0.0:
         edges, values = edges[::-1], values[::-1, ::-1]
     return replace(found, sol=steps_output(scene, Pieces(edges, values)))
-
-
-def sliding_reason(time: float) -> str:
-    """Return why an integration ended at a switch of the torque, at `time` (s)."""
-    return (
-        f"a switch of the torque (where, sign, a comparison) would change back and forth without "
-        f"end from t = {time:.9g} s on, because both sides push towards it; write a smooth "
-        "function, such as tanh(x/width), or hold the torque between steps of a Stepper"
-    )
 
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:

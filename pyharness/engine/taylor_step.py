@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from pyharness.model.codes import Statuses
+from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.trajectory import Array
 
@@ -10,6 +12,14 @@ _N_TERMS = 29
 # The first trial step, in the user's unit of time. Its length hardly matters, because the series
 # gives any shorter step, or one up to 16 times longer.
 LONGEST_TRIAL = 1e3
+
+
+# Why an integration ends at a switch.
+SLIDING = (
+    "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
+    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
+    "hold the torque between steps of a Stepper"
+)
 
 
 class Step(NamedTuple):
@@ -37,11 +47,14 @@ def taylor_step(
     """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
 
     `tolerances`, shape (n,), are the largest errors of the components; the relative tolerance
-    determines the order. `trial` is a guess of the step, with the sign of the `longest` step.
+    determines the order. `trial` is a guess of the step, with the sign of the `longest` step. Raise
+    InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, _N_TERMS
     )
+    if status == Statuses.SLIDING:
+        raise TimedError(SLIDING, t)
     if status != COMPLETE:
         h = 0.0
     return Step(h, terms[: order + 1], end, expansions)

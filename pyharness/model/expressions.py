@@ -10,26 +10,33 @@ import operator
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from keyword import iskeyword
 from typing import Any
 
 from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.numpy_calls import ELEMENTARY
 from pyharness.model.state_torque import StateTorque, law_of
-from pyharness.model.symbols import _MOST_POWER as MOST_POWER
-from pyharness.model.symbols import Recorder, Symbol
+from pyharness.model.symbols import Recorder, Symbol, negated, select
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import finite, number_list
 
 # Names of the inputs of a tape, by slot.
 INPUTS = ("t", "w1", "w2", "w3", "q0", "q1", "q2", "q3")
-FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "sinh", "cosh", "tanh")
+_OF_ONE = (
+    "sqrt", "cbrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh",
+    "tanh", "abs", "sign", "floor", "heaviside",
+)  # fmt: skip
+# The numbers of arguments.
+_COUNTS = dict.fromkeys(_OF_ONE, 1) | {"atan2": 2, "min": 2, "max": 2, "clip": 3, "where": 3}
+FUNCTIONS = tuple(_COUNTS)
 _LONGEST = 10_000
 _DEEPEST = 500
-_FOREIGN = re.compile(r"[^0-9A-Za-z_+\-*/()., \t\r\n]")
+_FOREIGN = re.compile(r"[^0-9A-Za-z_+\-*/%<>=()., \t\r\n]")
 _NAME = re.compile(r"[A-Za-z_][0-9A-Za-z_]*")
 _ALLOWED = (
-    f"allowed: numbers, names, + - * / ** and parentheses, and {', '.join(FUNCTIONS)} of one "
-    "argument"
+    f"allowed: numbers, names, + - * / % ** and parentheses, {', '.join(FUNCTIONS)}; in where "
+    "also < > <= >= and or not"
 )
 _THREE = "allowed: a list of three texts, as in ['-0.1*w1', '0', 'sin(t)']"
 _SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
@@ -37,6 +44,13 @@ _SUM: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
+}
+_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.Gt: operator.gt,
+    ast.LtE: operator.le,
+    ast.GtE: operator.ge,
 }
 
 
@@ -49,7 +63,7 @@ def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
-    recorder = Recorder()
+    recorder = Recorder(has_lines=False)
     tape = recorder.tape(components(texts, recorder.inputs(), values))
     torque = StateTorque(
         tape, None, tape.needs_attitude, tuple(texts.values()), tuple(values.items())
@@ -167,11 +181,18 @@ def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
             return [left, right]
         case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
             return [operand]
+        case ast.Compare(left, [op], [right]) if type(op) in _COMPARISONS:
+            return [left, right]
+        case ast.BoolOp(_, conditions) if all(map(_is_condition, conditions)):
+            return conditions
+        case ast.UnaryOp(ast.Not(), condition) if _is_condition(condition):
+            return [condition]
         case ast.Call(ast.Name(name), arguments, keywords):
             if name not in FUNCTIONS:
                 raise unknown("function", name, FUNCTIONS, place)
-            if len(arguments) != 1 or keywords:
-                raise InputError(f"{place}: {name} of {len(arguments)} arguments; allowed: one")
+            count = _COUNTS[name]
+            if len(arguments) != count or keywords:
+                raise InputError(f"{place}: {name} of {len(arguments)} arguments; allowed: {count}")
             return arguments
         case ast.Name():
             return []
@@ -179,6 +200,11 @@ def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
             return []
     shown = _short(text[node.col_offset : node.end_col_offset])
     raise InputError(f"{place}: '{shown}' is not allowed; {_ALLOWED}")
+
+
+def _is_condition(node: ast.expr) -> bool:
+    is_not = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
+    return isinstance(node, (ast.Compare, ast.BoolOp)) or is_not
 
 
 def _value(
@@ -191,14 +217,21 @@ def _value(
                 return float(value)  # type: ignore[arg-type]
             case ast.Name(name):
                 return _named(name, names, place)
+            case ast.Compare(left, [op], [right]):
+                return _COMPARISONS[type(op)](found[left], found[right])
+            case ast.BoolOp(op, conditions):
+                values = [found[each] for each in conditions]
+                return reduce(operator.and_ if isinstance(op, ast.And) else operator.or_, values)
+            case ast.UnaryOp(ast.Not(), condition):
+                return negated(found[condition])
             case ast.UnaryOp(op, operand):
                 return -found[operand] if isinstance(op, ast.USub) else found[operand]
             case ast.BinOp(left, ast.Pow(), right):
                 return _power(found[left], found[right], place)
             case ast.BinOp(left, op, right):
                 return _SUM[type(op)](found[left], found[right])
-            case ast.Call(ast.Name(name), [argument]):
-                return _function(name, found[argument], place)
+            case ast.Call(ast.Name(name), arguments):
+                return _function(name, [found[each] for each in arguments], place)
     except InputError as error:
         # Messages of symbols lack the expression.
         message = str(error)
@@ -217,12 +250,7 @@ def _named(name: str, names: Mapping[str, Any], place: str) -> Any:
 
 
 def _power(base: Any, exponent: Any, place: str) -> Any:
-    allowed = f"allowed: a whole number up to {MOST_POWER}, or 0.5"
-    if isinstance(exponent, Symbol):
-        raise InputError(f"{place}: the exponent of ** is not constant; {allowed}, or exp(...)")
-    if isinstance(base, Symbol):
-        if exponent != 0.5 and (exponent != int(exponent) or abs(exponent) > MOST_POWER):
-            raise InputError(f"{place}: the exponent of ** is {exponent:g}; {allowed}")
+    if isinstance(base, Symbol) or isinstance(exponent, Symbol):
         return base**exponent
     try:
         return math.pow(base, exponent)
@@ -232,12 +260,17 @@ def _power(base: Any, exponent: Any, place: str) -> Any:
         raise InputError(f"{place}: the constant {base:g} has no real power {exponent:g}") from None
 
 
-def _function(name: str, argument: Any, place: str) -> Any:
-    if isinstance(argument, Symbol):
-        return getattr(argument, name)()
-    if name == "sqrt" and argument < 0.0:
-        raise InputError(f"{place}: square root of the constant {argument:g}")
-    return getattr(math, name)(argument)
+def _function(name: str, arguments: Sequence[Any], place: str) -> Any:
+    if name == "where":
+        return select(*arguments)
+    if any(isinstance(each, Symbol) for each in arguments):
+        return ELEMENTARY[name](*arguments)
+    try:
+        return ELEMENTARY[name](*map(float, arguments))
+    except ValueError:
+        (argument,) = arguments
+        what = "square root" if name == "sqrt" else name
+        raise InputError(f"{place}: {what} of the constant {argument:g}") from None
 
 
 def _overflow(place: str) -> InputError:

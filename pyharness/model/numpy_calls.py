@@ -48,6 +48,7 @@ def replaced_functions(with_targets: bool) -> Iterator[None]:
 
 
 def _install() -> None:
+    original: Callable[..., Any]
     for module, functions in _REPLACEMENTS:
         for name, function in functions.items():
             original = getattr(module, name)
@@ -353,7 +354,19 @@ _OF_MATH = (
         "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
     }
 )
-_REPLACEMENTS = (
+# The functions of scene files, of numbers and symbols.
+ELEMENTARY: dict[str, Callable[..., Any]] = {
+    name: _OF_MATH[name]
+    for name in (
+        "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh",
+        "floor", "atan2",
+    )
+} | {
+    "cbrt": _OF_NUMPY["cbrt"], "abs": abs, "sign": lambda x: (x > 0.0) * 2.0 - 1.0,
+    "heaviside": lambda x: select(x > 0.0, 1.0, 0.0), "min": _smallest, "max": _largest,
+    "clip": _limited, "where": select,
+}  # fmt: skip
+_REPLACEMENTS: tuple[tuple[Any, dict[str, Callable[..., Any]]], ...] = (
     (np, _OF_NUMPY),
     (np.linalg, {"norm": _norm, "solve": _solve, "inv": _inverse}),
     (math, _OF_MATH),

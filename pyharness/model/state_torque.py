@@ -143,7 +143,10 @@ def replayed(function: Function) -> StateTorque:
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
     """Return a function as a tape; the keyword arguments `names` become further inputs."""
-    return _recorded_with(Recorder(n_inputs=N_INPUTS + len(names)), function, names)
+    recorder = Recorder(n_inputs=N_INPUTS + len(names))
+    # A number of factors is no parameter.
+    recorder.has_powers = not names
+    return _recorded_with(recorder, function, names)
 
 
 def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] = ()) -> Tape:
@@ -240,6 +243,13 @@ def opaque(function: Any) -> StateTorque:
 def is_opaque(torque: object) -> bool:
     """Return whether a torque calls a function that is not recorded."""
     return isinstance(torque, StateTorque) and torque.tape is None
+
+
+def has_switches(torque: object) -> bool:
+    """Return whether a torque is recorded and has switches."""
+    return (
+        isinstance(torque, StateTorque) and torque.tape is not None and torque.tape.n_switches > 0
+    )
 
 
 def checked_torque(value: object) -> TorqueLaw | StateTorque:

@@ -53,12 +53,18 @@ class Recorder:
         n_inputs: int = N_INPUTS,
         place: str = "[torque]",
         instead: str = "opaque(function), which SciPy's methods solve",
+        has_lines: bool = True,
     ) -> None:
-        """Begin an empty tape; messages begin with `place` and say what to use `instead`."""
+        """Begin an empty tape; messages begin with `place` and say what to use `instead`.
+
+        `has_lines` says whether a function is recorded, whose lines messages name.
+        """
+        self._has_lines = has_lines
         self.place = place
         self._most, self._n_inputs, self._instead = most, n_inputs, instead
         self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
+        self.has_powers = True  # whether exponents may be symbols
         self.was_converted = False  # whether a symbol was to become a float
 
     def inputs(self) -> list["Symbol"]:
@@ -68,7 +74,8 @@ class Recorder:
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
         """Return the exception for an operation that can't be recorded; say what to `write`."""
         allowed = f"allowed: {write}, or {self._instead}"
-        return InputError(f"{self.place}: {what} can't be recorded{_line()}; {allowed}")
+        where = _line() if self._has_lines else ""
+        return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def impure(self) -> InputError:
         """Return the exception for a function that depends on more than its arguments."""
@@ -239,6 +246,8 @@ class Symbol:
     def __pow__(self, power: Any) -> "Symbol":
         """Record and return a power; that of a negative number is defined for integers alone."""
         if isinstance(power, Symbol):
+            if not self.recorder.has_powers:
+                raise self.recorder.refusal("a power that is not a number")
             return (power * self.log()).exp()
         exponent = converted(power)
         if not isinstance(exponent, float) or not math.isfinite(exponent):
@@ -280,7 +289,7 @@ class Symbol:
         """Return a function of this symbol; the kernel needs the `derivative` of some."""
         if not self._terms:
             return Symbol(self.recorder, function(self._constant), {})
-        operands = (self._own_slot(),)
+        operands: tuple[int, ...] = (self._own_slot(),)
         if derivative is not None:
             operands = (*operands, derivative(self)._own_slot())
         return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, operands)): 1.0})
@@ -360,7 +369,8 @@ class Symbol:
     def arctan2(self, x: Any) -> "Symbol":
         """Return the angle (rad) of the point (x, self); not defined where x < 0 and self = 0."""
         # Half the angle, because a quotient by x would not be defined where x is 0.
-        return 2.0 * (self / ((self * self + x * x).sqrt() + x)).arctan()
+        half: Symbol = self / ((self * self + x * x).sqrt() + x)
+        return 2.0 * half.arctan()
 
     def switch(self) -> "Condition | bool":
         """Return the condition that this symbol is positive; bool if it is constant."""
@@ -381,7 +391,7 @@ class Symbol:
 
     def ceil(self) -> "Symbol":
         """Return the smallest whole number from this symbol on."""
-        return -(-self).floor()
+        return -((-self).floor())
 
     __ceil__ = ceil
 
@@ -463,7 +473,8 @@ class Symbol:
 
     def __abs__(self) -> "Symbol":
         """Record and return the absolute value."""
-        return select(self > 0.0, self, -self)
+        found: Symbol = select(self > 0.0, self, -self)
+        return found
 
     def __float__(self) -> float:
         """Refuse the conversion to a number."""
@@ -482,7 +493,8 @@ class Symbol:
 
     def __rfloordiv__(self, value: Any) -> "Symbol":
         """Record and return a number divided by this symbol, rounded down."""
-        return (value / self).floor()
+        quotient: Symbol = value / self
+        return quotient.floor()
 
     @_of_symbols
     def __mod__(self, other: "Symbol") -> "Symbol":
@@ -491,7 +503,8 @@ class Symbol:
 
     def __rmod__(self, value: Any) -> "Symbol":
         """Record and return the remainder of a number."""
-        return value - self * (value / self).floor()
+        quotient: Symbol = value / self
+        return self.__mul__(quotient.floor()).__rsub__(value)
 
     def __getattr__(self, name: str) -> Any:
         """Refuse functions that can't be recorded; NumPy looks them up by name."""

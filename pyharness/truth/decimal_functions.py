@@ -1,6 +1,7 @@
 """Sine, cosine, pi, series, vectors and fractions in the current decimal context."""
 
 import decimal
+import math
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -37,6 +38,32 @@ def _alternating(term: Decimal, square: Decimal, n: int) -> Decimal:
         term = -term * square / (n * (n - 1))
         total += term
     return total
+
+
+def arctan(x: Decimal) -> Decimal:
+    """Return the angle (rad) whose tangent is x, by Newton's method."""
+    with decimal.localcontext() as context:
+        context.prec += 10
+        angle = Decimal(math.atan(x))
+        # The number of correct digits doubles, from 16 on.
+        digits = 15
+        while digits < context.prec:
+            sine, cosine = sine_cosine(angle)
+            angle += (x * cosine - sine) / (cosine + x * sine)
+            digits *= 2
+    return +angle
+
+
+def arcsin(x: Decimal) -> Decimal:
+    """Return the angle (rad) whose sine is x; raise ArithmeticError beyond 1."""
+    if abs(x) >= 1:
+        if abs(x) > 1:
+            raise decimal.InvalidOperation
+        return (pi(decimal.getcontext().prec) / 2).copy_sign(x)
+    with decimal.localcontext() as context:
+        context.prec += 10
+        angle = arctan(x / (1 - x * x).sqrt())
+    return +angle
 
 
 @cache

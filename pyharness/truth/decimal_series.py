@@ -13,6 +13,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.decimal_functions import Row, product, sine_cosine, to_decimal, value_at
+from pyharness.truth.decimal_switches import Switches
 from pyharness.truth.tape_series import TapeSeries, series_products
 
 _MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
@@ -55,11 +56,12 @@ def taylor_series(
         # The caller compares integrations of different orders, which must remain different.
         order = equations.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
-    at_end = [equations]
+    at_end, switches = [equations], equations.switches
     if is_recorded:
         # Sums of the torque that cancel may be rounded to 0, as those beside a saturated tanh are.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
-        at_end = [_Equations(scene, coefficients, velocity, each) for each in changes]
+        results = {} if switches is None else switches.results
+        at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]
     state = [Decimal(w) for w in scene.omega] + [Decimal(0)] * (3 if velocity else 0)
     moving = len(state)
     state += [Decimal(x) for x in scene.attitude or ()]
@@ -68,6 +70,13 @@ def taylor_series(
     rows: list[Row] = []
     forward = times[-1] >= 0
     step = stops = 0
+    while switches is not None:
+        try:
+            equations.expand(begin, state, 1, forward)
+        except ArithmeticError:
+            return rows
+        if not switches.begin():
+            break
     while True:
         try:
             series = equations.expand(begin, state, order, forward)
@@ -80,6 +89,10 @@ def taylor_series(
             length = min(length, _step(series[moving:], tolerance, rest, 4))
         length = equations.reach(length)
         length = length.copy_sign(times[-1])
+        if switches is not None:
+            if switches.turns(begin, length):
+                continue
+            length = switches.end(length)
         if begin + length == begin and rest:
             return rows
         limit.check(step, stops, begin, length, rest)
@@ -87,6 +100,7 @@ def taylor_series(
         # The Taylor series of a table is valid until the table changes.
         if stop is not None and abs(stop) <= abs(end):
             end, length = stop, stop - begin
+        tried = length
         state = _evaluate(series, length)
         while is_recorded and not _is_continued(at_end, series, state, end, length, tolerance):
             length /= 2
@@ -105,6 +119,8 @@ def taylor_series(
         if len(rows) == len(times) or equations.is_singular_before(length):
             return rows
         begin = end
+        if switches is not None:
+            switches.step(length == tried and end != stop)
 
 
 class _Limit:
@@ -259,12 +275,17 @@ class _Equations:
     """
 
     def __init__(
-        self, scene: Scene, coefficients: Row, velocity: bool, change: Decimal = Decimal(0)
+        self,
+        scene: Scene,
+        coefficients: Row,
+        velocity: bool,
+        change: Decimal = Decimal(0),
+        results: dict[int, Decimal] | None = None,
     ) -> None:
         self._abc = coefficients
         self._tape = self._law = None
         if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
-            self._tape = TapeSeries(scene.torque.tape, change)
+            self._tape = TapeSeries(scene.torque.tape, change, results)
         else:
             self._law = _law_of(scene)
         self._changing = scene.changing
@@ -308,6 +329,12 @@ class _Equations:
             for each, rate in zip(series, rates, strict=True):
                 each.append(rate / (k + 1))
         return series
+
+    @property
+    def switches(self) -> Switches | None:
+        """The switches of the torque; None without."""
+        has_one = self._tape is not None and bool(self._tape.operands_of_switches())
+        return Switches(self._tape) if has_one and self._tape is not None else None
 
     @property
     def least_order(self) -> int:

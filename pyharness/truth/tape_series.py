@@ -6,11 +6,12 @@ together with the solution, are those of Jorba and Zou 2005, Experimental Mathem
 
 from bisect import bisect_left, bisect_right
 from collections import Counter
+from collections.abc import Callable
 from decimal import Context, Decimal
 from typing import NamedTuple
 
-from pyharness.model.tape import N_INPUTS, Linear, Operation, Table, Tape
-from pyharness.truth.decimal_functions import Row, product, sine_cosine, value_at
+from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape
+from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine_cosine, value_at
 
 # A larger angle has no sine in any method; its reduction would take as many digits as it has.
 _LARGEST_ANGLE = Decimal("1e308")
@@ -29,6 +30,11 @@ _MOST_ORDER = 100
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
+_FUNCTIONS: dict[str, Callable[[Decimal], Decimal]] = {
+    "log": Decimal.ln,
+    "atan": arctan,
+    "asin": arcsin,
+}
 
 
 class _Power(NamedTuple):
@@ -65,8 +71,14 @@ class TapeSeries:
     the lowest order at which the tape's powers are visible.
     """
 
-    def __init__(self, tape: Tape, change: Decimal = Decimal(0)) -> None:
-        """Store the operations; `change` is relative, of the terms of sums, with alternate sign."""
+    def __init__(
+        self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
+    ) -> None:
+        """Store the operations; `change` is relative, of the terms of sums, with alternate sign.
+
+        `results` are those of the switches by slot, which the caller changes.
+        """
+        self.results = {} if results is None else results
         self._operations = [(each, _sum(each.linear, change)) for each in tape.operations]
         self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
@@ -131,6 +143,14 @@ class TapeSeries:
         if table is not None:
             return self._tables[slot][k] if k < 4 else Decimal(0)
         x, found = self._slots[operands[0]], self._slots[slot]
+        if kind in SWITCHES:
+            return self.results.get(slot, Decimal(0)) if k == 0 else Decimal(0)
+        if kind == "select":
+            return self._slots[operands[1] if x[0] else operands[2]][k]
+        if kind in _FUNCTIONS:
+            if k == 0:
+                return _FUNCTIONS[kind](x[0])
+            return product(self._slope(operands[0], k), self._slots[operands[1]][:k][::-1]) / k
         if kind == "product":
             return product(x, self._slots[operands[1]][::-1])
         if kind == "quotient":
@@ -181,6 +201,18 @@ class TapeSeries:
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
         return slope
+
+    def operands_of_switches(self) -> list[tuple[int, bool, Row]]:
+        """Return the slot of each switch, whether it is a floor, and its operand's coefficients."""
+        return [
+            (
+                slot,
+                operation.kind == "floor",
+                self._slots[operation.operands[0]] if self._slots else [],
+            )
+            for slot, (operation, _) in enumerate(self._operations, N_INPUTS)
+            if operation.kind in SWITCHES
+        ]
 
     def reach(self, length: Decimal) -> Decimal:
         """Return the step (s), reduced so that the series of every operation converges.

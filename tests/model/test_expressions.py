@@ -19,6 +19,10 @@ VALUES = (
     "cosh(k*t)", "tanh(w3)", "exp(-k*t)*cos(w2*t)", "pi*w1", "1_000*w1", "1e-3*w1", ".5*w2 + 1.",
     "0x10*w1", "sin(t)**2", "sin(3*t + 1)", "t*w1", "t**2", "cos(cos(t))", "1/(2 + sin(t))",
     "q0*q0 + q1*q1 - q2*q2 - q3*q3", "w1\n + w2", "\tw1 ", "7*k/3*w2", "exp(sin(w1)*cos(w2))",
+    "log(1 + w1)", "w1**1.5", "w2**-0.3", "2**w1", "w1**w2", "asin(w1/2)", "acos(w2/2)", "atan(w1)",
+    "atan2(w1 - 1, w2 - 1)", "cbrt(w2)", "abs(w1 - w2)", "sign(w1 - w2)", "floor(3*t)", "t % 0.4",
+    "heaviside(t - 1)", "min(w1, t)", "max(w1, 1)", "clip(w1, 0.8, q0)", "(w1 > w2)*t",
+    "where(w1 < w2 and not t >= 1, w1, -w2)", "where(w1 <= w2 or t > 1, 2, q1)",
 )  # fmt: skip
 CONSTANTS = {"k": 0.25, "wheel": 3, "_unused": -1.5}
 
@@ -34,7 +38,13 @@ def _value(torque: StateTorque | TorqueLaw, state: list[float]) -> float:
 
 
 def _in_python(text: str, state: list[float], constants: dict[str, float]) -> Any:
-    names = {name: getattr(math, name) for name in FUNCTIONS} | {"pi": math.pi} | constants
+    names: dict[str, Any] = {
+        "abs": abs, "min": min, "max": max, "clip": lambda x, low, high: min(max(x, low), high),
+        "sign": lambda x: 1.0 if x > 0.0 else -1.0, "heaviside": lambda x: float(x > 0.0),
+        "where": lambda condition, x, y: x if condition else y, "cbrt": lambda x: x ** (1.0 / 3.0),
+        "pi": math.pi,
+    } | constants  # fmt: skip
+    names |= {name: getattr(math, name) for name in FUNCTIONS if name not in names}
     names |= dict(zip(INPUTS, state, strict=True))
     return eval(" ".join(text.split()), {"__builtins__": {}}, names)
 

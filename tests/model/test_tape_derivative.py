@@ -23,8 +23,10 @@ def _piece(table: Table, time: Any) -> Any:
 
 
 MPMATH: Functions[Any] = Functions(
-    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.tanh, mpmath.sin, mpmath.cos, _piece
-)
+    mpmath.mpf, mpmath.sqrt, mpmath.exp, mpmath.tanh, mpmath.sin, mpmath.cos, _piece, mpmath.log,
+    mpmath.atan, mpmath.asin, lambda x: mpmath.mpf(x > 0), mpmath.floor,
+    lambda condition, x, y: x if condition else y,
+)  # fmt: skip
 
 
 def check(torque: StateTorque, source: Random) -> None:

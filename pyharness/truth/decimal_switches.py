@@ -1,0 +1,135 @@
+"""Switches of a recorded torque in decimal arithmetic: the roots at which its steps end."""
+
+from decimal import Decimal, getcontext
+
+import numpy as np
+
+from pyharness.engine.taylor_step import SLIDING
+from pyharness.model.errors import TimedError
+from pyharness.truth.decimal_functions import Row, value_at
+from pyharness.truth.tape_series import TapeSeries
+
+# The last terms of an operand in a step, over the sum of all.
+_SMALL = Decimal("1e-8")
+_ZERO = Decimal("1e-20")  # part of the terms that is a rounding error
+_IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
+_NEWTON = 8
+_TOGETHER = Decimal("1e-15")  # relative difference of roots that are one
+
+
+class Switches:
+    """The results of the switches of a tape, in `results` by slot, and the levels of operands.
+
+    On a level, the next step begins; `_levels` has it by slot: -1 for the lower, 1 for the upper.
+    """
+
+    def __init__(self, tape: TapeSeries) -> None:
+        """Begin without results."""
+        self._tape, self.results = tape, tape.results
+        self._levels: dict[int, int] = {}
+        self._turned: set[int] = set()
+        self._next: dict[int, int] = {}
+
+    def begin(self) -> bool:
+        """Set the results by the values of the operands; return whether one changed."""
+        for slot, is_floor, x in self._tape.operands_of_switches():
+            value = x[0].to_integral_value("ROUND_FLOOR") if is_floor else Decimal(x[0] >= 0)
+            if x[0] == (value if is_floor else 0):
+                self._levels[slot] = -1
+            if slot not in self.results or self.results[slot] != value:
+                self.results[slot] = value
+                return True
+        return False
+
+    def turns(self, time: Decimal, length: Decimal) -> bool:
+        """Return whether an operand did not leave its level, so that its result was changed.
+
+        Raise TimedError if neither side leaves it.
+        """
+        for slot, _, x in self._tape.operands_of_switches():
+            level = self._levels.get(slot)
+            if level is None:
+                continue
+            terms = [each * length**k for k, each in enumerate(x)][1:]
+            total = sum(map(abs, terms))
+            first = next((each for each in terms if abs(each) > _ZERO * total), Decimal(0))
+            if first == 0 or (first > 0) == (level < 0):
+                continue
+            if slot in self._turned:
+                raise TimedError(f"reference: {SLIDING}", float(time))
+            self._turned.add(slot)
+            self._cross(slot, level)
+            return True
+        self._turned.clear()
+        return False
+
+    def end(self, length: Decimal) -> Decimal:
+        """Return the step (s), shortened until all operands are resolved and to the first root."""
+        while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
+            length *= Decimal("0.75")
+        roots = []
+        for slot, is_floor, x in self._tape.operands_of_switches():
+            result = self.results[slot]
+            levels = [(-1, result), (1, result + 1)] if is_floor else [(1 - 2 * int(result), 0)]
+            for level, value in levels:
+                terms = [x[0] - value, *x[1:]]
+                if self._levels.get(slot) == level:
+                    terms[0] = Decimal(0)
+                root = _first_root(terms, length, -level)
+                if root is not None:
+                    roots.append((root, slot, level))
+        self._next = {}
+        if not roots:
+            return length
+        first = min(abs(root) for root, *_ in roots)
+        self._next = {
+            slot: level for root, slot, level in roots if abs(root) <= first * (1 + _TOGETHER)
+        }
+        return first.copy_sign(length)
+
+    def step(self, is_whole: bool) -> None:
+        """Change the results at the end of a step, unless it was shortened."""
+        self._levels = {}
+        if is_whole:
+            for slot, level in self._next.items():
+                self._cross(slot, level)
+
+    def _cross(self, slot: int, level: int) -> None:
+        self.results[slot] += level
+        self._levels[slot] = -level
+
+    def _is_unresolved(self, x: Row, length: Decimal) -> bool:
+        sizes = [abs(each * length**k) for k, each in enumerate(x)]
+        return max(sizes[-2:]) > _SMALL * sum(sizes)
+
+
+def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
+    """Return the first place up to `length` where a series changes to the sign opposite to `side`.
+
+    The roots of the polynomial are the eigenvalues of its companion matrix, in binary64, which
+    Newton's method corrects.
+    """
+    scaled = [each * length**k for k, each in enumerate(terms)]
+    if not scaled[0]:
+        scaled = scaled[1:]
+    size = max(map(abs, scaled))
+    if not size or abs(scaled[0]) > sum(map(abs, scaled[1:])):
+        return None
+    floats = np.array([float(each / size) for each in scaled])
+    kept = np.flatnonzero(np.abs(floats) > 1e-25)
+    found = np.roots(floats[: kept[-1] + 1][::-1])
+    near = found[(np.abs(found.imag) < _IMAGINARY) & (found.real > -1e-3) & (found.real < 1.001)]
+    slopes = [k * each for k, each in enumerate(scaled)][1:]
+    for guess in sorted(near.real):
+        root = Decimal(guess)
+        for _ in range(_NEWTON):
+            slope = value_at(slopes, root)
+            if not slope:
+                break
+            root -= value_at(scaled, root) / slope
+        tiny = Decimal(10) ** (4 - getcontext().prec) * size
+        if not 0 < root <= 1 or abs(value_at(scaled, root)) > tiny:
+            continue
+        if value_at(slopes, root) * side < 0:
+            return root * abs(length)
+    return None

@@ -1,0 +1,274 @@
+"""Torques with limits and switches, against exact solutions and the many-digit reference."""
+
+import math
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pyharness import InputError, Scene, Stepper, Taylor, prepare, solve, solve_many
+from pyharness.model.state_torque import recorded
+from pyharness.truth.reference import reference
+
+Torque = Callable[[Any, Any], Any]
+SPHERE = (1.0, 1.0, 1.0)
+BRICK = (1.0, 2.0, 2.5)
+
+
+def _ball(torque: Torque, omega: tuple[float, float, float] = (0.3, 0.0, 0.0)) -> Scene:
+    return Scene("ball", omega, moments=SPHERE, torque=torque)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8, 1e-12])
+def test_saturated_damping_has_its_closed_form(tolerance: float) -> None:
+    """Omega decreases by 0.1 each second to 0.1/0.5 = 0.2, and then as exp(-t/2)."""
+    found = solve(
+        _ball(lambda t, omega: np.clip(-0.5 * omega, -0.1, 0.1)), [0.5, 1.0, 1.5, 4.0],
+        tolerance=tolerance,
+    )  # fmt: skip
+    wanted = [0.25, 0.2, 0.2 * math.exp(-0.25), 0.2 * math.exp(-1.5)]
+    assert found.ended == "complete"
+    assert found.omega[:, 0] == pytest.approx(wanted, abs=0.3 * tolerance + 1e-15)
+
+
+def test_steps_of_time_are_exact() -> None:
+    found = solve(_ball(lambda t, omega: [np.floor(t), (t > 2.5) * 2.0, t % 1.5]), [4.0])
+    assert found.omega[0] == pytest.approx([0.3 + 6.0, 3.0, 2 * 1.125 + 0.5], rel=1e-14)
+
+
+@pytest.mark.parametrize("start", [0.25, 0.0])
+def test_sliding_is_told_with_its_time(start: float) -> None:
+    scene = _ball(lambda t, omega: [-0.1 * np.sign(omega[0]), 0.0, 0.0], (start, 0.0, 0.0))
+    found = solve(scene, [1.0, 2.0, 3.0])
+    assert found.ended == "sliding"
+    assert not found.success
+    assert found.reason is not None
+    assert f"t = {10 * start:g} s" in found.reason
+    assert found.omega[:, 0] == pytest.approx([0.15, 0.05][: len(found.omega)], abs=1e-15)
+    assert len(found.omega) == (2 if start else 0)
+
+
+def test_a_touch_that_an_error_may_turn_into_a_crossing_is_sensitive() -> None:
+    def touched(height: float) -> str:
+        torque: Torque = lambda t, omega: [np.where(np.cos(t) > height, 1.0, 0.0), 0.0, 0.0]  # noqa: E731
+        return solve(_ball(torque), [2.0, 8.0], tolerance=1e-10).ended
+
+    assert touched(-1.0) == "sensitive"
+    assert touched(-1.1) == touched(-0.9) == "complete"
+
+
+def test_amplification_includes_the_change_of_the_time_of_a_switch() -> None:
+    """Where the rates jump, a perturbation jumps too: here by the factor 1 - 0.8/1."""
+
+    def end(x: float) -> Any:
+        torque: Torque = lambda t, omega: [-1.0 + 0.8 * (omega[0] < 0.5), 0.1, 0.0]  # noqa: E731
+        return solve(_ball(torque, (1.0 + x, 0.0, 0.0)), [1.0])
+
+    slope = (end(1e-3).omega[0, 0] - end(-1e-3).omega[0, 0]) / 2e-3
+    assert slope == pytest.approx(0.2, rel=1e-9)
+
+    def away(t: Any, omega: Any) -> Any:
+        return [
+            -1.0 + np.where(omega[0] < 0.5, 0.9, 0.0) - 5.0 * np.where(omega[0] < 0.45, 1, 0),
+            0,
+            0,
+        ]
+
+    assert solve(_ball(away, (1.0, 0.0, 0.0)), [1.1]).growth == pytest.approx(5.1, rel=1e-3)
+
+
+def _torque(kind: str, source: np.random.Generator) -> Torque:
+    k, limit, wide = source.uniform(0.05, 1.0), source.uniform(0.02, 0.3), source.uniform(0.05, 0.4)
+    c, speed, at = source.normal(size=3) * 0.2, source.uniform(0.5, 3.0), source.uniform(1.0, 5.0)
+    places, values = np.sort(source.uniform(-1.0, 1.0, 5)), source.normal(size=5) * 0.2
+    return {
+        "clip": lambda t, w: np.clip(-k * w, -limit, limit) + c * np.sin(speed * t),
+        "dead zone": lambda t, w: (
+            np.where(np.abs(w) < wide, 0.0, -k * (w - wide * np.sign(w))) + c * np.sin(speed * t)
+        ),
+        "where": lambda t, w: [
+            np.where(w[0] > 0, limit, -0.5 * limit) + c[0], c[1] * np.cos(speed * t),
+            np.where((w[1] < w[2]) & (w[0] > -0.2), c[2], 0.1),
+        ],
+        "time": lambda t, w: [
+            limit * np.where(t > at, 1.0, -1.0), c[1] * np.heaviside(t - at / 2, 0.5), -k * w[2]
+        ],
+        "interp": lambda t, w: [
+            np.interp(w[0], places, values), c[1] * np.cos(speed * t), np.interp(t, places, values)
+        ],
+        "abs": lambda t, w: -k * np.abs(w) * w + c * np.cos(speed * t),
+        "extremes": lambda t, w: [np.maximum(w[0], w[1]) * c[0], np.minimum(w[2], c[1]), c[2]],
+        "relay": lambda t, w: [
+            c[0] + 0.3 * limit * np.where(w[0] + 0.5 * w[1] > 0.3 * np.sin(speed * t), 1.0, -1.0),
+            c[1] * np.cos(t), c[2] * np.sin(2.0 * t),
+        ],
+        "functions": lambda t, w: [
+            0.1 * np.log(40.0 + w[0] * w[1]), 0.1 * np.arctan(3.0 * w[1]),
+            -0.1 * np.arcsin(0.9 * np.sin(w[2])) - 0.05 * (w @ w) ** 0.75,
+        ],
+    }[kind]  # fmt: skip
+
+
+KINDS = (
+    "clip", "dead zone", "where", "time", "interp", "abs", "extremes", "relay", "functions",
+)  # fmt: skip
+
+
+def _check(kind: str, seed: str) -> None:
+    source = np.random.default_rng([*seed.encode(), *kind.encode()])
+    omega = source.normal(size=3) * source.uniform(0.2, 1.5)
+    tolerance = 10.0 ** source.uniform(-12.0, -3.0)
+    scene = Scene(kind, tuple(omega), moments=BRICK, torque=_torque(kind, source))
+    times = np.linspace(0.0, source.uniform(1.0, 5.0), 4)
+    found = solve(scene, times, tolerance=tolerance)
+    if found.ended == "sliding":
+        return
+    exact = np.array(reference(scene, times.tolist()).omega, dtype=float)
+    error = np.abs(found.omega - exact).max() / np.abs(exact).max()
+    assert found.growth is not None
+    assert found.error is not None
+    assert error <= tolerance + 4e-15 * found.growth
+    assert error <= 4.0 * found.error + 4e-15 * found.growth
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_error_is_within_the_tolerance(kind: str) -> None:
+    _check(kind, "first")
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("kind", KINDS)
+def test_errors_of_random_scenes_are_within_the_tolerance(kind: str) -> None:
+    for k in range(5):
+        _check(kind, f"random {k}")
+
+
+def _bounded(t: Any, omega: Any) -> Any:
+    x, y, z = np.clip(-0.5 * omega, -0.1, 0.1)
+    return [x, y + 0.05 * (t > 3.0), z]
+
+
+def test_prepared_solver_batch_steps_and_rows_agree() -> None:
+    scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
+    (wanted,) = solve(scene, [7.0]).omega
+    assert prepare(scene)(scene.omega, 7.0).tolist() == wanted.tolist()
+    assert solve_many(scene, 7.0, omega0=[scene.omega]).omega[0].tolist() == wanted.tolist()
+    stepper = Stepper(scene, 1e-12)
+    stepper.until(7.0)
+    assert stepper.omega == pytest.approx(wanted, abs=1e-10)
+    for method in ("dop853", "lsoda"):
+        assert solve(scene, [7.0], method, 1e-9).omega[0] == pytest.approx(wanted, abs=1e-9)
+    both = solve(scene, [-2.0, 0.0, 7.0])
+    assert both.omega[2] == pytest.approx(wanted, abs=1e-12)
+    assert solve(replace_start(scene, both.omega[0]), [2.0]).ended == "complete"
+
+
+def replace_start(scene: Scene, omega: Any) -> Scene:
+    return Scene("later", tuple(omega), moments=BRICK, torque=scene.torque)
+
+
+def test_dense_output_and_events_read_the_steps() -> None:
+    scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
+
+    def slow(t: Any, omega: Any) -> Any:
+        return np.linalg.norm(omega) - 0.9
+
+    found = solve(scene, [7.0], dense_output=True, events=slow)
+    ((time,),) = found.t_events
+    assert np.linalg.norm(found.sol(time)[:3]) == pytest.approx(0.9, abs=1e-11)
+    for each in np.linspace(0.1, 6.9, 9):
+        assert found.sol(each)[:3] == pytest.approx(solve(scene, [each]).omega[0], abs=1e-11)
+
+
+def test_derivatives_of_a_torque_with_switches_are_refused() -> None:
+    scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
+    with pytest.raises(InputError, match="switches"):
+        solve(scene, [1.0], sensitivities=["omega0"])
+
+
+def test_an_equation_of_the_user_has_switches_and_real_powers() -> None:
+    """The ball bounces between two constant forces, with the period 4 sqrt(2)."""
+    given: Any = {"method": Taylor, "rtol": 1e-10, "atol": 1e-12}
+    found = solve_ivp(
+        lambda t, y: [y[1], -np.sign(y[0])], (0.0, 4.0 * math.sqrt(2.0)), [1, 0], **given
+    )
+    assert found.y[:, -1] == pytest.approx([1.0, 0.0], abs=1e-9)
+
+    def kepler(t: Any, y: Any) -> Any:
+        return [*y[2:], *(-y[:2] / (y[0] ** 2 + y[1] ** 2) ** 1.5)]
+
+    found = solve_ivp(kepler, (0.0, 2.0 * math.pi), [0.4, 0.0, 0.0, 2.0], **given)
+    assert found.y[:, -1] == pytest.approx([0.4, 0.0, 0.0, 2.0], abs=1e-8)
+
+
+CASES: list[Torque] = [
+    lambda t, w: np.where(w > 0.4, w, -w),
+    lambda t, w: np.clip(w, [-0.1, 0.0, 0.1], 0.6),
+    lambda t, w: [np.max(w), np.min(w), np.linalg.norm(w)],
+    lambda t, w: [np.heaviside(w[0] - 0.5, 0.5), np.hypot(w[0], w[1]), np.arctan2(w[1], w[0])],
+    lambda t, w: [math.sin(t) + math.atan2(w[0], w[1]), math.fmod(t, 0.5), math.pow(w[2], 1.3)],
+    lambda t, w: [np.interp(w[0], [0, 1], [2, 3]), np.interp(t, [0, 5], [1, 9]), np.fabs(w[1])],
+    lambda t, w: np.linalg.solve(np.diag(w) + np.ones((3, 3)), w),
+    lambda t, w: np.linalg.inv(np.array([[2.0, 1, 0], [0, 3, 0], [0, 0, 4]])) @ w,
+    lambda t, w: np.einsum("ij,j->i", np.eye(3), w) + np.stack([w[0], w[1], w[2]]),
+    lambda t, w: [np.log1p(w[0]), np.exp2(w[1]), np.log10(w[2])],
+    lambda t, w: [np.expm1(w[0]), np.cbrt(w[1]), np.log2(w[2])],
+    lambda t, w: [np.arcsinh(w[0]), np.arccos(w[1] / 2), np.trunc(3.0 * w[2])],
+    lambda t, w: [np.ceil(w[0]), np.rint(2.2 * w[1]), w[2] // 0.2],
+    lambda t, w: [2.0 ** w[0], w[1] ** w[2], w[0] ** -0.5],
+    lambda t, w: [np.logical_or(w[0] > 1, w[1] > 0.1) * t, ~(w[0] > 1) * t, (t < w[1]) * 1.0],
+    lambda t, w: [np.interp(w[0], [0, 0.2], [1, 2], right=5.0), (w[0] >= 0.5) ^ (w[1] > 9), t],
+    lambda t, w: np.sqrt(np.array([w[0], 2.0, w[1]])),
+    lambda t, w: np.maximum(w, 0.5),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_recorded_function_has_the_values_of_numpy(number: int) -> None:
+    torque = CASES[number]
+    omega = np.array([0.3, 0.2, 0.9]) + 0.3 * np.random.default_rng(number).random(3)
+    found = recorded(torque).at(1.75, omega.tolist(), (1.0, 0.0, 0.0, 0.0))
+    assert found == pytest.approx([float(x) for x in torque(1.75, omega)], rel=1e-14)
+
+
+def test_new_arrays_take_symbols() -> None:
+    def torque(t: Any, omega: Any) -> Any:
+        found, other = np.zeros(3), np.empty(3)
+        found[0] = -omega[0]
+        other[:] = np.eye(3) @ np.ones(3)
+        return found + other
+
+    assert recorded(torque).at(0.0, (0.5, 0, 0), (1, 0, 0, 0)) == (0.5, 1.0, 1.0)
+
+
+def test_numpy_is_replaced_in_the_recording_thread_alone() -> None:
+    seen: list[Any] = []
+    where, sine = np.where, math.sin
+
+    def elsewhere() -> None:
+        seen.append((np.zeros(1).dtype, np.maximum.reduce([1.0, 2.0]), math.sin(0.0)))
+
+    def torque(t: Any, omega: Any) -> Any:
+        thread = threading.Thread(target=elsewhere)
+        thread.start()
+        thread.join()
+        return np.where(omega > 0.0, 1.0, 2.0)
+
+    recorded(torque)
+    with pytest.raises(InputError):
+        recorded(lambda t, omega: [1.0 / 0, 0, 0])
+    assert seen[0] == (np.dtype(float), 2.0, 0.0)
+    assert np.where is where
+    assert math.sin is sine
+
+
+def test_refusal_names_line_and_function() -> None:
+    def braking(t: Any, omega: Any) -> Any:
+        return [0.0, 0.0, 0.0] if t > 100.0 else omega
+
+    line = braking.__code__.co_firstlineno + 1
+    with pytest.raises(InputError, match=rf"line {line}, in braking.*numpy\.where"):
+        recorded(braking)

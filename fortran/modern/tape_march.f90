@@ -13,8 +13,9 @@ module tape_march
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
                          slot_gradient, sum_perturbations, VARIATION_TOLERANCE
-  use tape_switches, only: begin_switches, change_switch => change, CROSSES, IS_CHANGED, next_crossing, &
-                           operand_error, resolve_switches, SLIDES, STAYS, switches_t
+  use tape_switches, only: begin_switches, change_switch => change, CROSSES, IS_CHANGED, &
+                           next_crossing, operand_error, resolve_switches, SLIDES, STAYS, &
+                           switches_t, update
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -91,6 +92,7 @@ contains
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
     integer :: is_short
+    logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
@@ -220,6 +222,7 @@ contains
       do i = 1, n
         sum_of_noise(i) = sum_of_noise(i) + (noise(i)*factor*s%h)**2
       end do
+      is_compared = .false.
       if (switches%n > 0) call check_touch()
       call take_step()
       if (switches%n > 0) call cross()
@@ -234,14 +237,14 @@ contains
         exit
       end if
       ! The steps shrink to nothing before a singularity.
-      if (abs(factor*s%h) <= spacing(t(1)) .and. .not. arrives) then
+      if (abs(factor*s%h) <= spacing(t(1)) .and. .not. arrives .and. verdict /= CROSSES) then
         solution%status = OVERFLOW
         exit
       end if
       call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
       if (is_full) call begin_block()
       t = t_next
-      has_values = size(tape%table_starts) == 1 .and. verdict /= CROSSES
+      has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
       from_rest = .not. scale > 0.0_dp
       rest = (t_end - t(1)) - t(2)
       s%h = factor*s%h
@@ -480,6 +483,7 @@ contains
       real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
 
       if (switches%touches < 0.0_dp) return
+      is_compared = .true.
       slots = s%a(0, switches%slots)
       call evaluate(switches%touches, at, zero)
       at = y + (at + y_low)
@@ -490,6 +494,7 @@ contains
       end associate
       call derivatives_at(tape, at_time, at, s%h, s, other)
       s%a(0, switches%slots) = slots
+      call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, rates)
       if (maxval(weights*abs(other - here))*abs(factor*s%h)*sqrt(nearly) > request%tolerance) then
         found%grazes = .true.
       end if
@@ -500,6 +505,7 @@ contains
       !! rates jump (Leine and Nijmeijer 2004, section 7.2).
       real(dp) :: gradient(tape%n_unknowns), after(tape%n_unknowns), jump(tape%n_unknowns)
       real(dp) :: slope, blur
+      logical :: is_changed
       integer :: i
 
       switches%on_level = 0
@@ -510,7 +516,11 @@ contains
       do i = 1, switches%n
         if (switches%crosses(i) /= 0) call change_switch(i, switches%crosses(i), switches, s)
       end do
-      call derivatives_at(tape, t_next, y + y_low, s%h, s, after)
+      is_changed = .true.
+      do while (is_changed)
+        call derivatives_at(tape, t_next, y + y_low, s%h, s, after)
+        call update(switches, s, is_changed)
+      end do
       jump = after - rates
       do i = 1, SIDE_BY_SIDE
         lanes(i, :n) = lanes(i, :n) + jump*(dot_product(gradient, lanes(i, :n))/slope)

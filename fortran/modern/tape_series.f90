@@ -6,8 +6,9 @@ module tape_series
   use, intrinsic :: iso_fortran_env, only: int64
   use kinds, only: dp
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, EXPONENTIAL => EXP, &
-                        FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, SELECT_OF => SELECT, SINE_COSINE, &
-                        SQUARE_ROOT => SQRT, SWITCH, TABLE, TANGENT => TANH
+                        FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &
+                        SELECT_OF => SELECT, SINE_COSINE, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
+                        TANGENT => TANH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_powers, only: find_powers, powers_t

@@ -7,8 +7,8 @@ module tape_step
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_plan, only: converge, fitting, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
-  use tape_switches, only: begin_switches, find_levels, find_switches, IS_CHANGED, &
-                           next_crossing, resolve_switches, SLIDES, switches_t
+  use tape_switches, only: begin_switches, change, CROSSES, find_levels, find_switches, &
+                           IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS, switches_t
   implicit none(type, external)
   private
 
@@ -67,6 +67,7 @@ contains
     step%order = s%order
     s%h = request%trial
     is_rejected = .false.
+    verdict = STAYS
     call find_switches(tape, switches, failed)
     if (failed /= 0) return
     s%a = 0.0_dp
@@ -85,7 +86,6 @@ contains
       s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = request%state
       call expand(tape, 0.0_dp, .false., s)
       step%expansions = step%expansions + 1
-      if (switches%n > 0 .and. step%expansions == 1) call find_levels(switches, s)
       factor = fitting(tape, s%order, LOCAL_TOLERANCE, 1.0_dp/tolerances, s%a)
       if (.not. factor > 0.0_dp) then
         ! The terms are not finite.
@@ -96,6 +96,7 @@ contains
       factor = min(factor, request%longest/s%h)
       call converge(tape, s%order, minval(tolerances), s%a, s%powers, factor)
       if (switches%n > 0) then
+        if (step%expansions == 1) call find_levels(switches, s, factor)
         call resolve_switches(LOCAL_TOLERANCE*max(1e-12_dp, request%relative), switches, s, factor)
         call next_crossing(0.0_dp, switches, s, factor, verdict)
         if (verdict == SLIDES) then
@@ -111,7 +112,14 @@ contains
       end if
       ! The time at the end is rounded. The state belongs to that time.
       step%h = (request%t + step%h) - request%t
-      if (.not. abs(step%h) > 0.0_dp) return
+      if (.not. abs(step%h) > 0.0_dp) then
+        if (verdict /= CROSSES) return
+        ! A switch at the beginning of the step, but for rounding.
+        do i = 1, switches%n
+          if (switches%crosses(i) /= 0) call change(i, switches%crosses(i), switches, s)
+        end do
+        cycle
+      end if
       factor = step%h/s%h
       do i = 1, tape%n_unknowns
         step%terms(:, i) = 0.0_dp

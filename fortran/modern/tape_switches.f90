@@ -12,6 +12,7 @@ module tape_switches
   integer, parameter :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
+  real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
   real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
   real(dp), parameter :: NARROWEST = 2.0_dp**(-40) ! interval without a decision, over the step
   integer, parameter :: MOST_CUTS = 100
@@ -31,7 +32,7 @@ module tape_switches
   end type switches_t
 
   public :: begin_switches, change, find_levels, find_switches, next_crossing, operand_error, &
-            resolve_switches
+            resolve_switches, update
 
 contains
 
@@ -45,10 +46,12 @@ contains
     failed = 0
     switches%n = count(tape%operations(1, :) == SWITCH .or. tape%operations(1, :) == FLOOR_OF)
     if (switches%n == 0) return
-    allocate (switches%slots(switches%n), switches%operands(switches%n), &
-              switches%is_floor(switches%n), switches%on_level(switches%n), &
-              switches%crosses(switches%n), &
-              switches%is_turned(switches%n), stat=failed)
+    allocate (switches%slots(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%operands(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%is_floor(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%is_turned(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%on_level(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%crosses(switches%n), stat=failed)
     if (failed /= 0) return
     switches%is_turned = .false.
     i = 0
@@ -81,18 +84,19 @@ contains
     end associate
   end subroutine begin_switches
 
-  pure subroutine find_levels(switches, s)
+  pure subroutine find_levels(switches, s, factor)
     !! Find the operands that are on a level but for rounding errors, at the beginning of a step.
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(in) :: s
+    real(dp), intent(in) :: factor !! on the step
     real(dp) :: terms(0:LAST_TERM), level
     integer :: i
 
     do i = 1, switches%n
       terms = terms_from(i, LOWER, switches, s)
-      level = merge(0.0_dp, anint(terms(0)), .not. switches%is_floor(i))
+      level = merge(0.0_dp, anint(terms(0)),.not. switches%is_floor(i))
       switches%on_level(i) = 0
-      if (abs(terms(0) - level) > ZERO_TERM*sum(abs(terms(:s%order - 1)))) cycle
+      if (abs(terms(0) - level) > ZERO_TERM*size_of(terms(:s%order - 1), factor)) cycle
       switches%on_level(i) = LOWER
       if (switches%is_floor(i)) then
         if (level > 0.5_dp) switches%on_level(i) = UPPER
@@ -149,7 +153,14 @@ contains
       do level = LOWER, UPPER
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
         terms = terms_from(i, level, switches, s)
-        if ((terms(0) < 0.0_dp) .eqv. (level == LOWER)) switches%on_level(i) = level
+        if (terms(0) == 0.0_dp .or. ((terms(0) > 0.0_dp) .eqv. (level == LOWER))) cycle
+        if (abs(terms(0)) > FAR*size_of(terms(:s%order - 1), factor)) then
+          ! The operand depends on another switch.
+          call begin_switches(i, switches, s)
+          verdict = IS_CHANGED
+          return
+        end if
+        switches%on_level(i) = level
       end do
       if (switches%on_level(i) /= 0) then
         if (.not. leaves(i)) then
@@ -185,29 +196,21 @@ contains
     factor = root
     switches%slope = slope_at(switches%first, factor)
     ! Two roots that nearly coincide are a touch.
-    if (abs(switches%slope)*factor <= sqrt(nearly)*size_at(switches%first, factor)) then
+    if (abs(switches%slope)*factor <= sqrt(nearly) &
+        *size_of(s%a(:s%order - 1, switches%operands(switches%first)), factor)) then
       switches%touches = factor
       switches%touching = switches%first
     end if
 
   contains
 
-    pure real(dp) function size_at(i, part)
-      !! Return the sum of the absolute terms of an operand.
-      integer, intent(in) :: i
-      real(dp), intent(in) :: part
-      integer :: k
-
-      size_at = 0.0_dp
-      do k = s%order - 1, 0, -1
-        size_at = part*size_at + abs(s%a(k, switches%operands(i)))
-      end do
-    end function size_at
-
     pure logical function has_level(i, level)
       integer, intent(in) :: i, level
 
-      has_level = switches%is_floor(i) .or. (s%a(0, switches%slots(i)) > 0.5_dp .eqv. level == LOWER)
+      has_level = switches%is_floor(i)
+      if (.not. has_level) then
+        has_level = (s%a(0, switches%slots(i)) > 0.5_dp) .eqv. (level == LOWER)
+      end if
     end function has_level
 
     pure logical function leaves(i)
@@ -265,6 +268,25 @@ contains
     switches%is_turned(i) = .true.
   end subroutine turn_back
 
+  pure subroutine update(switches, s, is_changed)
+    !! Set the result of the first switch that contradicts its operand's term 0, which may depend on
+    !! another switch.
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    logical, intent(out) :: is_changed
+    real(dp) :: before
+    integer :: i
+
+    is_changed = .false.
+    do i = 1, switches%n
+      if (switches%on_level(i) /= 0) cycle
+      before = s%a(0, switches%slots(i))
+      call begin_switches(i, switches, s)
+      is_changed = s%a(0, switches%slots(i)) /= before
+      if (is_changed) return
+    end do
+  end subroutine update
+
   pure subroutine change(i, level, switches, s)
     !! Change the result of a switch whose operand crosses a level.
     integer, intent(in) :: i, level
@@ -309,9 +331,9 @@ contains
   end function terms_from
 
   pure subroutine first_root(given, order, side, from_root, most, nearly, root, touch)
-    !! Find the first place in a step where a polynomial changes its sign to that opposite to `side`.
-    !! Bounds of the Taylor polynomials around the middle of an interval show that it has no root, or
-    !! is monotonic; other intervals are halved.
+    !! Find the first place in a step where a polynomial changes its sign to the one opposite to
+    !! `side`. Bounds of the Taylor polynomial around the middle of an interval show that it has no
+    !! root, or is monotonic; other intervals are halved.
     real(dp), intent(in) :: given(0:LAST_TERM)
     integer, intent(in) :: order        !! number of the terms
     integer, intent(in) :: side         !! sign at the beginning
@@ -330,7 +352,7 @@ contains
       degree = degree - 1
       c(:degree) = c(1:degree + 1)
     end if
-    total = sum_of(c, most)
+    total = size_of(c(:degree), most)
     if (c(0) > total - c(0) .or. total == 0.0_dp) return
     low = 0.0_dp
     width = most
@@ -362,20 +384,18 @@ contains
         width = r
       end if
     end do
-
-  contains
-
-    pure real(dp) function sum_of(c, part)
-      real(dp), intent(in) :: c(0:), part
-      integer :: k
-
-      sum_of = 0.0_dp
-      do k = degree, 0, -1
-        sum_of = part*sum_of + abs(c(k))
-      end do
-    end function sum_of
-
   end subroutine first_root
+
+  pure real(dp) function size_of(c, part)
+    !! Return the sum of the absolute terms of a polynomial.
+    real(dp), intent(in) :: c(0:), part
+    integer :: k
+
+    size_of = 0.0_dp
+    do k = ubound(c, 1), 0, -1
+      size_of = part*size_of + abs(c(k))
+    end do
+  end function size_of
 
   pure real(dp) function value_of(c, x)
     real(dp), intent(in) :: c(0:), x

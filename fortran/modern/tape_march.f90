@@ -201,7 +201,6 @@ contains
         if (verdict == IS_CHANGED) cycle
         if (verdict == CROSSES) call end_at_switch()
       end if
-      call estimate_truncation()
       call noise_of(tape, s, noise)
       if (.not. is_continued_to_switch()) then
         is_rejected = .true.
@@ -458,22 +457,21 @@ contains
       real(dp) :: correction, before
       integer :: tries
 
-      is_continued_to_switch = is_continued()
-      ! The root of a touch can't be corrected.
-      if (verdict /= CROSSES .or. switches%touches >= 0.0_dp) return
       before = factor
-      do tries = 1, CORRECTIONS
-        if (.not. is_continued_to_switch) return
+      do tries = 0, CORRECTIONS
+        call estimate_truncation()
+        is_continued_to_switch = is_continued()
+        ! The root of a touch can't be corrected.
+        if (verdict /= CROSSES) return
+        if (switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
+        if (abs(correction) <= 2.0_dp*epsilon(factor)*factor) return
         if (.not. abs(correction) <= 0.01_dp*before) then
           is_continued_to_switch = .false.
           return
         end if
         factor = factor + correction
         call end_at_switch()
-        call estimate_truncation()
-        is_continued_to_switch = is_continued()
-        if (abs(correction) <= 2.0_dp*epsilon(factor)*factor) return
       end do
     end function is_continued_to_switch
 

@@ -155,11 +155,12 @@ static inline double combined(const struct tape *tape, int n, int k, const serie
   return sum;
 }
 
-/* Return the combination that SELECT chooses: the second operand, or the next one. */
-static inline int chosen(const struct tape *tape, const int *operation)
+/* Return the slot that SELECT chooses: the only one of its combination, or of the next one. */
+static int chosen(const struct tape *tape, const int *operation)
 {
   const series *const a = tape->a;
-  return operation[2] - 1 + (a[operation[1] - 1][0] == 0.0);
+  const int combination = operation[2] - 1 + (a[operation[1] - 1][0] == 0.0);
+  return tape->slots[tape->starts[combination] - 1] - 1;
 }
 
 /* Compute the terms of all slots below the order, and those of the unknowns up to it. Inputs are
@@ -210,7 +211,7 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
         angle[k] = k * x[k];
         out[k] = (*sum++ + angle[k] * y[0]) / k;
         break;
-      case SELECT: out[k] = combined(tape, chosen(tape, operation), k, a); break;
+      case SELECT: out[k] = a[chosen(tape, operation)][k]; break;
       default: /* a table, or a switch */
         break;
       }
@@ -304,7 +305,7 @@ static void perturb(const struct tape *tape, double h, int k)
     case ASIN:
       x = convolved_one(v[first], a[second], k) + loaded(v[first][k]) * a[second][0];
       break;
-    case SELECT: x = perturbed(tape, chosen(tape, operation), k, (const perturbations *)v); break;
+    case SELECT: x = loaded(v[chosen(tape, operation)][k]); break;
     case SINE_COSINE:
       x = convolved_one(v[first], a[out], k) + loaded(v[first][k]) * a[out][0];
       store(v[out + 1][k], -x);
@@ -394,10 +395,8 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     const int is_rate = n >= tape->n_operations;
     const int *operation = tape->operations[is_rate ? 0 : n];
     const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
-    if (is_rate || operation[0] == LINEAR || operation[0] == SELECT) {
-      const int c = is_rate                  ? derivatives + n - tape->n_operations
-                    : operation[0] == LINEAR ? first
-                                             : chosen(tape, operation);
+    if (is_rate || operation[0] == LINEAR) {
+      const int c = is_rate ? derivatives + n - tape->n_operations : first;
       double *to = is_rate ? jacobian[n - tape->n_operations] : v[out];
       for (int p = 0; p < columns; p += IN_REGISTER) {
         reg sum = {0.0};
@@ -409,7 +408,7 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     }
     /* The derivatives of the first slot by the operands, and of the second by the first operand. */
     double by_first = 0.0, by_second = 0.0, of_second = 0.0;
-    int other = 0;
+    int from = first, other = 0;
     switch (operation[0]) {
     case PRODUCT: by_first = m[second], by_second = m[first], other = second; break;
     case QUOTIENT:
@@ -422,10 +421,9 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     case LOG:
     case ATAN:
     case ASIN: by_first = m[second]; break;
-    default: break; /* a table depends on the time alone, and a switch is constant */
+    case SELECT: by_first = 1.0, from = chosen(tape, operation); break;
+    default: from = 0; break; /* a table depends on the time alone, and a switch is constant */
     }
-    const int is_constant = operation[0] == TABLE || operation[0] == SWITCH || operation[0] == FLOOR;
-    const int from = is_constant ? 0 : first;
     for (int p = 0; p < columns; p += IN_REGISTER) {
       const reg x = *(reg *)(v[from] + p);
       *(reg *)(v[out] + p) = by_first * x + by_second * *(reg *)(v[other] + p);

@@ -96,5 +96,6 @@ class Operations:
     # The second operand is the number of the switch. The result is constant in a step.
     SWITCH = 12  # 1 where the operand is positive, else 0
     FLOOR = 13
-    # One of two combinations, numbers operand 2 and the next: the first where operand 1 is not 0.
+    # One of two combinations of one slot, numbers operand 2 and the next: the first where operand 1
+    # is not 0.
     SELECT = 14

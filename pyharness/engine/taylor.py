@@ -15,7 +15,6 @@ from pyharness.engine.problem import (
 )
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
-from pyharness.engine.taylor_step import SLIDING
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
@@ -23,6 +22,7 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
+from pyharness.model.tape import SLIDING
 from pyharness.model.trajectory import Array, Trajectory
 
 

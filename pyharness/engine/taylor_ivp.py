@@ -47,8 +47,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     ----------
     fun : callable
         The right-hand side ``fun(t, y)``, with `y` of shape (n,), which returns n numbers. It may
-        use up to 20,000 arithmetic operators, integer powers, and NumPy's sqrt, sin, cos, tan, exp,
-        sinh, cosh and tanh, but no branches on `t` or `y`.
+        use up to 20,000 arithmetic operators and elementary functions of NumPy, and its where,
+        clip, minimum, maximum, sign and comparisons, but no branches on `t` or `y`.
     t0 : float
         The time of the initial state.
     y0 : array_like, shape (n,)

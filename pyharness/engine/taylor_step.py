@@ -5,6 +5,7 @@ from typing import NamedTuple
 from pyharness.model.codes import Statuses
 from pyharness.model.errors import TimedError
 from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.tape import SLIDING
 from pyharness.model.trajectory import Array
 
 # The largest order in fortran/modern/tape_series.f90, plus 1.
@@ -12,14 +13,6 @@ _N_TERMS = 29
 # The first trial step, in the user's unit of time. Its length hardly matters, because the series
 # gives any shorter step, or one up to 16 times longer.
 LONGEST_TRIAL = 1e3
-
-
-# Why an integration ends at a switch.
-SLIDING = (
-    "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
-    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
-    "hold the torque between steps of a Stepper"
-)
 
 
 class Step(NamedTuple):

@@ -23,6 +23,12 @@ ATTITUDE = (4, 5, 6, 7)
 N_INPUTS = 8
 # The kinds of operations whose results are constant but where a root of the operand is crossed.
 SWITCHES = ("switch", "floor")
+# Why an integration ends at a switch.
+SLIDING = (
+    "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
+    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
+    "hold the torque between steps of a Stepper"
+)
 
 
 class Linear(NamedTuple):

@@ -176,7 +176,7 @@ def test_dense_output_and_events_read_the_steps() -> None:
     def slow(t: Any, omega: Any) -> Any:
         return np.linalg.norm(omega) - 0.9
 
-    found = solve(scene, [7.0], dense_output=True, events=slow)
+    found: Any = solve(scene, [7.0], dense_output=True, events=slow)
     ((time,),) = found.t_events
     assert np.linalg.norm(found.sol(time)[:3]) == pytest.approx(0.9, abs=1e-11)
     for each in np.linspace(0.1, 6.9, 9):

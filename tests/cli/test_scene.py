@@ -68,20 +68,23 @@ def test_the_schema_is_printed_and_is_one(printed: Printed) -> None:
 
 
 def test_the_schema_has_the_keys_of_the_reader() -> None:
-    assert SCHEMA["properties"].keys() == {"schema", "name", *TABLES}
+    mend = "add it to data/scene.schema.json"
+    assert SCHEMA["properties"].keys() == {"schema", "name", *TABLES}, mend
     for table, keys in TABLES.items():
-        assert SCHEMA["properties"][table]["properties"].keys() == set(keys)
+        assert SCHEMA["properties"][table]["properties"].keys() == set(keys), f"{table}: {mend}"
     kinds = SCHEMA["properties"]["torque"]["properties"]["terms"]["items"]["oneOf"]
-    assert {each["properties"]["kind"]["const"] for each in kinds} == KINDS.keys()
+    assert {each["properties"]["kind"]["const"] for each in kinds} == KINDS.keys(), mend
     for each in kinds:
-        parameters = signature(KINDS[each["properties"]["kind"]["const"]]).parameters
-        assert each["properties"].keys() == {"kind", *parameters}
-        required = {name for name, own in parameters.items() if own.default is Parameter.empty} - (
+        name = each["properties"]["kind"]["const"]
+        parameters = signature(KINDS[name]).parameters
+        assert each["properties"].keys() == {"kind", *parameters}, f"{name}: {mend}"
+        required = {key for key, own in parameters.items() if own.default is Parameter.empty} - (
             {"inertia"} if "inertia" in parameters else set()
         )
-        assert set(each["required"]) == {"kind", *required}
+        assert set(each["required"]) == {"kind", *required}, f"required of {name}: {mend}"
     documented = (ROOT / "docs" / "reference" / "scene-files.md").read_text()
-    assert all(f"`{key}`" in documented for key in KINDS)
+    missing = [key for key in KINDS if f"`{key}`" not in documented]
+    assert missing == [], "describe it in docs/reference/scene-files.md"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

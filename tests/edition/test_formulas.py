@@ -91,10 +91,15 @@ def _of_the_port(program: str) -> dict[str, set[int]]:
 def test_cards_are_those_under_the_citation_of_the_port(program: str) -> None:
     cited = _of_the_port(program)
     expected = {"two-term": {"34", "36"}, "four-term": set(), "runge-kutta": {"19", "31"}}
-    assert set(cited) == expected[program]
+    assert set(cited) == expected[program], "the port cites other equations: extend this list"
     for number, cards in cited.items():
-        cards = {n for n in cards if deck(program).cards[n].text[6:].lstrip()[:5] != "WRITE"}
-        assert _omega(program, cards) <= _cards(BY_NUMBER[number], program), number
+        known = deck(program).cards
+        assert cards <= set(known), "the margin of the port names a card that the deck lacks"
+        cards = {n for n in cards if known[n].text[6:].lstrip()[:5] != "WRITE"}
+        assert _omega(program, cards) <= _cards(BY_NUMBER[number], program), (
+            f"the margin under the citation of equation {number} names a card that its cards in "
+            "data/formulas.toml lack: add it, or end the citation by a blank line"
+        )
 
 
 def test_coefficients_are_on_the_cards_that_the_port_cites() -> None:

@@ -148,17 +148,21 @@ def check_same(found: Trajectory, saved: Trajectory) -> None:
     """Compare each bit of two trajectories."""
     for each in fields(Trajectory):
         was, now = getattr(saved, each.name), getattr(found, each.name)
-        assert type(now) is type(was), each.name
+        told = (
+            f"{each.name}: write it in model/trajectory_file.py, "
+            "read it in engine/trajectory_reader.py"
+        )
+        assert type(now) is type(was), told
         if isinstance(was, np.ndarray):
-            assert (now.dtype, now.shape) == (was.dtype, was.shape), each.name
-            assert now.tobytes() == was.tobytes(), each.name
+            assert (now.dtype, now.shape) == (was.dtype, was.shape), told
+            assert now.tobytes() == was.tobytes(), told
             assert now.flags.writeable
         elif each.name in ("t_events", "y_events") and was is not None:
             assert [(x.shape, x.tobytes()) for x in now] == [(x.shape, x.tobytes()) for x in was]
         else:
             now, was = described(now), described(was)
-            assert now == was, each.name
-            assert repr(now) == repr(was), each.name  # the sign of a zero too
+            assert now == was, told
+            assert repr(now) == repr(was), told  # the sign of a zero too
     for name in RESULTS:
         assert result(found, name) == result(saved, name), name
     if saved.attitude is not None:

@@ -24,7 +24,8 @@ def test_revisions_are_in_the_order_of_time_and_each_has_a_text_of_its_own() -> 
     # Only the oldest texts were not yet data.
     assert not any(digests[len(known) :])
     assert revisions()[0].digest == text_digest(), (
-        "the text has changed: add a revision at the beginning of pyharness/data/revisions.toml"
+        f'the text has changed: set digest = "{text_digest()}" in a new revision at the beginning '
+        "of pyharness/data/revisions.toml"
     )
 
 

@@ -15,6 +15,7 @@ from pyharness.thesis.cards import Card, Difference, chosen, deck, numbers
 from pyharness.thesis.collation import HEADING, expected_lines, undeclared, unexplained
 from tests.conftest import Printed
 
+_ABSENT = "absent of cards/places.toml"
 SCAN = Path(__file__).parents[3] / "shared" / "thesis" / "thesis.txt"
 # Forms that the port writes otherwise in every statement: kinds, spaces, powers, torques by point.
 FORMS = (
@@ -114,10 +115,13 @@ def test_scan_of_the_thesis_is_explained() -> None:
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_every_executable_card_has_its_place(program: str) -> None:
     found = deck(program)
-    assert set(found.port) | set(found.absent) == found.executable
-    assert not set(found.port) & set(found.absent)
-    assert set(found.twin) <= found.executable
-    assert found.executable - set(found.twin) <= set(found.absent)
+    port, absent, twin = set(found.port), set(found.absent), set(found.twin)
+    assert port <= found.executable, "the margin of the port names a card that is not executable"
+    assert absent <= found.executable, f"{_ABSENT} names a card that is not executable"
+    assert port | absent >= found.executable, f"name it in the margin of the port or in {_ABSENT}"
+    assert not port & absent, f"the margin of the port names a card that is in {_ABSENT}"
+    assert twin <= found.executable, "twin of cards/places.toml names a card that is not executable"
+    assert found.executable - twin <= absent, "name it in twin of cards/places.toml"
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -128,10 +132,19 @@ def test_statements_of_the_port_are_those_of_their_cards(program: str) -> None:
         return {"endif": "", "enddo": ""}.get(statement, statement).upper().rstrip("+")
 
     found = deck(program)
+    assert set(found.port) <= set(found.cards), (
+        "the margin of the port names a card that the deck lacks"
+    )
     for number, places in found.port.items():
         card = "".join(found.cards[number].text[6:].split()).rstrip("+").replace("T5**", "T(L)**")
         said = [as_on_card(place.text) for place in places]
-        assert (card in said) != (number in found.otherwise), (number, card, said)
+        assert card in said or number in found.otherwise, (
+            f"the margin of the port names card {number}, {card}, beside {said}: name another "
+            "card, or this one in otherwise of cards/places.toml"
+        )
+        assert card not in said or number not in found.otherwise, (
+            f"the port has card {number} as it is: remove it from otherwise of cards/places.toml"
+        )
 
 
 def test_cards_are_found() -> None:

@@ -1,1 +1,1 @@
-"""Outputs of some forty commands, recorded and compared, which a refactoring must not change."""
+"""Outputs of some seventy commands, recorded and compared, which a refactoring must not change."""

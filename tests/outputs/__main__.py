@@ -8,6 +8,7 @@ of the extension. A comparison lists every difference, and has exit status 1 if 
 import hashlib
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -24,6 +25,7 @@ ROOT = HERE.parent.parent
 _VARIES = (
     "seconds", "seconds_per_step", "build", "speed", "preparation", "time_ratio", "installation",
 )  # fmt: skip
+_FORECAST = re.compile(r"\babout \S+ s\b")  # the run time of a sweep, in its messages
 _SCENE = """\
 name = "forced"
 [body]
@@ -37,6 +39,21 @@ sines = [{ amplitude = [0.0, 0.5, 0.0], frequency = 3.0 }]
 step_size = 0.01
 steps = 200
 """
+_SWEEP = """\
+reductions = ["status", { name = "largest-tilt", samples = 50 }]
+[scene]
+file = "scene.toml"
+[[axis]]
+field = "omega.1"
+from = 0.3
+to = 3.0
+count = 4
+"""
+# Files that the commands read, by name.
+_GIVEN = {
+    "scene.toml": _SCENE, "sweep.toml": _SWEEP,
+    "vectors.json": (ROOT / "pyharness/data/words/cdc.json").read_text(),
+}  # fmt: skip
 
 
 def main() -> int:
@@ -68,7 +85,8 @@ def _record(folder: Path) -> int:
 
 def _run(command: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "scene.toml").write_text(_SCENE)
+        for name, text in _GIVEN.items():
+            (Path(folder) / name).write_text(text)
         environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "NO_COLOR": "1"}
         done = subprocess.run(
             [sys.executable, "-m", "pyharness", *shlex.split(command)],
@@ -77,16 +95,16 @@ def _run(command: str) -> str:
         written = {
             str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
             for path in sorted(Path(folder).rglob("*"))
-            if path.is_file() and path.name != "scene.toml"
+            if path.is_file() and path.name not in _GIVEN
         }
-    said, text = (each.decode(errors="backslashreplace") for each in (done.stderr, done.stdout))
+    said, output = (each.decode(errors="backslashreplace") for each in (done.stderr, done.stdout))
     try:
-        printed = _steady(json.loads(text))
+        printed = _steady(json.loads(output))
     except ValueError:
-        printed = text.splitlines()
+        printed = output.splitlines()
     record = {
         "command": command, "exit": done.returncode, "printed": printed,
-        "said": said.splitlines(), "written": written,
+        "said": _FORECAST.sub("about ... s", said).splitlines(), "written": written,
     }  # fmt: skip
     return json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 

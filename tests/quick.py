@@ -49,14 +49,15 @@ def main(arguments: Sequence[str]) -> int:
 def run(files: Sequence[str], seconds: float) -> int:
     """Run test files in this order, and end after `seconds`, even in the middle of a test."""
     counter = Counter(time.monotonic() + seconds)
-    signal.signal(signal.SIGALRM, lambda *_: pytest.exit("the time is up", returncode=0))
+    signal.signal(signal.SIGALRM, lambda *_: counter.ring())
+    # An alarm in a finalizer is ignored; the next test finds that the time is up.
+    options = ["-q", "--no-header", "-p", "no:cacheprovider", "-p", "no:unraisableexception"]
     codes = []
     # In chunks, because all files may take longer to collect than the time that there is.
     for chunk in _chunks(files):
         if counter.left() > 0.0:
-            command = ["-q", "--no-header", "-p", "no:cacheprovider", "-m", "not campaign", *chunk]
+            command = [*options, "-m", "not campaign", *chunk]
             codes.append(pytest.main(command, plugins=[counter]))
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
     print(f"quick: {counter.passed} tests passed of {len(files)} files; make test runs all")
     return int(any(code not in _WELL for code in codes) or counter.failed > 0)
 
@@ -165,9 +166,10 @@ def imported(text: str) -> set[str]:
 
 
 class Counter:
-    """A plugin that counts tests and sets the alarm after each collection."""
+    """A plugin that counts tests, and ends them when the time is up."""
 
     passed = failed = 0
+    _is_running = False
 
     def __init__(self, end: float) -> None:
         """Store the time (s) of `time.monotonic` at which the tests end."""
@@ -177,18 +179,40 @@ class Counter:
         """Return the time that is left (s)."""
         return self._end - time.monotonic()
 
+    def ring(self) -> None:
+        """End pytest if a test is running: elsewhere the exception would be an error of pytest."""
+        if self._is_running:
+            self._stop()
+
+    def _stop(self) -> None:
+        self._is_running = False
+        pytest.exit("the time is up", returncode=0)
+
     def pytest_collection_finish(self) -> None:
-        """Set the alarm; an alarm during the collection would be an error of collection."""
-        signal.setitimer(signal.ITIMER_REAL, max(self.left(), 0.5))
+        """Set the alarm."""
+        signal.setitimer(signal.ITIMER_REAL, max(self.left(), 0.001))
 
     def pytest_runtest_logstart(self) -> None:
-        """End before the next test, where one has caught the exception of the alarm."""
+        """End pytest if a test caught the exception, or the alarm rang between two tests."""
+        self._is_running = True
         if self.left() <= 0.0:
-            pytest.exit("the time is up", returncode=0)
+            self.ring()
 
+    def pytest_runtest_logfinish(self) -> None:
+        """Let the alarm ring in vain until the next test begins."""
+        self._is_running = False
+
+    def pytest_sessionfinish(self) -> None:
+        """Stop the alarm."""
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+    @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Count each test that passed, and every failed part of a test."""
-        self.failed += report.failed and self.left() > 0.0
+        # A test that caught the exception failed by it, which is not reported.
+        if report.failed and self.left() <= 0.0:
+            self._stop()
+        self.failed += report.failed
         self.passed += report.when == "call" and report.passed
 
 

@@ -3,13 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from tests.changed import campaigns_of
 from tests.changed import changed as changed_since
-from tests.quick import ROOT, main, nearest, sources
+from tests.quick import ROOT, Counter, main, nearest, sources
 
 TESTS = {
     "tests/engine/test_taylor.py": "from pyharness import solve",
@@ -60,7 +61,8 @@ def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
             2.0,
             """
     try: time.sleep(90)
-    except Exception: assert False""",
+    except Exception: assert False
+def test_b(): pass""",
             0,
             "1 tests passed of 2",
         ),
@@ -78,10 +80,26 @@ def test_it_ends_when_the_time_is_up(tmp_path: Path) -> None:
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     *_, codes = done.stdout.splitlines()
+    assert done.stdout.count("FAILED") == 1
     assert codes == str([code for _, _, code, _ in cases]), done.stdout + done.stderr
     said = [line for line in done.stdout.splitlines() if line.startswith("quick: ")]
     for line, (_, _, _, wanted) in zip(said, cases, strict=True):
         assert line.startswith(f"quick: {wanted} files;")
+
+
+def test_the_alarm_ends_only_a_test() -> None:
+    counter = Counter(time.monotonic())
+    counter.ring()
+    with pytest.raises(pytest.exit.Exception):
+        counter.pytest_runtest_logstart()
+    counter.ring()
+    counter = Counter(time.monotonic() + 1e3)
+    counter.pytest_runtest_logstart()
+    with pytest.raises(pytest.exit.Exception):
+        counter.ring()
+    counter.pytest_runtest_logstart()
+    counter.pytest_runtest_logfinish()
+    counter.ring()
 
 
 @pytest.mark.campaign

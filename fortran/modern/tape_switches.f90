@@ -116,20 +116,18 @@ contains
     integer :: i, k, tries
 
     do i = 1, switches%n
-      associate (terms => s%a(:, switches%operands(i)))
-        do tries = 1, MOST_CUTS
-          total = 0.0_dp
-          last = 0.0_dp
-          power = 1.0_dp
-          do k = 0, s%order - 1
-            total = total + power*abs(terms(k))
-            if (k >= s%order - 2) last = max(last, power*abs(terms(k)))
-            power = factor*power
-          end do
-          if (.not. last > relative*total) exit
-          factor = 0.75_dp*factor
+      do tries = 1, MOST_CUTS
+        total = 0.0_dp
+        last = 0.0_dp
+        power = 1.0_dp
+        do k = 0, s%order - 1
+          total = total + power*abs(s%a(k, switches%operands(i)))
+          if (k >= s%order - 2) last = max(last, power*abs(s%a(k, switches%operands(i))))
+          power = factor*power
         end do
-      end associate
+        if (.not. last > relative*total) exit
+        factor = 0.75_dp*factor
+      end do
     end do
   end subroutine resolve_switches
 

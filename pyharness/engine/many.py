@@ -29,7 +29,7 @@ from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
-from pyharness.model.errors import InputError, unknown
+from pyharness.model.errors import InputError, known
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
@@ -139,6 +139,8 @@ def solve_many(
         "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
     }  # fmt: skip
     details = None
+    if isinstance(method, str):
+        method = method.lower()
     scene = scene if isinstance(scene, Scene) else list(scene)
     if scene and (events is not None or sensitivities is not None):
         details = Details(
@@ -258,8 +260,7 @@ def _solve_groups(
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
     """Return the kernel's code of a method and the tolerance, or raise InputError."""
-    if not isinstance(method, str) or method not in PREPARED:
-        raise unknown("method", method, PREPARED)
+    method = known("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
     asked = requested_tolerance(method, tolerance)
     if not finest <= asked <= 1.0:

@@ -13,7 +13,7 @@ from pyharness.engine.registry import (
 from pyharness.engine.solver import PREPARED, Solver
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
-from pyharness.model.errors import unknown
+from pyharness.model.errors import known
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array
@@ -92,8 +92,7 @@ def prepare(
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     attitude = boolean("attitude", attitude)
-    if not isinstance(method, str) or method not in PREPARED:
-        raise unknown("method", method, PREPARED)
+    method = known("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
     check_prepared(scene, method)

@@ -40,7 +40,7 @@ from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
-from pyharness.model.errors import InputError, TimedError, unknown
+from pyharness.model.errors import InputError, TimedError, known
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque, is_opaque
@@ -128,8 +128,7 @@ def solve(
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     attitude = boolean("attitude", attitude)
     dense_output = boolean("dense_output", dense_output)
-    if not isinstance(method, str) or method not in METHODS:
-        raise unknown("method", method, METHODS)
+    method = known("method", method, METHODS)
     asked = method
     if method == "auto" and is_opaque(scene.torque):
         method = "dop853"

@@ -95,6 +95,15 @@ def kind_of(value: object) -> str:
     return f"a {type(value).__name__}"
 
 
+def known(what: str, name: object, allowed: Iterable[str]) -> str:
+    """Return the allowed name that `name` is, in upper or lower case; raise InputError if none."""
+    names = list(allowed)
+    found = name.lower() if isinstance(name, str) else ""
+    if found not in names:
+        raise unknown(what, name, names)
+    return found
+
+
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
     """Return the InputError for a name that is not `allowed`; it suggests a similar allowed name.
 

@@ -97,9 +97,10 @@ class Scene:
         `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
-    torque : TorqueLaw, or function of (t, omega) or (t, omega, attitude)
-        The torque; zero by default. A function returns the components about the body axes. It is
-        recorded with symbols; one that can't be is passed as ``opaque(function)``.
+    torque : TorqueLaw, three numbers, or function of (t, omega) or (t, omega, attitude)
+        The torque; zero by default. Three numbers are constant. A function returns the components
+        about the body axes. It is recorded with symbols; one that can't be is passed as
+        ``opaque(function)``.
     step_size : float
         The step size of programs and methods with a fixed step (s).
     steps : int
@@ -152,7 +153,7 @@ class Scene:
             omega: Numbers,
             moments: Numbers | ChangingMoments | None = None,
             coefficients: Numbers | None = None,
-            torque: TorqueLaw | StateTorque | Callable[..., Any] = ...,
+            torque: TorqueLaw | StateTorque | Numbers | Callable[..., Any] = ...,
             step_size: Number = 0.01,
             steps: SupportsIndex = 100,
             masses: Numbers = ...,

@@ -256,10 +256,12 @@ def checked_torque(value: object) -> TorqueLaw | StateTorque:
     """Return a user's torque, recorded if it is a function, or raise InputError."""
     if isinstance(value, (TorqueLaw, StateTorque)):
         return value
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return TorqueLaw(three_floats("[torque]", value))
     if not callable(value):
         raise InputError(
-            f"[torque] is {kind_of(value)}; it must be a TorqueLaw, or a function of (t, omega) or "
-            "(t, omega, attitude)"
+            f"[torque] is {kind_of(value)}; it must be three numbers, a TorqueLaw, or a function "
+            "of (t, omega) or (t, omega, attitude)"
         )
     torque = recorded(value)
     return law_of(torque) or torque

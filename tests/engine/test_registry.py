@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from pyharness import Scene, TorqueLaw, case_scene
+from pyharness import Scene, TorqueLaw, case_scene, prepare, solve_many
 from pyharness.engine.registry import METHODS, REGISTRY, SCIPY_METHODS
 from pyharness.engine.rescaled import scaled
 from pyharness.engine.solve import solve
@@ -109,6 +109,15 @@ def test_every_call_of_the_right_hand_side_is_counted(
     monkeypatch.setattr(Scene, "right_hand_side", lambda _: slope)
     # The count includes the forecast's calls; SciPy's own count leaves out Radau's Jacobians.
     assert solve(scene, [0.5, 1.0], method, 1e-6).evaluations == slope.call_count
+
+
+def test_names_of_methods_are_in_any_case() -> None:
+    scene = case_scene(2)
+    wanted = solve(scene, 1.0, "dop853").omega.tolist()
+    assert solve(scene, 1.0, "DOP853").omega.tolist() == wanted
+    assert prepare(scene, "Taylor")(scene.omega, 1.0).tolist() == (
+        solve_many(scene, 1.0, omega0=[scene.omega], method="TAYLOR").omega[0].tolist()
+    )
 
 
 def test_orders_of_gauss_collocation_are_twice_its_stages() -> None:

@@ -133,6 +133,12 @@ def test_torque_of_coefficients_is_not_divided() -> None:
     assert by_moments.normalized_torque(0.0) == (0.5, 1.0, 1.5)
 
 
+@pytest.mark.parametrize("given", [(1, 2, 3), [1, 2, 3], np.array([1.0, 2.0, 3.0])])
+def test_three_numbers_are_a_constant_torque(given: Any) -> None:
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=given)
+    assert scene.torque == TorqueLaw((1.0, 2.0, 3.0))
+
+
 def test_largest_number_of_steps_fits() -> None:
     assert 10_000_000 < most_steps() <= 400_000_000
 

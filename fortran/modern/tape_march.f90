@@ -249,7 +249,8 @@ contains
       s%h = factor*s%h
       if (verdict == CROSSES) s%h = whole_step
       if (abs(s%h) > abs(rest)) s%h = rest
-      call check_steps(found%steps, t(1), rest, arrives, limit, found%ahead, solution%status)
+      call check_steps(found%steps, t(1), rest, arrives .or. verdict == CROSSES, limit, &
+                       found%ahead, solution%status)
       if (solution%status /= COMPLETE) exit
     end do
     call weigh()
@@ -465,7 +466,7 @@ contains
         if (verdict /= CROSSES) return
         if (switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
-        if (abs(correction) <= 2.0_dp*epsilon(factor)*factor) return
+        if (abs(correction*s%h) <= 2.0_dp*epsilon(factor)*abs(whole_step)) return
         if (.not. abs(correction) <= 0.01_dp*before) then
           is_continued_to_switch = .false.
           return

@@ -64,8 +64,15 @@ class _Scaling:
             if odd:
                 raise ArithmeticError("the exponent of a square root is not a whole number")
             found = Operation(kind, (self._places[operands[0]],))
+        elif kind == "switch":
+            exponent, found = 0, Operation(kind, (self._places[operands[0]],))
+        elif kind == "select":
+            exponent = exponents[1]
+            other = self._at(operands[2], exponent)
+            chosen = self._places[operands[0]], self._places[operands[1]], other
+            found = Operation(kind, chosen)
         else:
-            exponent, found = 0, Operation(kind, (self._unscaled(operands[0]),))
+            exponent, found = 0, Operation(kind, tuple(self._at(slot, 0) for slot in operands))
         self._places.append(self._append(found))
         self._exponents.append(exponent)
 
@@ -85,13 +92,13 @@ class _Scaling:
         own = {self._exponents[slot] for slot, _ in linear.terms}
         return 0 if linear.constant or not own else min(own, key=abs)
 
-    def _unscaled(self, slot: int) -> int:
-        """Return a new slot that has the original value of `slot`."""
-        if self._exponents[slot] == 0:
+    def _at(self, slot: int, exponent: int) -> int:
+        """Return a new slot that has the original value of `slot`, times 2**exponent."""
+        if self._exponents[slot] == exponent:
             return self._places[slot]
         # The kernel recognises an angle proportional to time by its linear combination.
         linear = self._linear.get(slot, Linear(0.0, ((slot, 1.0),)))
-        return self._append(Operation("linear", (), self.combined(linear, 0)))
+        return self._append(Operation("linear", (), self.combined(linear, exponent)))
 
     def _moved(self, table: Table) -> Table:
         breaks = tuple(_scaled(time, -self._unit) for time in table.breaks)

@@ -291,7 +291,8 @@ class Symbol:
             return Symbol(self.recorder, function(self._constant), {})
         operands: tuple[int, ...] = (self._own_slot(),)
         if derivative is not None:
-            operands = (*operands, derivative(self)._own_slot())
+            argument = Symbol(self.recorder, 0.0, {operands[0]: 1.0})
+            operands = (*operands, derivative(argument)._own_slot())
         return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, operands)): 1.0})
 
     # NumPy calls the methods with these names for np.sqrt(symbol) and so on.

@@ -272,3 +272,22 @@ def test_refusal_names_line_and_function() -> None:
     line = braking.__code__.co_firstlineno + 1
     with pytest.raises(InputError, match=rf"line {line}, in braking.*numpy\.where"):
         recorded(braking)
+
+
+@pytest.mark.parametrize("unit", [1e-120, 1e-2, 1e90])
+def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> None:
+    def torque(t: Any, w: Any) -> Any:
+        kick = np.where((t * unit) % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1] / unit)
+        return unit * unit * np.array([kick, np.arctan(w[2] / unit), -0.1]) + np.clip(
+            -0.5 * unit * w, -0.1 * unit * unit, 0.1 * unit * unit
+        )
+
+    def end(torque: Torque, unit: float) -> Any:
+        omega = (0.3 * unit, 0.2 * unit, 0.9 * unit)
+        return solve(Scene("", omega, moments=BRICK, torque=torque), [5.0 / unit]).omega[0]
+
+    def plain(t: Any, w: Any) -> Any:
+        kick = np.where(t % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1])
+        return np.array([kick, np.arctan(w[2]), -0.1]) + np.clip(-0.5 * w, -0.1, 0.1)
+
+    assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)

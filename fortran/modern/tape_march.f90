@@ -13,9 +13,8 @@ module tape_march
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
                          slot_gradient, sum_perturbations, VARIATION_TOLERANCE
-  use tape_switches, only: begin_switches, change_switch => change, CROSSES, IS_CHANGED, &
-                           next_crossing, operand_error, resolve_switches, SLIDES, STAYS, &
-                           switches_t, update
+  use tape_switches, only: begin_switches, CROSSES, IS_CHANGED, next_crossing, operand_error, &
+                           resolve_switches, SLIDES, STAYS, switches_t, update
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -118,7 +117,7 @@ contains
     call begin_lanes()
     do i = 1, switches%n
       call derivatives_at(tape, t, y, t_end, s, rates)
-      call begin_switches(i, switches, s)
+      call begin_switches(i, 0.0_dp, switches, s)
     end do
     verdict = STAYS
     nearly = min(MOST_NEAR, max(NEAR, attempt%tolerance))
@@ -198,7 +197,12 @@ contains
           solution%status = SLIDING
           exit
         end if
-        if (verdict == IS_CHANGED) cycle
+        if (verdict == IS_CHANGED) then
+          tries = tries + 1
+          if (tries <= MOST_TRIES) cycle
+          solution%status = OVERFLOW
+          exit
+        end if
         if (verdict == CROSSES) call end_at_switch()
       end if
       call noise_of(tape, s, noise)
@@ -512,13 +516,10 @@ contains
       call slot_gradient(s%arrays, switches%operands(switches%first), gradient)
       slope = switches%slope/s%h
       blur = s%noise(switches%operands(switches%first))/slope
-      do i = 1, switches%n
-        if (switches%crosses(i) /= 0) call change_switch(i, switches%crosses(i), switches, s)
-      end do
       is_changed = .true.
       do while (is_changed)
         call derivatives_at(tape, t_next, y + y_low, s%h, s, after)
-        call update(switches, s, is_changed)
+        call update(factor, switches, s, is_changed)
       end do
       jump = after - rates
       do i = 1, SIDE_BY_SIDE

@@ -73,7 +73,7 @@ contains
     s%a = 0.0_dp
     do i = 1, switches%n
       call derivatives_at(tape, [request%t, 0.0_dp], request%state, s%h, s, step%state)
-      call begin_switches(i, switches, s)
+      call begin_switches(i, 0.0_dp, switches, s)
     end do
     do while (step%expansions < MOST_TRIES)
       ! The steps shrink to nothing before a singularity. The first trial may be short by chance.

@@ -65,24 +65,39 @@ contains
     switches%on_level = 0
   end subroutine find_switches
 
-  pure subroutine begin_switches(switch_number, switches, s)
-    !! Set the result of a switch by the value of its operand. On a level it is the upper one.
-    integer, intent(in) :: switch_number
+  pure subroutine begin_switches(i, near, switches, s)
+    !! Set the result of a switch by the value of its operand. On a level, or as near to one as
+    !! `near`, it is that of NumPy, until the derivative of the operand shows the side.
+    integer, intent(in) :: i
+    real(dp), intent(in) :: near
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(inout) :: s
     real(dp) :: level
 
-    associate (i => switch_number, operand => s%a(0, switches%operands(switch_number)))
-      if (switches%is_floor(i)) then
-        level = real(floor(min(1e9_dp, max(-1e9_dp, operand))), dp)
-        switches%on_level(i) = merge(LOWER, 0, operand == level)
+    associate (operand => s%a(0, switches%operands(i)), value => s%a(0, switches%slots(i)))
+      switches%on_level(i) = 0
+      level = 0.0_dp
+      if (switches%is_floor(i)) level = anint(operand)
+      if (abs(operand - level) <= near) then
+        value = level
+        switches%on_level(i) = merge(LOWER, UPPER, switches%is_floor(i))
+      else if (switches%is_floor(i)) then
+        value = merge(level, level - 1.0_dp, level < operand)
       else
-        level = merge(1.0_dp, 0.0_dp, operand >= 0.0_dp)
-        switches%on_level(i) = merge(LOWER, 0, operand == 0.0_dp)
+        value = merge(1.0_dp, 0.0_dp, operand > 0.0_dp)
       end if
-      s%a(0, switches%slots(i)) = level
     end associate
   end subroutine begin_switches
+
+  pure real(dp) function nearness(i, factor, switches, s)
+    !! Return the rounding error of an operand at the end of a step.
+    integer, intent(in) :: i
+    real(dp), intent(in) :: factor !! on the step
+    type(switches_t), intent(in) :: switches
+    type(series_t), intent(in) :: s
+
+    nearness = ZERO_TERM*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
+  end function nearness
 
   pure subroutine find_levels(switches, s, factor)
     !! Find the operands that are on a level but for rounding errors, at the beginning of a step.
@@ -147,6 +162,15 @@ contains
     switches%crosses = 0
     roots = 2.0_dp*factor
     do i = 1, switches%n
+      ! The operand may depend on another switch, and no more be on its level.
+      if (switches%on_level(i) /= 0) then
+        terms = terms_from(i, switches%on_level(i), switches, s)
+        if (abs(terms(0)) > FAR*size_of(terms(:s%order - 1), factor)) then
+          call begin_switches(i, nearness(i, factor, switches, s), switches, s)
+          verdict = IS_CHANGED
+          return
+        end if
+      end if
       ! It may have crossed a level together with another one.
       do level = LOWER, UPPER
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
@@ -154,7 +178,7 @@ contains
         if (terms(0) == 0.0_dp .or. ((terms(0) > 0.0_dp) .eqv. (level == LOWER))) cycle
         if (abs(terms(0)) > FAR*size_of(terms(:s%order - 1), factor)) then
           ! The operand depends on another switch.
-          call begin_switches(i, switches, s)
+          call begin_switches(i, nearness(i, factor, switches, s), switches, s)
           verdict = IS_CHANGED
           return
         end if
@@ -266,23 +290,36 @@ contains
     switches%is_turned(i) = .true.
   end subroutine turn_back
 
-  pure subroutine update(switches, s, is_changed)
-    !! Set the result of the first switch that contradicts its operand's term 0, which may depend on
-    !! another switch.
+  pure subroutine update(factor, switches, s, is_changed)
+    !! Change the first switch whose result is not that of its operand's term 0 at the end of a
+    !! step. One that crosses is changed, unless a change of another moved its operand away.
+    real(dp), intent(in) :: factor !! on the step
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(inout) :: s
     logical, intent(out) :: is_changed
-    real(dp) :: before
-    integer :: i
+    real(dp) :: before, near
+    integer :: i, level
 
-    is_changed = .false.
+    is_changed = .true.
     do i = 1, switches%n
+      near = nearness(i, factor, switches, s)
+      level = switches%crosses(i)
+      if (level /= 0) then
+        switches%crosses(i) = 0
+        if (abs(s%a(0, switches%operands(i)) - level_of(i, level, switches, s)) &
+            <= FAR/ZERO_TERM*near) then
+          call change(i, level, switches, s)
+        else
+          call begin_switches(i, near, switches, s)
+        end if
+        return
+      end if
       if (switches%on_level(i) /= 0) cycle
       before = s%a(0, switches%slots(i))
-      call begin_switches(i, switches, s)
-      is_changed = s%a(0, switches%slots(i)) /= before
-      if (is_changed) return
+      call begin_switches(i, near, switches, s)
+      if (s%a(0, switches%slots(i)) /= before) return
     end do
+    is_changed = .false.
   end subroutine update
 
   pure subroutine change(i, level, switches, s)

@@ -5,11 +5,12 @@ numpy.zeros. While a user's function is recorded, these functions are therefore 
 modules numpy, numpy.linalg and math. Calls from other threads, and without symbols, are passed on.
 """
 
+import importlib
 import math
 import operator
 import re
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -48,6 +49,8 @@ def replaced_functions(with_targets: bool) -> Iterator[None]:
 
 
 def _install() -> None:
+    # It reads the signatures of the functions that are replaced.
+    importlib.import_module("numpy.ma")
     original: Callable[..., Any]
     for module, functions in _REPLACEMENTS:
         for name, function in functions.items():
@@ -79,7 +82,12 @@ class _Replaced:
     def __call__(self, *given: Any, **named: Any) -> Any:
         if getattr(_here, "targets", None) is None or not any(map(_has_symbol, given)):
             return self._original(*given, **named)
-        return self._function(*given, **named)
+        _refuse_out(given, named)
+        try:
+            return self._function(*given, **named)
+        except TypeError as error:
+            what = f"{getattr(self._original, '__name__', 'a function')} with these arguments"
+            raise _symbol_in(given).recorder.refusal(what) from error
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._original, name)
@@ -92,8 +100,18 @@ class _Target(_Replaced):
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
 
     def __call__(self, *given: Any, **named: Any) -> Any:
-        found = self._function if getattr(_here, "targets", None) else self._original
-        return found(*given, **named)
+        is_target = getattr(_here, "targets", None) and _is_float(given, named)
+        return (self._function if is_target else self._original)(*given, **named)
+
+
+def _is_float(given: Sequence[Any], named: Mapping[str, Any]) -> bool:
+    kind = given[1] if len(given) > 1 else named.get("dtype", float)
+    return kind is float or kind is object or kind is np.float64
+
+
+def _refuse_out(given: Any, named: Mapping[str, Any]) -> None:
+    if named.get("out") is not None:
+        raise _symbol_in(given).recorder.refusal("the argument out", "an assignment")
 
 
 def _has_symbol(value: Any) -> bool:
@@ -108,7 +126,14 @@ class SymbolArray(np.ndarray[Any, Any]):
     """An array of symbols, whose comparisons are arrays of conditions instead of truth values."""
 
     def _compared(self, name: str, other: Any) -> Any:
-        return np.frompyfunc(getattr(operator, name), 2, 1)(self, other)
+        compare = getattr(operator, name)
+
+        def compared(x: Any, y: Any) -> Any:
+            found = compare(x, y)
+            # The negative of a bool of Python is a number.
+            return np.bool_(found) if isinstance(found, bool) else found
+
+        return np.frompyfunc(compared, 2, 1)(self, other)
 
     def __lt__(self, other: Any) -> Any:
         """Return where each element is smaller."""
@@ -128,6 +153,7 @@ class SymbolArray(np.ndarray[Any, Any]):
 
     def clip(self, *given: Any, **named: Any) -> Any:
         """Return the elements, limited to an interval."""
+        _refuse_out(self, named)
         return _clip(self, *given, **named)
 
 
@@ -286,8 +312,12 @@ def _determinant(matrix: Any) -> Any:
     return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
 
 
-def _symbol_in(array: Any) -> Symbol:
-    return next(x for x in np.asarray(array, dtype=object).flat if isinstance(x, Symbol))
+def _symbol_in(values: Any) -> Symbol:
+    if isinstance(values, Symbol):
+        return values
+    if isinstance(values, np.ndarray):
+        values = values.ravel().tolist()
+    return next(_symbol_in(each) for each in values if _has_symbol(each))
 
 
 def called_once(

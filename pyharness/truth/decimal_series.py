@@ -70,15 +70,12 @@ def taylor_series(
     rows: list[Row] = []
     forward = times[-1] >= 0
     step = stops = 0
-    while switches is not None:
-        try:
-            equations.expand(begin, state, 1, forward)
-        except ArithmeticError:
-            return rows
-        if not switches.begin():
-            break
+    is_settled = switches is None
     while True:
         try:
+            while switches is not None and not is_settled:
+                equations.expand(begin, state, 1, forward)
+                is_settled = not switches.settle()
             series = equations.expand(begin, state, order, forward)
         except ArithmeticError:
             # The torque is singular here, or beyond the range of decimal arithmetic.
@@ -91,6 +88,7 @@ def taylor_series(
         length = length.copy_sign(times[-1])
         if switches is not None:
             if switches.turns(begin, length):
+                is_settled = False
                 continue
             length = switches.end(length)
         if begin + length == begin and rest:
@@ -121,6 +119,7 @@ def taylor_series(
         begin = end
         if switches is not None:
             switches.step(length == tried and end != stop)
+            is_settled = False
 
 
 class _Limit:

@@ -30,13 +30,23 @@ class Switches:
         self._turned: set[int] = set()
         self._next: dict[int, int] = {}
 
-    def begin(self) -> bool:
-        """Set the results by the values of the operands; return whether one changed."""
+    def settle(self) -> bool:
+        """Set the results that are not those of the operands; return whether one changed."""
         for slot, is_floor, x in self._tape.operands_of_switches():
-            value = x[0].to_integral_value("ROUND_FLOOR") if is_floor else Decimal(x[0] >= 0)
-            if x[0] == (value if is_floor else 0):
-                self._levels[slot] = -1
-            if slot not in self.results or self.results[slot] != value:
+            level = x[0].to_integral_value() if is_floor else Decimal(0)
+            if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
+                # Its derivative shows the side; on a level, the result is that of NumPy.
+                known = self._levels.get(slot)
+                value = level if is_floor else Decimal(0)
+                if slot in self.results and known is not None:
+                    at = self.results[slot] + (known > 0 if is_floor else 0)
+                    if not is_floor or at == level:
+                        continue
+                self._levels[slot] = -1 if is_floor else 1
+            else:
+                self._levels.pop(slot, None)
+                value = x[0].to_integral_value("ROUND_FLOOR") if is_floor else Decimal(x[0] > 0)
+            if self.results.get(slot) != value:
                 self.results[slot] = value
                 return True
         return False

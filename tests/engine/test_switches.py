@@ -222,6 +222,7 @@ CASES: list[Torque] = [
     lambda t, w: [np.logical_or(w[0] > 1, w[1] > 0.1) * t, ~(w[0] > 1) * t, (t < w[1]) * 1.0],
     lambda t, w: [np.interp(w[0], [0, 0.2], [1, 2], right=5.0), (w[0] >= 0.5) ^ (w[1] > 9), t],
     lambda t, w: np.sqrt(np.array([w[0], 2.0, w[1]])),
+    lambda t, w: np.where(~(np.array([w[0], 1.0, 0.0]) > 0.5), 1.0, 2.0),
     lambda t, w: np.maximum(w, 0.5),
 ]  # fmt: skip
 
@@ -291,3 +292,26 @@ def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> 
         return np.array([kick, np.arctan(w[2]), -0.1]) + np.clip(-0.5 * w, -0.1, 0.1)
 
     assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)
+
+
+@pytest.mark.parametrize(("law", "end", "wanted"), [
+    (lambda t: np.where(np.floor(t) % 2 < 1, 1, 0), 20.0, 10.0),
+    (lambda t: np.where(np.maximum(t % 2 - 1, 0) > 0, 1, 0), 20.0, 10.0),
+    (lambda t: (t % 7) // 1, 20.0, 57.0), (lambda t: np.floor(3 * (t % 1)), 20.0, 20.0),
+    (lambda t: (t % 10) % 5, 20.0, 50.0), (lambda t: np.where(t % 4 < 4, 1.0, 0.0), 20.0, 20.0),
+    (lambda t: (t // 2) % 2, -20.0, -10.0), (lambda t: (t + 1.7e9) // 1 - 1.7e9, 3.0, 3.0),
+])  # fmt: skip
+def test_switches_that_depend_on_others_or_rest_on_a_level(
+    law: Any, end: float, wanted: float
+) -> None:
+    scene = _ball(lambda t, omega: [law(t), 0.0, 0.0], (0.0, 0.0, 0.0))
+    assert solve(scene, [end]).omega[0, 0] == pytest.approx(wanted, rel=1e-13)
+    assert float(reference(scene, [end]).omega[0][0]) == pytest.approx(wanted, rel=1e-13)
+    stepper = Stepper(scene, 1e-12)
+    stepper.until(end)
+    assert stepper.omega[0] == pytest.approx(wanted, rel=1e-13)
+
+
+def test_a_state_that_rests_on_a_level_has_the_value_of_numpy() -> None:
+    scene = _ball(lambda t, omega: [0, 0, np.where(omega[2] > 1, 5.0, 0.0)], (0.0, 0.0, 1.0))
+    assert solve(scene, [10.0]).omega[0].tolist() == [0.0, 0.0, 1.0]

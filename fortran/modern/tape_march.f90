@@ -450,10 +450,15 @@ contains
     end function is_continued
 
     subroutine end_at_switch()
-      !! Let the step end where a switch changes.
-      arrives = .false.
-      at_end = .false.
-      call two_sum(t(1), factor*s%h + t(2), t_next(1), t_next(2))
+      !! Let the step end where a switch changes, or with the breakpoint that is there.
+      arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - 4.0_dp*epsilon(factor))
+      at_end = arrives .and. .not. abs(break_time) < abs(t_end)
+      if (arrives) then
+        factor = to_stop/s%h
+        t_next = [break_time, 0.0_dp]
+      else
+        call two_sum(t(1), factor*s%h + t(2), t_next(1), t_next(2))
+      end if
     end subroutine end_at_switch
 
     logical function is_continued_to_switch()
@@ -468,7 +473,7 @@ contains
         is_continued_to_switch = is_continued()
         ! The root of a touch can't be corrected.
         if (verdict /= CROSSES) return
-        if (switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
+        if (arrives .or. switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
         if (abs(correction*s%h) <= 2.0_dp*epsilon(factor)*abs(whole_step)) return
         if (.not. abs(correction) <= 0.01_dp*before) then

@@ -58,7 +58,6 @@ module tape_march
     logical :: finest = .false. ! whether the local tolerance is the smallest
     logical :: grazes = .false. ! whether an error may decide if a switch changes
     real(dp) :: slides_at = 0.0_dp ! s
-    integer :: slides_on = 0       ! number of the switch
   end type outcome_t
 
   public :: march
@@ -193,7 +192,6 @@ contains
         call next_crossing(nearly, switches, s, factor, verdict)
         if (verdict == SLIDES) then
           found%slides_at = t(1)
-          found%slides_on = switches%first
           solution%status = SLIDING
           exit
         end if
@@ -510,7 +508,7 @@ contains
 
     subroutine cross()
       !! Change the switches at the end of the step. A perturbation changes the time at which the
-      !! rates jump (Leine and Nijmeijer 2004, section 7.2).
+      !! rates jump (Leine and Nijmeijer 2004).
       real(dp) :: gradient(tape%n_unknowns), after(tape%n_unknowns), jump(tape%n_unknowns)
       real(dp) :: slope, blur
       logical :: is_changed

@@ -7,8 +7,8 @@ module tape_step
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
   use tape_plan, only: converge, fitting, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
-  use tape_switches, only: begin_switches, change, CROSSES, find_levels, find_switches, &
-                           IS_CHANGED, next_crossing, resolve_switches, SLIDES, STAYS, switches_t
+  use tape_switches, only: begin_switches, change, CROSSES, find_switches, IS_CHANGED, &
+                           next_crossing, resolve_switches, SLIDES, STAYS, switches_t, update
   implicit none(type, external)
   private
 
@@ -57,6 +57,7 @@ contains
     type(switches_t) :: switches
     integer :: failed, i, k, verdict
     logical :: is_rejected ! whether a longer step was rejected
+    logical :: is_settled, is_moved ! results of the switches
 
     step%status = OVERFLOW
     step%expansions = 0
@@ -67,6 +68,7 @@ contains
     step%order = s%order
     s%h = request%trial
     is_rejected = .false.
+    is_settled = .false.
     verdict = STAYS
     call find_switches(tape, switches, failed)
     if (failed /= 0) return
@@ -96,7 +98,12 @@ contains
       factor = min(factor, request%longest/s%h)
       call converge(tape, s%order, minval(tolerances), s%a, s%powers, factor)
       if (switches%n > 0) then
-        if (step%expansions == 1) call find_levels(switches, s, factor)
+        if (.not. is_settled) then
+          ! At the beginning, where the last step ended at a switch, but for rounding.
+          call update(factor, switches, s, is_moved)
+          if (is_moved) cycle
+          is_settled = .true.
+        end if
         call resolve_switches(LOCAL_TOLERANCE*max(1e-12_dp, request%relative), switches, s, factor)
         call next_crossing(0.0_dp, switches, s, factor, verdict)
         if (verdict == SLIDES) then

@@ -31,7 +31,7 @@ module tape_switches
     integer :: touching   !! its switch
   end type switches_t
 
-  public :: begin_switches, change, find_levels, find_switches, next_crossing, operand_error, &
+  public :: begin_switches, change, find_switches, next_crossing, operand_error, &
             resolve_switches, update
 
 contains
@@ -63,6 +63,7 @@ contains
       switches%slots(i) = tape%operations(4, n)
     end do
     switches%on_level = 0
+    switches%crosses = 0
   end subroutine find_switches
 
   pure subroutine begin_switches(i, near, switches, s)
@@ -98,28 +99,6 @@ contains
 
     nearness = ZERO_TERM*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
   end function nearness
-
-  pure subroutine find_levels(switches, s, factor)
-    !! Find the operands that are on a level but for rounding errors, at the beginning of a step.
-    type(switches_t), intent(inout) :: switches
-    type(series_t), intent(in) :: s
-    real(dp), intent(in) :: factor !! on the step
-    real(dp) :: terms(0:LAST_TERM), level
-    integer :: i
-
-    do i = 1, switches%n
-      terms = terms_from(i, LOWER, switches, s)
-      level = merge(0.0_dp, anint(terms(0)),.not. switches%is_floor(i))
-      switches%on_level(i) = 0
-      if (abs(terms(0) - level) > ZERO_TERM*size_of(terms(:s%order - 1), factor)) cycle
-      switches%on_level(i) = LOWER
-      if (switches%is_floor(i)) then
-        if (level > 0.5_dp) switches%on_level(i) = UPPER
-      else if (s%a(0, switches%slots(i)) < 0.5_dp) then
-        switches%on_level(i) = UPPER
-      end if
-    end do
-  end subroutine find_levels
 
   pure subroutine resolve_switches(relative, switches, s, factor)
     !! Reduce the factor on the step until the last terms of all operands are small.
@@ -282,7 +261,6 @@ contains
 
     if (switches%is_turned(i)) then
       verdict = SLIDES
-      switches%first = i
       return
     end if
     verdict = IS_CHANGED

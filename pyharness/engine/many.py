@@ -139,8 +139,7 @@ def solve_many(
         "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
     }  # fmt: skip
     details = None
-    if isinstance(method, str):
-        method = method.lower()
+    method = known("method", method, PREPARED)
     scene = scene if isinstance(scene, Scene) else list(scene)
     if scene and (events is not None or sensitivities is not None):
         details = Details(
@@ -260,7 +259,6 @@ def _solve_groups(
 
 def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
     """Return the kernel's code of a method and the tolerance, or raise InputError."""
-    method = known("method", method, PREPARED)
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
     asked = requested_tolerance(method, tolerance)
     if not finest <= asked <= 1.0:

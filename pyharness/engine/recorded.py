@@ -15,7 +15,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import (
     N_INPUTS,
-    SWITCHES,
     TIME,
     Functions,
     Linear,
@@ -104,7 +103,6 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     frequencies: dict[int, int] = {}  # numbers of combinations proportional to time, by slot
     waves: dict[int, int] = {}
     tables: list[Table] = []
-    n_switches = 0
 
     def combined(linear: Linear) -> int:
         terms = [(places[slot], coefficient) for slot, coefficient in linear.terms]
@@ -124,9 +122,6 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
         if table is not None:
             tables.append(table)
             first = len(tables)
-        if kind in SWITCHES:
-            n_switches += 1
-            second = n_switches
         if kind == "select":
             # The second combination follows the first.
             second, _ = (combined(Linear(0.0, ((slot, 1.0),))) for slot in operands[1:])

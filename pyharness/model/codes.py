@@ -93,7 +93,7 @@ class Operations:
     LOG = 9
     ATAN = 10
     ASIN = 11
-    # The second operand is the number of the switch. The result is constant in a step.
+    # The result is constant in a step.
     SWITCH = 12  # 1 where the operand is positive, else 0
     FLOOR = 13
     # One of two combinations of one slot, numbers operand 2 and the next: the first where operand 1

@@ -5,13 +5,13 @@ numpy.zeros. While a user's function is recorded, these functions are therefore 
 modules numpy, numpy.linalg and math. Calls from other threads, and without symbols, are passed on.
 """
 
-import importlib
 import math
 import operator
 import re
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import update_wrapper
 from typing import Any
 
 import numpy as np
@@ -49,8 +49,6 @@ def replaced_functions(with_targets: bool) -> Iterator[None]:
 
 
 def _install() -> None:
-    # It reads the signatures of the functions that are replaced.
-    importlib.import_module("numpy.ma")
     original: Callable[..., Any]
     for module, functions in _REPLACEMENTS:
         for name, function in functions.items():
@@ -78,6 +76,8 @@ class _Replaced:
 
     def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
         self._original, self._function = original, function
+        # Modules that are imported meanwhile read its name, signature and text.
+        update_wrapper(self, original)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         if getattr(_here, "targets", None) is None or not any(map(_has_symbol, given)):
@@ -236,7 +236,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
 
     def piecewise(at: Any) -> Any:
         if not isinstance(at, Symbol):
-            return np.interp(at, places, values)
+            return np.interp(at, places, values, left, right)
         if at.is_time() and left is right is None:
             slopes = [*np.diff(values) / np.diff(places), 0.0]
             pieces = [(values[0], 0.0), *zip(values, slopes, strict=True)]
@@ -249,7 +249,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
                 f"interp of {len(places)} points",
                 f"at most {_MOST_PIECES} points, torques.table for a function of time",
             )
-        found = _limited(at, places[0], places[-1]) * 0.0 + values[0]
+        found = values[0]
         for k in range(len(places) - 1):
             slope = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
             if slope:
@@ -282,7 +282,7 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
 
 
 def _solve(matrix: Any, right: Any) -> Any:
-    """Return the solution of a linear system by Cramer's rule, or by the inverse of numbers."""
+    """Return the solution of a linear system."""
     return _inverse(matrix) @ np.asarray(right, dtype=object)
 
 

@@ -6,7 +6,6 @@ change its coefficients. Any other operation has a slot for its result, only one
 
 import math
 import sys
-import sysconfig
 from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -41,7 +40,7 @@ _ALLOWED = (
     "heaviside, interp"
 )
 # Frames that are not the user's.
-_LIBRARIES = sysconfig.get_path("purelib"), str(Path(__file__).parents[1])
+_LIBRARIES = tuple(str(Path(each).parents[1]) for each in (np.__file__, __file__))
 
 
 class Recorder:

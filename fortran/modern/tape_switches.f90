@@ -172,8 +172,8 @@ contains
       do level = LOWER, UPPER
         if (.not. has_level(i, level)) cycle
         sign_of_level = merge(1, -1, level == LOWER)
-        call first_root(terms_from(i, level, switches, s), s%order, sign_of_level, &
-                        switches%on_level(i) == level, factor, nearly, root, touch)
+        call first_root(sign_of_level*terms_from(i, level, switches, s), s%order - 1, factor, &
+                        nearly, root, touch)
         roots(level, i) = root
         if (touch >= 0.0_dp .and. root > factor) then
           switches%touches = touch
@@ -343,28 +343,20 @@ contains
     terms(0) = terms(0) - level_of(i, level, switches, s)
   end function terms_from
 
-  pure subroutine first_root(given, order, side, from_root, most, nearly, root, touch)
-    !! Find the first place in a step where a polynomial changes its sign to the one opposite to
-    !! `side`. Bounds of the Taylor polynomial around the middle of an interval show that it has no
-    !! root, or is monotonic; other intervals are halved.
-    real(dp), intent(in) :: given(0:LAST_TERM)
-    integer, intent(in) :: order        !! number of the terms
-    integer, intent(in) :: side         !! sign at the beginning
-    logical, intent(in) :: from_root    !! whether the first term is zero
+  pure subroutine first_root(c, degree, most, nearly, root, touch)
+    !! Find the first place in a step where a polynomial becomes negative. Bounds of the Taylor
+    !! polynomial around the middle of an interval show that it has no root, or is monotonic; other
+    !! intervals are halved.
+    real(dp), intent(in) :: c(0:LAST_TERM)
+    integer, intent(in) :: degree
     real(dp), intent(in) :: most, nearly
     real(dp), intent(out) :: root       !! above `most` if there is none
     real(dp), intent(out) :: touch      !! where the polynomial is nearly zero, else -1
-    real(dp) :: c(0:LAST_TERM), d(0:LAST_TERM), low, high, width, r, total, spread, bend, power
-    integer :: degree, k
+    real(dp) :: d(0:LAST_TERM), low, high, width, r, total, spread, bend, power
+    integer :: k
 
     root = 2.0_dp*most
     touch = -1.0_dp
-    degree = order - 1
-    c = side*given
-    if (from_root) then
-      degree = degree - 1
-      c(:degree) = c(1:degree + 1)
-    end if
     total = size_of(c(:degree), most)
     if (c(0) > total - c(0) .or. total == 0.0_dp) return
     low = 0.0_dp

@@ -237,7 +237,7 @@ class _StateRun(Run):
             own = self._guarded(slopes)
         super().__init__(start, own, rate, end, name, effort, limit)
         self.name = name
-        self.is_smooth = torque.tape is not None and not torque.tape.n_switches
+        self.is_smooth = torque.tape is not None
         self._between = -math.inf, math.inf
         self._undefined: float | None = None
         self._integrations = 0

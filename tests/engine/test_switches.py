@@ -56,8 +56,26 @@ def test_a_touch_that_an_error_may_turn_into_a_crossing_is_sensitive() -> None:
         torque: Torque = lambda t, omega: [np.where(np.cos(t) > height, 1.0, 0.0), 0.0, 0.0]  # noqa: E731
         return solve(_ball(torque), [2.0, 8.0], tolerance=1e-10).ended
 
-    assert touched(-1.0) == "sensitive"
+    assert touched(-1.0) == touched(-1.0 - 1e-12) == "sensitive"
     assert touched(-1.1) == touched(-0.9) == "complete"
+
+
+def test_roots_of_fast_and_of_slow_operands_are_exact() -> None:
+    """A relay is off while a cosine is below a level: the impulse is known."""
+    source = np.random.default_rng(3)
+    for _ in range(60):
+        depth, speed = 10.0 ** source.uniform(-5.0, -0.1), source.uniform(0.5, 40.0)
+        tolerance = 10.0 ** source.uniform(-12.0, -4.0)
+
+        def relay(t: Any, omega: Any, speed: float = speed, depth: float = depth) -> Any:
+            return [np.where(np.cos(speed * t) > depth - 1.0, 1.0, 0.0), 0.0, 0.0]
+
+        half = math.acos(1.0 - depth) / speed
+        middles = np.arange(1, 2 * speed, 2) * math.pi / speed
+        off = np.clip(middles + half, 0.0, 5.0) - np.clip(middles - half, 0.0, 5.0)
+        found = solve(_ball(relay), [5.0], tolerance=tolerance)
+        error = abs(found.omega[0, 0] / (5.3 - off.sum()) - 1.0)
+        assert error <= 0.1 * tolerance + 1e-14 or found.ended == "sensitive"
 
 
 def test_amplification_includes_the_change_of_the_time_of_a_switch() -> None:
@@ -139,6 +157,24 @@ def test_error_is_within_the_tolerance(kind: str) -> None:
     _check(kind, "first")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_methods_of_scipy_begin_anew_at_switches(kind: str) -> None:
+    source = np.random.default_rng([5, *kind.encode()])
+    scene = Scene(kind, (0.3, -0.2, 0.9), moments=BRICK, torque=_torque(kind, source))
+    wanted = solve(scene, [6.0], tolerance=1e-13)
+    assert wanted.ended == "complete"
+    for method in ("dop853", "rk45"):
+        found = solve(scene, [6.0], method, 1e-8)
+        scale = np.abs(wanted.omega).max()
+        assert np.abs(found.omega - wanted.omega).max() <= 1e-8 * scale
+
+
+def test_methods_of_scipy_tell_of_sliding() -> None:
+    scene = _ball(lambda t, omega: [-0.1 * np.sign(omega[0]), 0.0, 0.0])
+    with pytest.raises(InputError, match="back and forth"):
+        solve(scene, [10.0], "dop853")
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("kind", KINDS)
 def test_errors_of_random_scenes_are_within_the_tolerance(kind: str) -> None:
@@ -183,6 +219,14 @@ def test_dense_output_and_events_read_the_steps() -> None:
         assert found.sol(each)[:3] == pytest.approx(solve(scene, [each]).omega[0], abs=1e-11)
 
 
+def test_event_whose_record_differs_is_called_with_numbers() -> None:
+    def event(t: Any, omega: Any) -> Any:
+        return omega[0] - (0.25 if isinstance(t, float) else 0.2)
+
+    found: Any = solve(_ball(lambda t, omega: [-0.1, 0.0, 0.0]), [2.0], events=event)
+    assert found.t_events[0] == pytest.approx([0.5])
+
+
 def test_derivatives_of_a_torque_with_switches_are_refused() -> None:
     scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
     with pytest.raises(InputError, match="switches"):
@@ -222,6 +266,7 @@ CASES: list[Torque] = [
     lambda t, w: [np.logical_or(w[0] > 1, w[1] > 0.1) * t, ~(w[0] > 1) * t, (t < w[1]) * 1.0],
     lambda t, w: [np.interp(w[0], [0, 0.2], [1, 2], right=5.0), (w[0] >= 0.5) ^ (w[1] > 9), t],
     lambda t, w: np.sqrt(np.array([w[0], 2.0, w[1]])),
+    lambda t, w: np.interp([w[0], 5.0, -5.0], [0, 1], [2, 3], left=7.0, right=8.0),
     lambda t, w: np.where(~(np.array([w[0], 1.0, 0.0]) > 0.5), 1.0, 2.0),
     lambda t, w: np.maximum(w, 0.5),
 ]  # fmt: skip
@@ -243,6 +288,16 @@ def test_new_arrays_take_symbols() -> None:
         return found + other
 
     assert recorded(torque).at(0.0, (0.5, 0, 0), (1, 0, 0, 0)) == (0.5, 1.0, 1.0)
+
+
+def test_new_array_of_integers_takes_none() -> None:
+    def torque(t: Any, omega: Any) -> Any:
+        found = np.zeros(3, dtype=int)
+        found[0] = omega[0]
+        return found
+
+    with pytest.raises(InputError, match="array of floats"):
+        recorded(torque)
 
 
 def test_numpy_is_replaced_in_the_recording_thread_alone() -> None:
@@ -279,7 +334,8 @@ def test_refusal_names_line_and_function() -> None:
 def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> None:
     def torque(t: Any, w: Any) -> Any:
         kick = np.where((t * unit) % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1] / unit)
-        return unit * unit * np.array([kick, np.arctan(w[2] / unit), -0.1]) + np.clip(
+        last = 1.0 + np.log(w[2]) - math.log(unit)
+        return unit * unit * np.array([kick, np.arctan(w[2] / unit), last]) + np.clip(
             -0.5 * unit * w, -0.1 * unit * unit, 0.1 * unit * unit
         )
 
@@ -289,7 +345,8 @@ def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> 
 
     def plain(t: Any, w: Any) -> Any:
         kick = np.where(t % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1])
-        return np.array([kick, np.arctan(w[2]), -0.1]) + np.clip(-0.5 * w, -0.1, 0.1)
+        last = 1.0 + np.log(w[2])
+        return np.array([kick, np.arctan(w[2]), last]) + np.clip(-0.5 * w, -0.1, 0.1)
 
     assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)
 

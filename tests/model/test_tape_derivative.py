@@ -10,7 +10,7 @@ import pytest
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
 from pyharness.engine.system import system_of
 from pyharness.model.dual import with_derivatives
-from pyharness.model.state_torque import StateTorque, replayed
+from pyharness.model.state_torque import StateTorque, recorded, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
 
 SLOTS = (TIME, *OMEGA, *ATTITUDE)
@@ -74,6 +74,18 @@ def test_every_operation_and_constant_outputs() -> None:
         return [first, np.sqrt(1.0 + q[1] ** 2 * t), 2.5]
 
     check(replayed(torque), Random("operations"))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_logarithms_arcs_and_switches(seed: int) -> None:
+    def torque(t: Any, w: Any, q: Any) -> Any:
+        chosen = np.where(w[0] > 0.5, w[1] * w[2], np.log(w[1]))
+        return [
+            chosen, np.arctan(w[0] * t) + np.arcsin(0.9 * q[0]),
+            np.clip(w[0] * q[1], 0.1, 0.4) + np.floor(3.0 * t) * w[2],
+        ]  # fmt: skip
+
+    check(recorded(torque), Random(f"switches {seed}"))
 
 
 def test_derivatives_of_the_equations_of_motion() -> None:

@@ -334,7 +334,7 @@ def test_refusal_names_line_and_function() -> None:
 def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> None:
     def torque(t: Any, w: Any) -> Any:
         kick = np.where((t * unit) % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1] / unit)
-        last = 1.0 + np.log(w[2]) - math.log(unit)
+        last = math.log(unit) - np.log(w[2])
         return unit * unit * np.array([kick, np.arctan(w[2] / unit), last]) + np.clip(
             -0.5 * unit * w, -0.1 * unit * unit, 0.1 * unit * unit
         )
@@ -345,7 +345,7 @@ def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> 
 
     def plain(t: Any, w: Any) -> Any:
         kick = np.where(t % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1])
-        last = 1.0 + np.log(w[2])
+        last = -np.log(w[2])
         return np.array([kick, np.arctan(w[2]), last]) + np.clip(-0.5 * w, -0.1, 0.1)
 
     assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)

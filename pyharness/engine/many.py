@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.many_alone import NO_ATTITUDE, Details, is_solved_alone, solve_one_by_one
+from pyharness.engine.many_alone import (
+    NO_ATTITUDE,
+    Details,
+    checked_copies,
+    is_solved_alone,
+    solve_one_by_one,
+)
 from pyharness.engine.many_scenes import (
     BODIES,
     TORQUES,
@@ -23,8 +29,9 @@ from pyharness.engine.many_scenes import (
 )
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
+from pyharness.engine.solve import ascending_times
 from pyharness.engine.solver import CODES, PREPARED
-from pyharness.model.arrays import check_rows, only_one, rows_of, spread, threads_of
+from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
 from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
@@ -33,7 +40,7 @@ from pyharness.model.errors import InputError, known
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
-from pyharness.model.values import Number, boolean, finite
+from pyharness.model.values import Number, Numbers, boolean, finite
 
 _STARTS = ("omega0", "attitude0")
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
@@ -41,8 +48,9 @@ _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivit
 
 def solve_many(
     scene: Scene | Sequence[Scene],
-    t_end: Any,
+    t_end: Any = None,
     *,
+    times: Numbers | None = None,
     omega0: Any = None,
     attitude0: Any = None,
     moments: Any = None,
@@ -71,6 +79,9 @@ def solve_many(
         One scene, whose values apply where no array is given; or all scenes, without arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
+    times : float or iterable of float, shape (m,)
+        Times (s) in order for all bodies instead of `t_end`. The result has a further axis, of
+        length m, after that of the bodies; its rows are those for these final times, to the bit.
     omega0 : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -107,7 +118,7 @@ def solve_many(
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
-        An earlier result for n bodies, or an array for omega, to be overwritten.
+        An earlier result for n bodies, or an array for omega, to be overwritten; not with `times`.
     progress : bool
         Whether to show a progress bar.
 
@@ -120,7 +131,8 @@ def solve_many(
     ------
     InputError
         If the arrays differ in their numbers of rows, the method can't solve the bodies, the
-        tolerance or effort is out of range, or events or sensitivities can't be computed.
+        tolerance or effort is out of range, or events or sensitivities can't be computed; or unless
+        one of `t_end` and `times` is given.
     NotBuiltError
         If the extension is not built.
 
@@ -141,22 +153,50 @@ def solve_many(
     details = None
     method = known("method", method, PREPARED)
     scene = scene if isinstance(scene, Scene) else list(scene)
+    if not only_one({"t_end": t_end, "times": times}):
+        raise InputError("neither t_end nor times is given; give one of them")
+    rows = None
+    if times is not None:
+        if out is not None:
+            raise InputError("out is given beside times; allowed: only one of the two")
+        values, turned = ascending_times(times)
+        rows = np.array(values[::-1] if turned else values)
     if scene and (events is not None or sensitivities is not None):
         details = Details(
-            scene, t_end, arrays, method=method, tolerance=tolerance, effort=effort,
-            events=events, sensitivities=sensitivities,
+            scene, t_end if rows is None else rows, arrays, method=method, tolerance=tolerance,
+            effort=effort, events=events, sensitivities=sensitivities, has_rows=rows is not None,
         )  # fmt: skip
+    bodies, ends, spread_arrays = (
+        (scene, t_end, arrays) if rows is None else _at_each_time(rows, scene, arrays)
+    )
     with bar_of_bodies(boolean("progress", progress)):
         found = _solved(
-            scene, t_end, arrays, out, step, method=method, tolerance=tolerance, effort=effort,
-            estimates=boolean("estimates", estimates), threads=threads,
+            bodies, ends, spread_arrays, out, step, method=method, tolerance=tolerance,
+            effort=effort, estimates=boolean("estimates", estimates), threads=threads,
         )  # fmt: skip
+    if rows is not None:
+        found = found.with_times(rows)
     if details is None:
         # `out` may have the details of an earlier call.
         has_details = found.t_events is not None or found.sensitivities is not None
         return replace(found, **_NO_DETAILS) if has_details else found
     with bar_of_bodies(progress):
         return details.added_to(found)
+
+
+def _at_each_time(
+    times: Array, scene: Scene | Sequence[Scene], arrays: dict[str, Any]
+) -> tuple[Scene | Sequence[Scene], Array, dict[str, Any]]:
+    """Return scenes or arrays and final times with a body for each body and time."""
+    if not isinstance(scene, Scene):
+        return [each for each in scene for _ in times], np.tile(times, len(scene)), arrays
+    rows = checked_copies(arrays)
+    n = count_bodies(rows)
+    spread_rows = {
+        name: each if len(each) == 1 else np.repeat(each, len(times), axis=0)
+        for name, each in rows.items()
+    }
+    return scene, np.tile(times, n), {**arrays, **spread_rows}
 
 
 def _solved(

@@ -136,17 +136,21 @@ class Details:
     def __init__(
         self, scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any], *, method: str,
         tolerance: Number | None, effort: float, events: object,
-        sensitivities: Iterable[str] | None,
+        sensitivities: Iterable[str] | None, has_rows: bool,
     ) -> None:  # fmt: skip
-        """Check the request; copy the arrays, which may be overwritten."""
+        """Check the request; copy the arrays, which may be overwritten.
+
+        `t_end` has the times of all bodies if `has_rows`.
+        """
         if method not in _METHODS:
             where = "sensitivities" if events is None else "events"
             raise InputError(f"{where}: the method is {method}; allowed: {', '.join(_METHODS)}")
-        self.times = rows_of("t_end", t_end).copy()
+        self.has_rows = has_rows
+        self.times = t_end[None] if has_rows else rows_of("t_end", t_end).copy()
         self.rows: dict[str, Array] = {}
         self.scenes: list[Scene] = []
         if isinstance(scene, Scene):
-            self.rows = _checked_rows(arrays)
+            self.rows = checked_copies(arrays)
             if only_one({name: arrays[name] for name in BODIES}):  # the arrays give other bodies
                 scene = replace(scene, changing=None, inertia=None, moments=(1.0, 1.0, 1.0))
             self.scene = scene
@@ -182,13 +186,14 @@ class Details:
         slopes: list[dict[str, Array] | None] = [None] * n
         refusals: dict[int, str] = {}
         expect_bodies(n)
-        for i, has_result in enumerate(found.has_result):
+        has_result = found.has_result
+        for i in range(n):
             count_done(1)
-            if not has_result:
+            if not has_result[i].all():
                 continue
             try:
                 one = solve(
-                    self._scene_of(i), float(row_of(self.times, i)), events=self.events,
+                    self._scene_of(i), row_of(self.times, i), events=self.events,
                     sensitivities=self.names, **self.settings,
                 )  # fmt: skip
             except InputError as refusal:
@@ -198,12 +203,16 @@ class Details:
                 times[k][i] = own
             for k, own in enumerate(one.y_events or []):
                 states[k][i] = own
-            slopes[i] = one.sensitivities
+            if one.sensitivities is not None:
+                rows = slice(None) if self.has_rows else 0
+                slopes[i] = {name: each[rows] for name, each in one.sensitivities.items()}
         return replace(
             found,
             t_events=None if self.events is None else times,
             y_events=None if self.events is None else states,
-            sensitivities=None if self.names is None else _stacked(self.names, slopes),
+            sensitivities=None
+            if self.names is None
+            else _stacked(self.names, slopes, self.times.shape[1:]),
             refusals=refusals,
         )
 
@@ -220,7 +229,7 @@ class Details:
         return self.scene
 
 
-def _checked_rows(arrays: dict[str, Any]) -> dict[str, Array]:
+def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return copies of the arrays, with one row for each body or for all."""
     rows = rows_of_bodies(arrays)
     for name, shape in (("coefficients", 3), ("omega0", 3), ("attitude0", 4)):
@@ -231,13 +240,15 @@ def _checked_rows(arrays: dict[str, Any]) -> dict[str, Array]:
     return {name: each.copy() for name, each in rows.items()}
 
 
-def _stacked(names: Sequence[str], slopes: Sequence[dict[str, Array] | None]) -> dict[str, Array]:
+def _stacked(
+    names: Sequence[str], slopes: Sequence[dict[str, Array] | None], rows: tuple[int, ...]
+) -> dict[str, Array]:
     known = next((each for each in slopes if each is not None), None)
     found = {}
     for name in names:
-        shape = (3, 0) if known is None else known[name].shape[1:]
+        shape = (*rows, 3, 0) if known is None else known[name].shape
         found[name] = np.full((len(slopes), *shape), np.nan)
         for i, each in enumerate(slopes):
-            if each is not None and each[name].shape[1:] == shape:
-                found[name][i] = each[name][0]
+            if each is not None and each[name].shape == shape:
+                found[name][i] = each[name]
     return found

@@ -155,7 +155,7 @@ def solve(
     if scene.inertia is not None:
         scene, axes = principal(scene)
     moments = scene.changing or scene.moments
-    values, turned = _ascending(times)
+    values, turned = ascending_times(times)
     if scene.changing is not None:
         scene.changing.check((values[0], values[-1]))
         # The reference has equations of its own for such a scene.
@@ -265,7 +265,7 @@ def _integrate(
     return unscaled(found, times, factor)
 
 
-def _ascending(times: object) -> tuple[list[float], bool]:
+def ascending_times(times: object) -> tuple[list[float], bool]:
     """Return ascending times (s), and whether they were descending; or raise InputError."""
     if _are_ascending_floats(times):
         return times.tolist(), False  # type: ignore[attr-defined]

@@ -1,12 +1,18 @@
 """The result of `solve_many`: final states of many bodies."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.arrays import buffer_of
+from pyharness.model.distribution import check_package
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array, BatchResult
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,6 +40,9 @@ class Ensemble(BatchResult):
         shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
+    times : ndarray, shape (m,), or None
+        The times (s) of the rows of all bodies. All arrays then have an axis of length m after the
+        first, such as `omega` the shape (n, m, 3).
 
     Examples
     --------
@@ -52,16 +61,101 @@ class Ensemble(BatchResult):
     y_events: list[list[Array | None]] | None = field(default=None, repr=False)
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
     refusals: dict[int, str] | None = field(default=None, repr=False)
+    times: Array | None = None
 
     @property
     def error(self) -> Array | None:
         """The estimated errors, shape (n,), as in `Trajectory`; NaN where unknown."""
-        return None if self.estimates is None else self.estimates[:, 0]
+        return None if self.estimates is None else self.estimates[..., 0]
 
     @property
     def growth(self) -> Array | None:
         """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
-        return None if self.estimates is None else self.estimates[:, 1]
+        return None if self.estimates is None else self.estimates[..., 1]
+
+    def with_times(self, times: Array) -> "Ensemble":
+        """Return the result for n bodies and m times of one for n m bodies, without copies."""
+
+        def divided(array: Any) -> Any:
+            return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
+
+        names = ("omega", "status", "attitude", "estimates")
+        return replace(self, times=times, **{name: divided(getattr(self, name)) for name in names})
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the states as a DataFrame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
+            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error` and `growth`.
+            ``attrs["units"]`` has the units.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        check_package("pandas", "to_pandas", "pip install pandas")
+        from pandas import DataFrame, MultiIndex, RangeIndex
+
+        columns = {
+            name: array.reshape(-1) for _, names, array in self._columns()
+            for name, array in zip(names, np.moveaxis(array, -1, 0), strict=True)
+        }  # fmt: skip
+        bodies = RangeIndex(len(self.omega), name="body")
+        index = (
+            bodies
+            if self.times is None
+            else MultiIndex.from_product([bodies, self.times], names=["body", "time"])
+        )
+        frame = DataFrame({**columns, "ended": self.ended.reshape(-1)}, index=index)
+        frame.attrs["units"] = {name: unit for unit, names, _ in self._columns() for name in names}
+        return frame
+
+    def _columns(self) -> list[tuple[str, tuple[str, ...], Array]]:
+        """Return unit, names and values, last axis by name, of what is present."""
+        given = (
+            ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
+            ("1", ("q0", "q1", "q2", "q3"), self.attitude),
+            ("1", ("error", "growth"), self.estimates),
+        )
+        return [(unit, names, array) for unit, names, array in given if array is not None]
+
+    def to_xarray(self) -> "Dataset":
+        """Return the states as a Dataset of xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            Its variables are `omega` (dimensions `body`, `time` if there are `times`, and `axis`),
+            `ended`, and, if present, `attitude` (`component` in place of `axis`), `error` and
+            `growth`.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        check_package("xarray", "to_xarray", "pip install xarray")
+        from xarray import Dataset
+
+        rows = ("body",) if self.times is None else ("body", "time")
+        coordinates: dict[str, Any] = {"axis": [1, 2, 3]}
+        if self.times is not None:
+            coordinates["time"] = ("time", self.times.copy(), {"units": "s"})
+        variables: dict[str, Any] = {
+            "omega": ((*rows, "axis"), self.omega.copy(), {"units": "rad/s"}),
+            "ended": (rows, self.ended),
+        }
+        if self.attitude is not None:
+            coordinates["component"] = ["q0", "q1", "q2", "q3"]
+            variables["attitude"] = ((*rows, "component"), self.attitude.copy(), {"units": "1"})
+        if self.estimates is not None:
+            variables["error"] = (rows, self.estimates[..., 0].copy())
+            variables["growth"] = (rows, self.estimates[..., 1].copy())
+        return Dataset(variables, coordinates)
 
     def estimates_of(self, piece: slice) -> Array:
         """Return the estimates of m bodies, shape (2, m), or (2, 0) if not requested."""

@@ -164,3 +164,47 @@ def test_the_garbage_collector_sees_what_the_compiled_entry_refers_to() -> None:
     kernel, fallback = gc.get_referents(entry)
     assert kernel is extension().solve_packed_many
     assert callable(fallback)
+
+
+@pytest.mark.sampled
+@pytest.mark.parametrize("name", CASES)
+def test_rows_over_time_are_those_of_final_times(name: str) -> None:
+    scene, own, names = CASES[name]
+    times = [3.0, 0.5, 0.0, -2.0]
+    found = MANY(
+        scene, times=times, omega0=STARTS, tolerance=1e-10, estimates=True, threads=2,
+        sensitivities=names, events=flip(1), **own,
+    )  # fmt: skip
+    assert found.times.tolist() == times
+    for k, time in enumerate(times):
+        one = MANY(
+            scene, time, omega0=STARTS, tolerance=1e-10, estimates=True, sensitivities=names, **own
+        )  # fmt: skip
+        assert found.omega[:, k].tobytes() == one.omega.tobytes()
+        assert found.ended[:, k].tolist() == one.ended.tolist()
+        assert np.array_equal(found.estimates[:, k], one.estimates, equal_nan=True)
+        assert (found.attitude is None) == (one.attitude is None)
+        if one.attitude is not None:
+            assert found.attitude[:, k].tobytes() == one.attitude.tobytes()
+        for each in names:
+            slopes = found.sensitivities[each]
+            wanted = one.sensitivities[each]
+            assert slopes[:, k] == pytest.approx(wanted, rel=1e-7, abs=1e-8 * abs(wanted).max())
+    frame, data = found.to_pandas(), found.to_xarray()
+    assert np.array_equal(frame.loc[2].loc[0.5, "omega1"], found.omega[2, 1, 0])
+    assert np.array_equal(data.omega.sel(body=2, time=0.5, axis=1), found.omega[2, 1, 0])
+    assert ("q3" in frame) == ("attitude" in data) == (found.attitude is not None)
+    assert data.growth.values.tobytes() == frame["growth"].to_numpy().tobytes()
+
+
+def test_scenes_have_rows_over_time() -> None:
+    scenes = [replace(TOP, torque=damping(0.1)), replace(TOP, moments=(2.0, 2.0, 1.0))]
+    found = MANY(scenes, times=[1.0, 2.0])
+    assert found.omega[:, 1].tobytes() == solve_many(scenes, 2.0).omega.tobytes()
+    assert found.omega.shape == (2, 2, 3)
+    assert solve_many(TOP, times=[1.0, 2.0], omega0=np.empty((0, 3))).omega.shape == (0, 2, 3)
+    final = solve_many(TOP, 2.0).to_pandas()
+    assert (list(final.columns), final.index.name) == (
+        ["omega1", "omega2", "omega3", "ended"], "body",
+    )  # fmt: skip
+    assert final.attrs["units"]["omega3"] == "rad/s"

@@ -9,12 +9,13 @@ module tape_march
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
+  use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
                          slot_gradient, sum_perturbations, VARIATION_TOLERANCE
-  use tape_switches, only: begin_switches, CROSSES, IS_CHANGED, next_crossing, operand_error, &
-                           resolve_switches, SLIDES, STAYS, switches_t, update
+  use tape_switches, only: CROSSES, IS_CHANGED, next_crossing, operand_error, resolve_switches, &
+                           SLIDES, STAYS, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -71,10 +72,11 @@ contains
     real(dp), intent(in) :: attitude(4)       !! at time 0
     type(attempt_t), intent(in) :: attempt
     type(series_t), intent(inout) :: s        !! working storage
-    type(switches_t), intent(inout) :: switches !! those of the tape
+    type(switches_t), intent(inout), target :: switches !! those of the tape
     type(solution_t), intent(inout) :: solution
     type(outcome_t), intent(out) :: found
     type(transitions_t) :: transitions
+    type(tape_t) :: live                      ! with the operations that matter
     real(dp) :: y(tape%n_unknowns), y_low(tape%n_unknowns) ! unknowns and their rounding errors
     real(dp) :: left(tape%n_unknowns)         ! truncation error of the step
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
@@ -114,10 +116,9 @@ contains
     s%v(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
-    do i = 1, switches%n
-      call derivatives_at(tape, t, y, t_end, s, rates)
-      call begin_switches(i, 0.0_dp, switches, s)
-    end do
+    live = tape
+    switches%part = 0.0_dp
+    if (switches%n > 0) call settle(tape, t, y, t_end, switches, s, live, rates)
     verdict = STAYS
     nearly = min(MOST_NEAR, max(NEAR, attempt%tolerance))
     scale = maxval(abs(request%omega))
@@ -133,7 +134,8 @@ contains
     from_rest = .not. scale > 0.0_dp
     do
       call set_unknowns()
-      call expand(tape, t(2), has_values, s)
+      if (switches%n > 0) call keep_live(tape, switches, s, live)
+      call expand(live, t(2), has_values, s)
       has_values = .false.
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
@@ -142,14 +144,8 @@ contains
       call weigh()
       factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
-        ! The terms are not finite.
-        tries = tries + 1
-        if (tries > MOST_TRIES) then
-          solution%status = OVERFLOW
-          exit
-        end if
-        s%a(1:, :) = 0.0_dp
-        s%h = 0.0625_dp*s%h
+        call shorten()
+        if (solution%status /= COMPLETE) exit
         cycle
       end if
       if ((found%steps == 0 .or. from_rest) .and. tries < MOST_TRIES) then
@@ -177,8 +173,13 @@ contains
                                is_short)
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
-      call converge(tape, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
+      call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
       if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
+      if (.not. factor > 0.0_dp) then
+        call shorten()
+        if (solution%status /= COMPLETE) exit
+        cycle
+      end if
       arrives = abs(factor*s%h) >= abs(to_stop)*(1.0_dp - epsilon(s%h))
       if (arrives) factor = to_stop/s%h
       at_end = arrives .and. .not. abs(break_time) < abs(t_end)
@@ -203,7 +204,7 @@ contains
         end if
         if (verdict == CROSSES) call end_at_switch()
       end if
-      call noise_of(tape, s, noise)
+      call noise_of(live, s, noise)
       if (.not. is_continued_to_switch()) then
         is_rejected = .true.
         tries = tries + 1
@@ -279,6 +280,14 @@ contains
         lanes(i + 1, i) = 1.0_dp
       end do
     end subroutine begin_block
+
+    subroutine shorten()
+      !! Try a shorter step, because the terms are not finite.
+      tries = tries + 1
+      if (tries > MOST_TRIES) solution%status = OVERFLOW
+      s%a(1:, :) = 0.0_dp
+      s%h = 0.0625_dp*s%h
+    end subroutine shorten
 
     subroutine set_unknowns()
       !! Set the terms that the expansion begins with.
@@ -438,7 +447,7 @@ contains
         return
       end if
       rounded = max(1.0_dp, maxval(weights*(size_of_terms + noise*abs(factor*s%h))))
-      call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, derivatives)
+      call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, derivatives)
       rates = derivatives
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
       defect = weights*abs(factor*s%h*derivatives - slope)
@@ -494,13 +503,15 @@ contains
       call evaluate(switches%touches, at, zero)
       at = y + (at + y_low)
       call two_sum(t(1), switches%touches*s%h + t(2), at_time(1), at_time(2))
-      call derivatives_at(tape, at_time, at, s%h, s, here)
+      call derivatives_at(live, at_time, at, s%h, s, here)
       associate (value => s%a(0, switches%slots(switches%touching)))
         value = merge(0.0_dp, 1.0_dp, value > 0.5_dp)
       end associate
-      call derivatives_at(tape, at_time, at, s%h, s, other)
+      call keep_live(tape, switches, s, live)
+      call derivatives_at(live, at_time, at, s%h, s, other)
       s%a(0, switches%slots) = slots
-      call derivatives_at(tape, t_next, y + (change + y_low), -s%h, s, rates)
+      call keep_live(tape, switches, s, live)
+      call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, rates)
       if (maxval(weights*abs(other - here))*abs(factor*s%h)*sqrt(nearly) > request%tolerance) then
         found%grazes = .true.
       end if
@@ -511,7 +522,6 @@ contains
       !! rates jump (Leine and Nijmeijer 2004).
       real(dp) :: gradient(tape%n_unknowns), after(tape%n_unknowns), jump(tape%n_unknowns)
       real(dp) :: slope, blur
-      logical :: is_changed
       integer :: i
 
       switches%on_level = 0
@@ -519,11 +529,8 @@ contains
       call slot_gradient(s%arrays, switches%operands(switches%first), gradient)
       slope = switches%slope/s%h
       blur = s%noise(switches%operands(switches%first))/slope
-      is_changed = .true.
-      do while (is_changed)
-        call derivatives_at(tape, t_next, y + y_low, s%h, s, after)
-        call update(factor, switches, s, is_changed)
-      end do
+      switches%part = factor
+      call settle(tape, t_next, y + y_low, s%h, switches, s, live, after)
       jump = after - rates
       do i = 1, SIDE_BY_SIDE
         lanes(i, :n) = lanes(i, :n) + jump*(dot_product(gradient, lanes(i, :n))/slope)

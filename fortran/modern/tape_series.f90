@@ -136,8 +136,8 @@ module tape_series
     end subroutine sum_perturbations
   end interface
 
-  public :: allocate_series, derivatives_at, expand, noise_of, perturb_tape, slot_gradient, &
-            sum_perturbations, vary_tape
+  public :: allocate_series, begin_work, chosen, derivatives_at, expand, noise_of, perturb_tape, &
+            slot_gradient, sum_perturbations, vary_tape
 
 contains
 
@@ -446,7 +446,8 @@ contains
                          + (s%noise(first) + abs(s%a(0, out))*s%noise(second)) &
                          /abs(s%a(0, second))
         case (SQUARE_ROOT)
-          s%noise(out) = abs(s%a(0, out)) + s%noise(first)/(2.0_dp*abs(s%a(0, out)))
+          s%noise(out) = abs(s%a(0, out)) &
+                         + s%noise(first)/max(tiny(1.0_dp), 2.0_dp*abs(s%a(0, out)))
         case (EXPONENTIAL)
           s%noise(out) = abs(s%a(0, out))*(EPSILON_OF_FUNCTION + s%noise(first))
         case (TANGENT)

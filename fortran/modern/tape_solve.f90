@@ -41,7 +41,7 @@ contains
     type(solution_t), pointer :: solution
     real(dp), allocatable, target :: memory(:)
     type(series_t) :: s
-    type(switches_t) :: switches
+    type(switches_t), target :: switches
     integer :: failed
     type(attempt_t) :: attempt
     type(outcome_t) :: outcome

@@ -5,10 +5,11 @@ module tape_step
   use problem, only: step_request_t, step_t
   use statuses, only: COMPLETE, OVERFLOW, SLIDING
   use tape, only: FIRST_UNKNOWN, tape_t, TIME_SLOT
+  use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, MOST_TRIES, order_for
   use tape_series, only: allocate_series, derivatives_at, expand, noise_of, series_t
-  use tape_switches, only: begin_switches, change, CROSSES, find_switches, IS_CHANGED, &
-                           next_crossing, resolve_switches, SLIDES, STAYS, switches_t, update
+  use tape_switches, only: change, CROSSES, find_switches, IS_CHANGED, next_crossing, &
+                           resolve_switches, SLIDES, STAYS, switches_t, update
   implicit none(type, external)
   private
 
@@ -54,7 +55,8 @@ contains
     type(step_t), intent(inout) :: step
     real(dp), allocatable :: tolerances(:)
     real(dp) :: factor
-    type(switches_t) :: switches
+    type(switches_t), target :: switches
+    type(tape_t) :: live ! with the operations that matter
     integer :: failed, i, k, verdict
     logical :: is_rejected ! whether a longer step was rejected
     logical :: is_settled, is_moved ! results of the switches
@@ -73,10 +75,11 @@ contains
     call find_switches(tape, switches, failed)
     if (failed /= 0) return
     s%a = 0.0_dp
-    do i = 1, switches%n
-      call derivatives_at(tape, [request%t, 0.0_dp], request%state, s%h, s, step%state)
-      call begin_switches(i, 0.0_dp, switches, s)
-    end do
+    live = tape
+    if (switches%n > 0) then
+      switches%part = 0.0_dp
+      call settle(tape, [request%t, 0.0_dp], request%state, s%h, switches, s, live, step%state)
+    end if
     do while (step%expansions < MOST_TRIES)
       ! The steps shrink to nothing before a singularity. The first trial may be short by chance.
       if (step%expansions > 0 .and. abs(s%h) <= spacing(request%t) &
@@ -86,7 +89,8 @@ contains
       s%a(0, TIME_SLOT) = request%t
       s%a(1, TIME_SLOT) = s%h
       s%a(0, FIRST_UNKNOWN:FIRST_UNKNOWN + tape%n_unknowns - 1) = request%state
-      call expand(tape, 0.0_dp, .false., s)
+      if (switches%n > 0) call keep_live(tape, switches, s, live)
+      call expand(live, 0.0_dp, .false., s)
       step%expansions = step%expansions + 1
       factor = fitting(tape, s%order, LOCAL_TOLERANCE, 1.0_dp/tolerances, s%a)
       if (.not. factor > 0.0_dp) then
@@ -96,15 +100,20 @@ contains
       end if
       if (is_rejected) factor = min(1.0_dp, factor)
       factor = min(factor, request%longest/s%h)
-      call converge(tape, s%order, minval(tolerances), s%a, s%powers, factor)
+      call converge(live, s%order, minval(tolerances), s%a, s%powers, factor)
       if (switches%n > 0) then
         if (.not. is_settled) then
           ! At the beginning, where the last step ended at a switch, but for rounding.
-          call update(factor, switches, s, is_moved)
+          switches%part = factor
+          call update(switches, s, is_moved)
           if (is_moved) cycle
           is_settled = .true.
         end if
         call resolve_switches(LOCAL_TOLERANCE*max(1e-12_dp, request%relative), switches, s, factor)
+        if (.not. factor > 0.0_dp) then
+          s%h = 0.0625_dp*s%h
+          cycle
+        end if
         call next_crossing(0.0_dp, switches, s, factor, verdict)
         if (verdict == SLIDES) then
           step%status = SLIDING
@@ -161,8 +170,8 @@ contains
         sizes = sizes + k*abs(step%terms(k, :))
       end do
       step%state = request%state + step%state
-      call derivatives_at(tape, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
-      call noise_of(tape, s, noise, abs(step%state))
+      call derivatives_at(live, [request%t + step%h, 0.0_dp], step%state, -s%h, s, derivatives)
+      call noise_of(live, s, noise, abs(step%state))
       ! NaN is not allowed.
       is_continued = all(abs(step%h*derivatives - slope) <= MOST_DEFECT*tolerances &
                          + MOST_ROUNDING*epsilon(s%h)*(sizes + abs(step%h)*noise)) &

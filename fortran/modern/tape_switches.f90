@@ -5,6 +5,7 @@ module tape_switches
   use kinds, only: dp
   use operations, only: FLOOR_OF => FLOOR, SWITCH
   use tape, only: tape_t
+  use tape_roots, only: first_root, size_of
   use tape_series, only: LAST_TERM, series_t
   implicit none(type, external)
   private
@@ -14,7 +15,6 @@ module tape_switches
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
   real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
   real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
-  real(dp), parameter :: NARROWEST = 2.0_dp**(-40) ! interval without a decision, over the step
   integer, parameter :: MOST_CUTS = 100
 
   type, public :: switches_t
@@ -24,9 +24,15 @@ module tape_switches
     integer, allocatable :: on_level(:)  !! LOWER or UPPER where the step begins there, else 0
     integer, allocatable :: crosses(:)   !! the level that the operand crosses at the step's end
     logical, allocatable :: is_turned(:) !! changed since the last step, because it did not move
+    logical, allocatable :: is_live(:)   !! whether it matters in this step
+    logical, allocatable :: is_new(:)    !! whether it matters again, and its result is an old one
+    ! All operations that matter in this step, and whether each operation of the tape does.
+    integer, allocatable :: operations(:, :)
+    logical, allocatable :: matters(:)
     ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
     integer :: first
     real(dp) :: slope
+    real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
     real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
     integer :: touching   !! its switch
   end type switches_t
@@ -52,8 +58,15 @@ contains
     if (failed == 0) allocate (switches%is_turned(switches%n), stat=failed)
     if (failed == 0) allocate (switches%on_level(switches%n), stat=failed)
     if (failed == 0) allocate (switches%crosses(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%is_live(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%is_new(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%operations(4, tape%n_operations), stat=failed)
+    if (failed == 0) allocate (switches%matters(tape%n_operations), stat=failed)
     if (failed /= 0) return
     switches%is_turned = .false.
+    switches%is_live = .false.
+    switches%is_new = .false.
+    switches%matters = .false.
     i = 0
     do n = 1, tape%n_operations
       if (tape%operations(1, n) /= SWITCH .and. tape%operations(1, n) /= FLOOR_OF) cycle
@@ -76,10 +89,13 @@ contains
     real(dp) :: level
 
     associate (operand => s%a(0, switches%operands(i)), value => s%a(0, switches%slots(i)))
+      switches%is_new(i) = .false.
       switches%on_level(i) = 0
       level = 0.0_dp
       if (switches%is_floor(i)) level = anint(operand)
-      if (abs(operand - level) <= near) then
+      if (.not. abs(operand) <= huge(operand)) then
+        value = 0.0_dp ! the derivatives are not finite
+      else if (abs(operand - level) <= near) then
         value = level
         switches%on_level(i) = merge(LOWER, UPPER, switches%is_floor(i))
       else if (switches%is_floor(i)) then
@@ -101,7 +117,8 @@ contains
   end function nearness
 
   pure subroutine resolve_switches(relative, switches, s, factor)
-    !! Reduce the factor on the step until the last terms of all operands are small.
+    !! Reduce the factor on the step until the last terms of all operands are small, or to 0 if they
+    !! are not finite.
     real(dp), intent(in) :: relative !! largest of the last two terms, over the sum of all
     type(switches_t), intent(in) :: switches
     type(series_t), intent(in) :: s
@@ -110,6 +127,7 @@ contains
     integer :: i, k, tries
 
     do i = 1, switches%n
+      if (.not. switches%is_live(i)) cycle
       do tries = 1, MOST_CUTS
         total = 0.0_dp
         last = 0.0_dp
@@ -119,6 +137,10 @@ contains
           if (k >= s%order - 2) last = max(last, power*abs(s%a(k, switches%operands(i))))
           power = factor*power
         end do
+        if (.not. total <= huge(total)) then
+          factor = 0.0_dp
+          return
+        end if
         if (.not. last > relative*total) exit
         factor = 0.75_dp*factor
       end do
@@ -132,7 +154,7 @@ contains
     type(series_t), intent(inout) :: s
     real(dp), intent(inout) :: factor
     integer, intent(out) :: verdict
-    real(dp) :: roots(2, switches%n), terms(0:LAST_TERM), root, touch
+    real(dp) :: roots(2, switches%n), terms(0:LAST_TERM), root, touch, before
     integer :: i, level, sign_of_level
 
     verdict = STAYS
@@ -141,6 +163,15 @@ contains
     switches%crosses = 0
     roots = 2.0_dp*factor
     do i = 1, switches%n
+      if (.not. switches%is_live(i)) cycle
+      if (switches%is_new(i)) then
+        before = s%a(0, switches%slots(i))
+        call begin_switches(i, nearness(i, factor, switches, s), switches, s)
+        if (s%a(0, switches%slots(i)) /= before) then
+          verdict = IS_CHANGED
+          return
+        end if
+      end if
       ! The operand may depend on another switch, and no more be on its level.
       if (switches%on_level(i) /= 0) then
         terms = terms_from(i, switches%on_level(i), switches, s)
@@ -268,10 +299,9 @@ contains
     switches%is_turned(i) = .true.
   end subroutine turn_back
 
-  pure subroutine update(factor, switches, s, is_changed)
+  pure subroutine update(switches, s, is_changed)
     !! Change the first switch whose result is not that of its operand's term 0 at the end of a
     !! step. One that crosses is changed, unless a change of another moved its operand away.
-    real(dp), intent(in) :: factor !! on the step
     type(switches_t), intent(inout) :: switches
     type(series_t), intent(inout) :: s
     logical, intent(out) :: is_changed
@@ -280,7 +310,9 @@ contains
 
     is_changed = .true.
     do i = 1, switches%n
-      near = nearness(i, factor, switches, s)
+      if (.not. switches%is_live(i)) cycle
+      near = 0.0_dp
+      if (switches%part > 0.0_dp) near = nearness(i, switches%part, switches, s)
       level = switches%crosses(i)
       if (level /= 0) then
         switches%crosses(i) = 0
@@ -342,108 +374,5 @@ contains
     terms = s%a(:, switches%operands(i))
     terms(0) = terms(0) - level_of(i, level, switches, s)
   end function terms_from
-
-  pure subroutine first_root(c, degree, most, nearly, root, touch)
-    !! Find the first place in a step where a polynomial becomes negative. Bounds of the Taylor
-    !! polynomial around the middle of an interval show that it has no root, or is monotonic; other
-    !! intervals are halved.
-    real(dp), intent(in) :: c(0:LAST_TERM)
-    integer, intent(in) :: degree
-    real(dp), intent(in) :: most, nearly
-    real(dp), intent(out) :: root       !! above `most` if there is none
-    real(dp), intent(out) :: touch      !! where the polynomial is nearly zero, else -1
-    real(dp) :: d(0:LAST_TERM), low, high, width, r, total, spread, bend, power
-    integer :: k
-
-    root = 2.0_dp*most
-    touch = -1.0_dp
-    total = size_of(c(:degree), most)
-    if (c(0) > total - c(0) .or. total == 0.0_dp) return
-    low = 0.0_dp
-    width = most
-    do while (low < most)
-      high = min(most, low + width)
-      r = 0.5_dp*(high - low)
-      d(:degree) = shifted(c(:degree), low + r)
-      spread = 0.0_dp
-      bend = 0.0_dp
-      power = r
-      do k = 1, degree
-        spread = spread + power*abs(d(k))
-        if (k > 1) bend = bend + k*(power/r)*abs(d(k))
-        power = power*r
-      end do
-      if (d(0) > spread) then
-        if (abs(d(1)) <= bend .and. d(0) <= nearly*total) touch = low + r
-        low = high
-        width = 2.0_dp*width
-      else if (degree > 0 .and. abs(d(1)) > bend .or. r <= NARROWEST*most) then
-        if (r <= NARROWEST*most) touch = low + r
-        if (value_of(c(:degree), high) < 0.0_dp) then
-          root = bisected(c(:degree), low, high)
-          return
-        end if
-        low = high
-        width = 2.0_dp*width
-      else
-        width = r
-      end if
-    end do
-  end subroutine first_root
-
-  pure real(dp) function size_of(c, part)
-    !! Return the sum of the absolute terms of a polynomial.
-    real(dp), intent(in) :: c(0:), part
-    integer :: k
-
-    size_of = 0.0_dp
-    do k = ubound(c, 1), 0, -1
-      size_of = part*size_of + abs(c(k))
-    end do
-  end function size_of
-
-  pure real(dp) function value_of(c, x)
-    real(dp), intent(in) :: c(0:), x
-    integer :: k
-
-    value_of = 0.0_dp
-    do k = ubound(c, 1), 0, -1
-      value_of = x*value_of + c(k)
-    end do
-  end function value_of
-
-  pure function shifted(c, x) result(d)
-    !! Return the coefficients of a polynomial around x (Horner's scheme).
-    real(dp), intent(in) :: c(0:), x
-    real(dp) :: d(0:ubound(c, 1))
-    integer :: j, k
-
-    d = c
-    do k = 0, ubound(c, 1) - 1
-      do j = ubound(c, 1) - 1, k, -1
-        d(j) = d(j) + x*d(j + 1)
-      end do
-    end do
-  end function shifted
-
-  pure real(dp) function bisected(c, below, above)
-    !! Return the root between a place where a polynomial is not negative and one where it is.
-    real(dp), intent(in) :: c(0:), below, above
-    real(dp) :: low, high
-    integer :: tries
-
-    low = below
-    high = above
-    do tries = 1, MOST_CUTS
-      bisected = low + 0.5_dp*(high - low)
-      if (bisected <= low .or. bisected >= high) exit
-      if (value_of(c, bisected) < 0.0_dp) then
-        high = bisected
-      else
-        low = bisected
-      end if
-    end do
-    bisected = high
-  end function bisected
 
 end module tape_switches

@@ -183,7 +183,11 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
       case LINEAR: out[k] = combined(tape, operation[1] - 1, k, a); break;
       case PRODUCT: out[k] = *sum++ + (x[k] * y[0] + x[0] * y[k]); break;
       case QUOTIENT: out[k] = (x[k] - *sum++ - y[k] * out[0]) / y[0]; break;
-      case SQRT: out[k] = (x[k] - *sum++) / (2.0 * out[0]); break;
+      case SQRT:
+        /* A norm is constant at rest. */
+        out[k] = x[k] - *sum++;
+        if (out[k]) out[k] /= 2.0 * out[0];
+        break;
       case EXP:
         /* The second slot has k times the terms of the argument. It is constant, because it is
            large, where term 0 of that slot says so. */
@@ -414,7 +418,7 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     case QUOTIENT:
       by_first = 1.0 / m[second], by_second = -m[out] * by_first, other = second;
       break;
-    case SQRT: by_first = 0.5 / m[out]; break;
+    case SQRT: by_first = m[out] ? 0.5 / m[out] : 0.0; break;
     case EXP: by_first = m[out]; break;
     case SINE_COSINE: by_first = m[out + 1], of_second = -m[out]; break;
     case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first; break;

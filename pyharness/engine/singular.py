@@ -7,7 +7,7 @@ import numpy as np
 
 from pyharness.engine.recorded import ARRAYS
 from pyharness.model.errors import TimedError
-from pyharness.model.tape import OMEGA, Tape, slot_values
+from pyharness.model.tape import OMEGA, Tape, live_slots, slot_values
 
 # An operand vanishes if its ratios to its initial value and to its value before the last step,
 # which is very short, are at most these.
@@ -56,7 +56,10 @@ def undefined_operation(
             size = step = 0.0
         return not abs(values[slot]) > min(_NEARLY_ZERO * size, _SHRUNK * step)
 
-    for kind, operands, *_ in tape.operations:
+    live = live_slots(tape, lambda slot: None, lambda slot: bool(values[slot]))
+    # What is undefined may be a branch that begins here.
+    for slot in [*live, *range(tape.n_inputs, tape.n_inputs + len(tape.operations))]:
+        kind, operands, *_ = tape.operations[slot - tape.n_inputs]
         if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
             continue
         if kind == "log" and not values[operands[0]] > 0.0:

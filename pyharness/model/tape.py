@@ -8,7 +8,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pyharness.model.functions import cosine, sine
@@ -83,6 +83,11 @@ class Tape:
         """Whether the function depends on the attitude."""
         return not self.inputs.isdisjoint(ATTITUDE)
 
+    @cached_property
+    def has_branches(self) -> bool:
+        """Whether values on which the outputs do not depend may be singular."""
+        return any(each.kind == "select" for each in self.operations)
+
     @property
     def n_switches(self) -> int:
         """The number of switches, each of which divides the states into two or more regions."""
@@ -145,20 +150,56 @@ def _combined(linear: Linear, values: Sequence[Any], functions: Functions[Any]) 
 def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:
     """Return the values of all slots of a tape."""
     values: list[Any] = list(inputs)
-    for kind, operands, linear, table in tape.operations:
-        if linear is not None:
-            values.append(_combined(linear, values, functions))
-        elif table is not None:
-            values.append(functions.table(table, values[TIME]))
-        elif kind == "product":
-            values.append(values[operands[0]] * values[operands[1]])
-        elif kind == "quotient":
-            values.append(values[operands[0]] / values[operands[1]])
-        elif kind == "select":
-            values.append(functions.select(*(values[each] for each in operands)))
-        else:
-            values.append(getattr(functions, kind)(values[operands[0]]))
+    for operation in tape.operations:
+        values.append(_result(operation, values, functions))
     return values
+
+
+def _result(operation: Operation, values: Sequence[Any], functions: Functions[Any]) -> Any:
+    kind, operands, linear, table = operation
+    if linear is not None:
+        return _combined(linear, values, functions)
+    if table is not None:
+        return functions.table(table, values[TIME])
+    if kind == "product":
+        return values[operands[0]] * values[operands[1]]
+    if kind == "quotient":
+        return values[operands[0]] / values[operands[1]]
+    if kind == "select":
+        return functions.select(*(values[each] for each in operands))
+    return getattr(functions, kind)(values[operands[0]])
+
+
+def live_slots(
+    tape: Tape, compute: Callable[[int], object], is_true: Callable[[int], bool]
+) -> list[int]:
+    """Compute the operations on which the outputs depend, operands first, and return their slots.
+
+    Of a "select" they depend on the chosen operand alone; the other may be singular. `compute` is
+    called for each slot, `is_true` for a condition that was computed.
+    """
+    known = set(range(tape.n_inputs))
+    wanted = [slot for output in tape.outputs for slot, _ in output.terms]
+    while wanted:
+        slot = wanted[-1]
+        operands: tuple[int, ...] = ()
+        if slot not in known:
+            operation = tape.operations[slot - tape.n_inputs]
+            operands = slots_of(operation)
+            if operation.kind == "select":
+                condition, first, second = operands
+                operands = (condition,)
+                if condition in known:
+                    operands = (first,) if is_true(condition) else (second,)
+        missing = [each for each in operands if each not in known]
+        if missing:
+            wanted += missing
+            continue
+        wanted.pop()
+        if slot not in known:
+            compute(slot)
+            known.add(slot)
+    return sorted(known)[tape.n_inputs :]
 
 
 def _sqrt(x: float) -> float:
@@ -225,6 +266,8 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another large
     number, unless the outputs depend on which.
     """
+    if tape.has_branches:
+        tape = _without_branches(tape, inputs)
     found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
         return found
@@ -240,6 +283,19 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     ):
         return own
     return found
+
+
+def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
+    """Return the tape with 0 in place of what does not matter for these inputs."""
+    values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
+
+    def compute(slot: int) -> None:
+        values[slot] = _result(tape.operations[slot - tape.n_inputs], values, FLOATS)
+
+    live = set(live_slots(tape, compute, lambda slot: bool(values[slot])))
+    nothing = Operation("linear", (), Linear(0.0, ()))
+    kept = enumerate(tape.operations, tape.n_inputs)
+    return replace(tape, operations=tuple(each if slot in live else nothing for slot, each in kept))
 
 
 def _saturated(kind: str, x: float) -> float:

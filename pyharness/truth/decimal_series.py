@@ -332,7 +332,7 @@ class _Equations:
     @property
     def switches(self) -> Switches | None:
         """The switches of the torque; None without."""
-        has_one = self._tape is not None and bool(self._tape.operands_of_switches())
+        has_one = self._tape is not None and self._tape.has_switches
         return Switches(self._tape) if has_one and self._tape is not None else None
 
     @property

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from decimal import Context, Decimal
 from typing import NamedTuple
 
-from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape
+from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape, live_slots
 from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine_cosine, value_at
 
 # A larger angle has no sine in any method; its reduction would take as many digits as it has.
@@ -79,6 +79,8 @@ class TapeSeries:
         `results` are those of the switches by slot, which the caller changes.
         """
         self.results = {} if results is None else results
+        self._tape = tape
+        self.has_switches = tape.n_switches > 0
         self._operations = [(each, _sum(each.linear, change)) for each in tape.operations]
         self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
@@ -93,6 +95,7 @@ class TapeSeries:
         self._powers, largest = _powers(tape)
         self.least_order = min(_MOST_ORDER, _ORDER_A_FACTOR * largest)
         self._slots: list[Row] = []
+        self._live: list[int] = []
 
     def begin(
         self, time: Decimal, omega: list[Row], attitude: list[Row], forward: bool = True
@@ -125,10 +128,19 @@ class TapeSeries:
         k = self._order
         if k > 0:
             self._slots[0].append(Decimal(k == 1))
-        for slot, (operation, linear) in enumerate(self._operations, N_INPUTS):
-            self._slots[slot].append(self._coefficient(operation, linear, slot, k))
+            for slot in self._live:
+                self._add(slot)
+        else:
+            self._live = live_slots(self._tape, self._add, lambda slot: self._slots[slot][0] != 0)
         self._order = k + 1
         return [self._combined(each, k) for each in self._outputs]
+
+    def _add(self, slot: int) -> None:
+        operation, linear = self._operations[slot - N_INPUTS]
+        self._slots[slot].append(self._coefficient(operation, linear, slot, self._order))
+
+    def _live_operations(self) -> list[tuple[int, Operation]]:
+        return [(slot, self._operations[slot - N_INPUTS][0]) for slot in self._live]
 
     def _combined(self, linear: _Sum, k: int) -> Decimal:
         constant, terms = linear
@@ -205,12 +217,8 @@ class TapeSeries:
     def operands_of_switches(self) -> list[tuple[int, bool, Row]]:
         """Return the slot of each switch, whether it is a floor, and its operand's coefficients."""
         return [
-            (
-                slot,
-                operation.kind == "floor",
-                self._slots[operation.operands[0]] if self._slots else [],
-            )
-            for slot, (operation, _) in enumerate(self._operations, N_INPUTS)
+            (slot, operation.kind == "floor", self._slots[operation.operands[0]])
+            for slot, operation in self._live_operations()
             if operation.kind in SWITCHES
         ]
 
@@ -222,7 +230,7 @@ class TapeSeries:
         order, unless the function remains invisible; so do the terms of a product of many factors,
         in the mean. A divisor has no zero in the circle around the beginning.
         """
-        for operation, _ in self._operations:
+        for _, operation in self._live_operations():
             most = self._largest_change(operation)
             if most is None:
                 continue
@@ -249,7 +257,9 @@ class TapeSeries:
             order += count * sum(k * x for k, x in enumerate(terms)) / total
             size += count * total.log10(_ROUGH)
         # A divisor that is 0 has no series.
-        divisors = [abs(self._slots[slot][0]).log10(_ROUGH) for slot in power.divisors]
+        divisors = [
+            abs(self._slots[slot][0]).log10(_ROUGH) for slot in power.divisors if self._slots[slot]
+        ]
         least = min([Decimal(0), *divisors]) - _INVISIBLE * Decimal("0.4343")
         return 2 * order > self._order and size > least
 
@@ -276,7 +286,7 @@ class TapeSeries:
         Beyond a double zero the series is the negative of the root: the series of sqrt(x**2) is x
         or -x.
         """
-        for slot, (operation, _) in enumerate(self._operations, N_INPUTS):
+        for slot, operation in self._live_operations():
             if operation.kind == "sqrt":
                 root = value_at(self._slots[slot], offset)
                 operand = value_at(self._slots[operation.operands[0]], offset)

@@ -351,6 +351,51 @@ def test_a_motion_in_another_unit_of_time_has_the_same_switches(unit: float) -> 
     assert end(torque, unit) / unit == pytest.approx(end(plain, 1.0), rel=1e-11)
 
 
+BRANCHES: dict[str, Torque] = {
+    "1/t": lambda t, w: [np.where(t > 5, 1 / t, 0.0), 0.0, 0.0],
+    "log and pole": lambda t, w: [
+        np.where(t > 1, np.where(t > 4, 1 / (t - 2), np.log(t)), 0.0), 0.0, 0.0,
+    ],
+    "root": lambda t, w: [np.where(w[0] > 1.5, np.sqrt(w[0] - 1.2), 0.3), 0.0, 0.0],
+    "arc": lambda t, w: [np.where(abs(w[1]) < 0.5, np.arcsin(2 * w[1]), 0.1), 0.0, 0.0],
+    "direction": lambda t, w: np.where(
+        np.linalg.norm(w) > 1e-9, -0.1 * w / np.linalg.norm(w), 0.0
+    ),
+    "condition": lambda t, w: [
+        np.where(t > 2, np.where(1 / (t - 1.5) > 0.5, 0.2, -0.2), 0.1), 0.0, 0.0,
+    ],
+    "exp": lambda t, w: [np.where(t < 3, 0.1, np.exp(-1000 * (t - 3))), 0.0, 0.0],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BRANCHES)
+def test_a_branch_may_be_singular_where_it_is_not_chosen(name: str) -> None:
+    scene = Scene(name, (1.0, 0.2, 0.3), moments=BRICK, torque=BRANCHES[name])
+    wanted = solve(scene, [3.0, 6.0], "reference").omega
+    found = solve(scene, [3.0, 6.0], tolerance=1e-11)
+    assert found.ended == "complete"
+    assert np.abs(found.omega - wanted).max() <= 1e-11 * np.abs(wanted).max()
+    assert solve(scene, [3.0, 6.0], "dop853", 1e-9).omega == pytest.approx(wanted, abs=1e-8)
+    stepper = Stepper(scene, tolerance=1e-11)
+    stepper.until(6.0)
+    assert stepper.omega == pytest.approx(wanted[-1], abs=1e-9)
+    batch = solve_many(scene, [3.0, 6.0], omega0=[scene.omega] * 2, tolerance=1e-11)
+    assert np.abs(batch.omega - wanted).max() <= 1e-11 * np.abs(wanted).max()
+
+
+def test_a_direction_is_guarded_at_rest() -> None:
+    scene = Scene("", (0.0, 0.0, 0.0), moments=BRICK, torque=BRANCHES["direction"])
+    for method in ("taylor", "dop853"):
+        assert solve(scene, [2.0], method).omega.tolist() == [[0.0, 0.0, 0.0]]
+
+
+def test_a_branch_that_begins_at_its_singularity_is_named() -> None:
+    torque: Torque = lambda t, w: [np.where(t > 0, np.sin(t) / t, 1.0), 0.0, 0.0]  # noqa: E731
+    found = solve(Scene("", (1.0, 0.2, 0.3), moments=BRICK, torque=torque), [2.0])
+    assert found.ended == "singular"
+    assert "0/0" in str(found.reason)
+
+
 @pytest.mark.parametrize(("law", "end", "wanted"), [
     (lambda t: np.where(np.floor(t) % 2 < 1, 1, 0), 20.0, 10.0),
     (lambda t: np.where(np.maximum(t % 2 - 1, 0) > 0, 1, 0), 20.0, 10.0),

@@ -1,0 +1,116 @@
+module tape_live
+  !! The operations of a tape that matter. Those of a branch that no SELECT chooses do not, and may
+  !! be singular: 1/t where t > 1.
+  use, intrinsic :: iso_c_binding, only: c_loc
+  use kinds, only: dp
+  use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &
+                        QUOTIENT, SELECT_OF => SELECT, TABLE
+  use tape, only: arrays_of, tape_t
+  use tape_series, only: begin_work, chosen, derivatives_at, series_t
+  use tape_switches, only: switches_t, update
+  implicit none(type, external)
+  private
+
+  public :: keep_live, settle
+
+contains
+
+  subroutine keep_live(tape, switches, s, live)
+    !! Set the tape whose operations are those that matter with the present results of switches.
+    type(tape_t), intent(in) :: tape       !! with all operations
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    logical :: is_used(tape%n_slots), matters(tape%n_operations), before
+    integer :: i, last, n
+
+    is_used = .false.
+    do n = size(tape%constants) - tape%n_unknowns + 1, size(tape%constants)
+      call use_combination(n)
+    end do
+    last = tape%n_slots
+    i = switches%n
+    do n = tape%n_operations, 1, -1
+      associate (kind => tape%operations(1, n), first => tape%operations(2, n), &
+                 second => tape%operations(3, n), out => tape%operations(4, n))
+        ! An operation may have several slots.
+        matters(n) = any(is_used(out:last))
+        last = out - 1
+        if (i > 0) then
+          if (switches%slots(i) == out) then
+            before = switches%is_live(i)
+            switches%is_live(i) = matters(n)
+            switches%is_new(i) = switches%is_new(i) .or. (matters(n) .and. .not. before)
+            i = i - 1
+          end if
+        end if
+        if (.not. matters(n)) cycle
+        select case (kind)
+        case (LINEAR)
+          call use_combination(first)
+        case (TABLE)
+          cycle
+        case (SELECT_OF)
+          is_used(first) = .true.
+          call use_combination(chosen(tape, n, s%a))
+        case (PRODUCT, QUOTIENT, LOGARITHM, ARCTANGENT, ARCSINE)
+          is_used(first) = .true.
+          is_used(second) = .true.
+        case default
+          is_used(first) = .true.
+        end select
+      end associate
+    end do
+    if (all(matters .eqv. switches%matters)) return
+    switches%matters = matters
+    i = 0
+    do n = 1, tape%n_operations
+      if (.not. matters(n)) cycle
+      i = i + 1
+      switches%operations(:, i) = tape%operations(:, n)
+    end do
+    live = tape
+    live%n_operations = i
+    live%operations => switches%operations(:, :i)
+    s%arrays = arrays_of(live, c_loc(s%a), s%arrays%v, s%arrays%work)
+    call begin_work(s%arrays, tape%n_slots)
+
+  contains
+
+    subroutine use_combination(number)
+      integer, intent(in) :: number
+      integer :: k
+
+      do k = tape%starts(number), tape%starts(number + 1) - 1
+        is_used(tape%slots(k)) = .true.
+      end do
+    end subroutine use_combination
+
+  end subroutine keep_live
+
+  subroutine settle(tape, t, y, h, switches, s, live, rates)
+    !! Change switches until each result is that of its operand, and compute the rates.
+    type(tape_t), intent(in) :: tape
+    real(dp), intent(in) :: t(2)   !! time and its rounding error, s
+    real(dp), intent(in) :: y(:)   !! unknowns
+    real(dp), intent(in) :: h      !! points to the side of which the pieces of tables are taken
+    type(switches_t), intent(inout), target :: switches
+    type(series_t), intent(inout) :: s
+    type(tape_t), intent(inout) :: live
+    real(dp), intent(out) :: rates(:)
+    logical :: is_changed
+
+    if (switches%part == 0.0_dp) then
+      live = tape
+      switches%matters = .false.
+      switches%is_live = .false.
+    end if
+    is_changed = .true.
+    do while (is_changed)
+      call keep_live(tape, switches, s, live)
+      call derivatives_at(live, t, y, h, s, rates)
+      call update(switches, s, is_changed)
+    end do
+  end subroutine settle
+
+end module tape_live

@@ -21,6 +21,7 @@ from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.errors import InputError, TimedError, printable
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
+from pyharness.model.symbols import HAS_MEMORY
 from pyharness.model.trajectory import Array, Trajectory
 
 # Ratio of the tolerance to the first local tolerance, as usual in motions of a few radians.
@@ -49,6 +50,8 @@ _UNBOUNDED = 1e3
 # Largest difference from the series of a recorded torque, in tolerances.
 _AGREEMENT = 0.5
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
+# A jump of the rates is looked for so far ahead, over the time span, by so many halvings.
+_AHEAD, _HALVINGS = 1e-3, 50
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
 # Microseconds of a right-hand side without torque, including SciPy; of an operation of a tape; and
@@ -236,6 +239,8 @@ class _StateRun(Run):
         if torque.tape is None:
             own = self._guarded(slopes)
         super().__init__(start, own, rate, end, name, effort, limit)
+        if torque.tape is None:
+            self._check_memory()
         self.name = name
         self.is_smooth = torque.tape is not None
         self._between = -math.inf, math.inf
@@ -243,6 +248,7 @@ class _StateRun(Run):
         self._integrations = 0
         self._reached, self._largest, self._stuck = 0.0, 0.0, 0
         self.with_steps = False
+        self._last = 0.0, np.array(start)
         self._solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
@@ -278,6 +284,47 @@ class _StateRun(Run):
 
         return guarded
 
+    def _check_memory(self) -> None:
+        """Raise InputError if an opaque function does not return the same for the same state."""
+        self._undefined = None
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            first = self.slopes(0.0, self.start)
+            self.slopes(0.5 * self.end, [1.5 * each for each in self.start])
+            again = self.slopes(0.0, self.start)
+        if not np.array_equal(first, again, equal_nan=True):
+            raise InputError(f"[torque]: {HAS_MEMORY}")
+
+    def work_error(self, time: float) -> TimedError:
+        """Return the exception for an exceeded work limit at `time` (s)."""
+        if self._jumps():
+            return TimedError(
+                f"{self.label}: the torque jumps back and forth at t = {{time}} s; write a smooth "
+                "function, such as tanh(x/width), or hold the torque between steps of a Stepper",
+                time,
+            )
+        return super().work_error(time)
+
+    def _jumps(self) -> bool:
+        """Return whether the rates jump near the last state."""
+        time, state = self._last
+
+        def rates(at: Array) -> Array:
+            return np.array(self.slopes(self.unit * time, at.tolist()))
+
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            low, first = state, rates(state)
+            high = state + _AHEAD * abs(self.end) * first
+            second = rates(high)
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                found = rates(middle)
+                if np.abs(found - first).max() > np.abs(second - found).max():
+                    high, second = middle, found
+                else:
+                    low, first = middle, found
+            jump = float(np.abs(second - first).max())
+            return jump > 0.1 * float(np.abs([first, second]).max())
+
     def check_undefined(self) -> None:
         """Raise InputError if an opaque function returned NaN since the last step."""
         if self._undefined is not None:
@@ -293,6 +340,7 @@ class _StateRun(Run):
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
         self._reached = time
+        self._last = time, np.array(state)
         omega = max(map(abs, state[:3]))
         if math.isfinite(omega):
             self._largest = max(self._largest, float(omega))

@@ -43,6 +43,13 @@ _ALLOWED = (
 _LIBRARIES = tuple(str(Path(each).parents[1]) for each in (np.__file__, __file__))
 
 
+HAS_MEMORY = (
+    "two calls of the function differ, or it keeps its arguments; allowed: a function of its "
+    "arguments alone, without random numbers and memory; for a controller with memory, set "
+    "held_torque of a Stepper"
+)
+
+
 class Recorder:
     """A tape during its recording."""
 
@@ -78,11 +85,7 @@ class Recorder:
 
     def impure(self) -> InputError:
         """Return the exception for a function that depends on more than its arguments."""
-        return InputError(
-            f"{self.place}: two calls of the function differ, or it keeps its arguments; allowed: "
-            "a function of its arguments alone, without random numbers and memory; for a "
-            "controller with memory, set held_torque of a Stepper"
-        )
+        return InputError(f"{self.place}: {HAS_MEMORY}")
 
     def slot(self, operation: Operation) -> int:
         """Return the slot of `operation`, which is recorded if new."""

@@ -45,10 +45,9 @@ _KINDS = {
 
 def table_values(table: Table, times: Any) -> Array:
     """Return the values of a table at an array of times (s)."""
-    breaks, pieces = np.array(table.breaks), np.array(table.pieces)
-    piece = np.maximum(0, np.searchsorted(breaks, times, side="right") - 1)
-    c0, c1, c2, c3 = pieces[piece].T
-    s = times - breaks[piece]
+    piece = np.maximum(0, np.searchsorted(table.breaks, times, side="right") - 1)
+    c0, c1, c2, c3 = table.pieces[piece].T
+    s = times - table.breaks[piece]
     found: Array = c0 + s * (c1 + s * (c2 + s * c3))
     return found
 
@@ -138,11 +137,11 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
     # f2py refuses empty arrays. The kernel does not read these entries.
-    breaks = [time for each in tables for time in each.breaks] or [0.0]
-    pieces = [number for each in tables for piece in each.pieces for number in piece] or [0.0] * 4
+    breaks = [each.breaks for each in tables] or [np.zeros(1)]
+    pieces = [each.pieces.ravel() for each in tables] or [np.zeros(4)]
     counts = [
         n_unknowns or len(tape.outputs), n_slots, len(operations), len(combinations), len(terms),
-        len(tables), len(breaks),
+        len(tables), sum(map(len, breaks)),
     ]  # fmt: skip
     packed = np.concatenate(
         [
@@ -153,8 +152,8 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
             _in_pairs(np.cumsum([1, *(len(each.breaks) for each in tables)])),
             [coefficient for _, coefficient in terms],
             [constant for constant, _ in combinations],
-            breaks,
-            pieces,
+            *breaks,
+            *pieces,
         ]
     )
     packed.flags.writeable = False

@@ -63,7 +63,7 @@ def later(torque: StateTorque, by: float) -> StateTorque:
     operations = [Operation("linear", (), Linear(by, ((TIME, 1.0),)))]
     for kind, operands, linear, table in torque.tape.operations:
         if table is not None:
-            table = Table(tuple(time - by for time in table.breaks), table.pieces)
+            table = Table(table.breaks - by, table.pieces)
         own = None if linear is None else moved_sum(linear)
         operations.append(Operation(kind, tuple(map(moved, operands)), own, table))
     outputs = tuple(map(moved_sum, torque.tape.outputs))

@@ -4,8 +4,10 @@ Each slot (input or result) has its own power of two as factor, so that none ove
 underflows.
 """
 
-import math
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
 
 from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
 
@@ -101,17 +103,18 @@ class _Scaling:
         return self._append(Operation("linear", (), self.combined(linear, exponent)))
 
     def _moved(self, table: Table) -> Table:
-        breaks = tuple(_scaled(time, -self._unit) for time in table.breaks)
-        pieces = []
-        for piece in table.pieces:
-            a, b, c, d = (_scaled(x, n * self._unit) for n, x in enumerate(piece))
-            pieces.append((a, b, c, d))
-        return Table(breaks, tuple(pieces))
+        powers = self._unit * np.arange(4)
+        return Table(_scaled_array(table.breaks, -self._unit), _scaled_array(table.pieces, powers))
 
 
 def _scaled(value: float, exponent: int) -> float:
     """Return value * 2**exponent, or raise ArithmeticError."""
-    found = math.ldexp(value, exponent)
-    if math.ldexp(found, -exponent) != value:
-        raise ArithmeticError("the product underflows")
+    return float(_scaled_array(np.float64(value), exponent))
+
+
+def _scaled_array(values: Any, exponents: Any) -> Any:
+    with np.errstate(all="ignore"):
+        found = np.ldexp(values, exponents)
+        if not np.array_equal(np.ldexp(found, -exponents), values):
+            raise ArithmeticError("the product underflows or overflows")
     return found

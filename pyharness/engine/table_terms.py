@@ -3,7 +3,6 @@
 A Taylor series begins a step where a table changes, and is as accurate as for a smooth torque.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from itertools import islice
@@ -12,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.term_input import ready_term
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.state_torque import Function, StateTorque
 from pyharness.model.symbols import SYMBOLS
 from pyharness.model.tape import Table
 from pyharness.model.values import Numbers, Triple, converted, finite, number_list, three
 
-_MOST_TIMES = 10_000
+_MOST_TIMES, _MOST_PULSES = 1_000_000, 10_000
 _LARGEST_TIME = 1e300
 # Pulses touch if at most this many spacings of floats are between the end of one and the start of
 # the next, because the sum of a start and a duration is rounded.
 _TOUCHING = 4.0
-_Cubic = tuple[float, float, float, float]
 
 
 def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linear") -> StateTorque:
@@ -34,9 +33,9 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     Parameters
     ----------
     times : iterable of numbers, shape (n,)
-        The times (s), ascending, 2 to 10 000.
+        The times (s), ascending, 2 to 1 000 000.
     values : iterable of three numbers, shape (n, 3)
-        The torque about the body axes (N m) at each time.
+        The torque about the body axes (N m) at each time; an array, list or DataFrame.
     interpolation : str
         ``held`` (constant until the next time), ``linear``, or ``cubic``: a spline whose first two
         pieces are one polynomial, as are the last two.
@@ -68,17 +67,30 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     """
     if not isinstance(interpolation, str) or interpolation not in _PIECES:
         raise unknown("interpolation", interpolation, _PIECES, "[torque] table")
-    found = _times("[torque] table times", times, 2)
-    if not all(a < b for a, b in itertools.pairwise(found)):
+    found = _times("[torque] table times", times, 2, _MOST_TIMES)
+    if not (np.diff(found) > 0.0).all():
         raise InputError("[torque] table times: not in ascending order; allowed: ascending times")
-    where = "[torque] table values"
-    given = list(islice(number_list(where, values, "allowed: a list of rows"), len(found) + 1))
-    if len(given) != len(found):
-        raise _other_number(where, "rows", len(given), len(found))
-    rows = [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
+    rows = _rows(_as_array(values), len(found))
     make = _PIECES[interpolation]
-    torque = _torque([make(found, list(axis)) for axis in zip(*rows, strict=True)])
+    torque = _torque([make(found, axis) for axis in rows.T])
     return ready_term("table", torque, times=found, values=rows, interpolation=interpolation)
+
+
+def _as_array(values: Any) -> Any:
+    """Return a DataFrame or Series as an array; iteration would give the names of columns."""
+    return values.to_numpy() if hasattr(values, "to_numpy") else values
+
+
+def _rows(values: Any, count: int) -> Array:
+    """Return a user's rows of three numbers, shape (count, 3), or raise InputError."""
+    where = "[torque] table values"
+    is_array = isinstance(values, np.ndarray) and values.dtype == float
+    if is_array and values.shape == (count, 3) and np.isfinite(values).all():
+        return np.asarray(values)
+    given = list(islice(number_list(where, values, "allowed: a list of rows"), count + 1))
+    if len(given) != count:
+        raise _other_number(where, "rows", len(given), count)
+    return np.array([three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)])
 
 
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
@@ -120,7 +132,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     >>> thruster.at(1.75, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     (0.0, 0.0, 0.0)
     """
-    begins = _times("[torque] pulses starts", starts, 1)
+    begins = _times("[torque] pulses starts", starts, 1, _MOST_PULSES).tolist()
     where = "[torque] pulses durations"
     allowed = "allowed: a list of numbers above 0, s"
     given = list(islice(number_list(where, durations, allowed), len(begins) + 1))
@@ -162,7 +174,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
         x, y, z = each
         times += [begun, ends[n]]
         values += [(factor * x, factor * y, factor * z), (0.0, 0.0, 0.0)]
-    found = _torque([_held(times, list(axis)) for axis in zip(*values, strict=True)])
+    found = _torque([_held(np.array(times), axis) for axis in np.array(values).T])
     different = any(each != torques[0] for each in torques)
     return ready_term(
         "pulses",
@@ -184,17 +196,20 @@ def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
     return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
 
 
-def _times(where: str, values: object, fewest: int) -> list[float]:
-    allowed = f"allowed: a list of {fewest} to {_MOST_TIMES} times, s"
-    given = list(islice(number_list(where, values, allowed), _MOST_TIMES + 1))
-    if not fewest <= len(given) <= _MOST_TIMES:
-        count = f"more than {_MOST_TIMES}" if len(given) > fewest else str(len(given))
+def _times(where: str, values: Any, fewest: int, most: int) -> Array:
+    allowed = f"allowed: a list of {fewest} to {most} times, s"
+    values = _as_array(values)
+    if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and values.ndim == 1:
+        values = values.tolist()
+    given = list(islice(number_list(where, values, allowed), most + 1))
+    if not fewest <= len(given) <= most:
+        count = f"more than {most}" if len(given) > fewest else str(len(given))
         raise InputError(f"{where}: {count} times; {allowed}")
-    found = [finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)]
-    if max(map(abs, found)) > _LARGEST_TIME:
+    found = np.array([finite(f"{where}, number {n}", each) for n, each in enumerate(given, 1)])
+    largest = found[np.abs(found).argmax()]
+    if abs(largest) > _LARGEST_TIME:
         raise InputError(
-            f"{where}: {max(found, key=abs):g}; allowed: from -{_LARGEST_TIME:g} to "
-            f"{_LARGEST_TIME:g} s"
+            f"{where}: {largest:g}; allowed: from -{_LARGEST_TIME:g} to {_LARGEST_TIME:g} s"
         )
     return found
 
@@ -209,44 +224,45 @@ def _before(first: float, second: float) -> float:
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
-def _held(times: list[float], values: list[float]) -> Table:
-    return Table(tuple(times), tuple((value, 0.0, 0.0, 0.0) for value in values))
+def _held(times: Array, values: Array) -> Table:
+    pieces = np.zeros((len(values), 4))
+    pieces[:, 0] = values
+    return Table(times, pieces)
 
 
-def _linear(times: list[float], values: list[float]) -> Table:
-    pieces = [
-        (a, (b - a) / (end - begin), 0.0, 0.0)
-        for (begin, end), (a, b) in zip(
-            itertools.pairwise(times), itertools.pairwise(values), strict=True
-        )
-    ]
+def _linear(times: Array, values: Array) -> Table:
+    pieces = np.zeros((len(values) - 1, 4))
+    pieces[:, 0] = values[:-1]
+    with np.errstate(all="ignore"):
+        pieces[:, 1] = np.diff(values) / np.diff(times)
     return _between(times, values, pieces)
 
 
-def _cubic(times: list[float], values: list[float]) -> Table:
+def _cubic(times: Array, values: Array) -> Table:
     # Imported late, because few scenes have a spline.
     from scipy.interpolate import CubicSpline
 
     with np.errstate(all="ignore"):
         try:
-            rows = CubicSpline(times, values).c[::-1].T.tolist()
+            pieces = CubicSpline(times, values).c[::-1].T
         except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-            rows = [[math.nan] * 4]
-    return _between(times, values, [(c0, c1, c2, c3) for c0, c1, c2, c3 in rows])
+            pieces = np.full((len(times) - 1, 4), np.nan)
+    return _between(times, values, pieces)
 
 
-def _between(times: list[float], values: list[float], pieces: Sequence[_Cubic]) -> Table:
+def _between(times: Array, values: Array, pieces: Array) -> Table:
     """Return the table with `pieces`, and constants before and after them."""
-    if not all(map(math.isfinite, itertools.chain.from_iterable(pieces))):
+    if not np.isfinite(pieces).all():
         raise InputError(
             "[torque] table: a slope or a coefficient overflows; allowed: smaller values, or times "
             "with a larger distance"
         )
-    first, last = ((value, 0.0, 0.0, 0.0) for value in (values[0], values[-1]))
-    return Table((_before(times[0], times[1]), *times), (first, *pieces, last))
+    first = _before(float(times[0]), float(times[1]))
+    ends = _held(times[[0, -1]], values[[0, -1]]).pieces
+    return Table([first, *times.tolist()], np.concatenate((ends[:1], pieces, ends[1:])))
 
 
-_PIECES: dict[str, Callable[[list[float], list[float]], Table]] = {
+_PIECES: dict[str, Callable[[Array, Array], Table]] = {
     "held": _held,
     "linear": _linear,
     "cubic": _cubic,
@@ -258,7 +274,7 @@ def _torque(axes: Sequence[Table]) -> Function:
 
     def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
         return [
-            SYMBOLS.table(each, time) if len(each.breaks) > 1 else each.pieces[0][0]
+            SYMBOLS.table(each, time) if len(each.breaks) > 1 else float(each.pieces[0, 0])
             for each in reduced
         ]
 
@@ -267,10 +283,7 @@ def _torque(axes: Sequence[Table]) -> Function:
 
 def _reduced(each: Table) -> Table:
     """Return the table without breaks between equal constants."""
-    kept: list[tuple[float, _Cubic]] = []
-    for time, piece in zip(each.breaks, each.pieces, strict=True):
-        # Equal neighbours are constants, because the table is continuous where pieces vary.
-        if not kept or kept[-1][1] != piece:
-            kept.append((time, piece))
-    breaks, pieces = zip(*kept, strict=True)
-    return Table(breaks, pieces)
+    # Equal neighbours are constants, because the table is continuous where pieces vary.
+    changes = (each.pieces[1:] != each.pieces[:-1]).any(axis=1)
+    kept = np.concatenate(([True], changes))
+    return Table(each.breaks[kept], each.pieces[kept])

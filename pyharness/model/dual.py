@@ -128,7 +128,7 @@ def _selected(condition: Any, first: Any, second: Any) -> Any:
 
 
 def _of_table(table: Table, time: Dual) -> Dual:
-    slopes = tuple((c1, 2.0 * c2, 3.0 * c3, 0.0) for _, c1, c2, c3 in table.pieces)
+    slopes = np.column_stack((table.pieces[:, 1:] * (1.0, 2.0, 3.0), np.zeros(len(table.pieces))))
     return time.chained(
         time.value.of_table(table), time.value.of_table(Table(table.breaks, slopes))
     )

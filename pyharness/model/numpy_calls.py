@@ -238,12 +238,10 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> An
         if not isinstance(at, Symbol):
             return np.interp(at, places, values, left, right)
         if at.is_time() and left is right is None:
-            slopes = [*np.diff(values) / np.diff(places), 0.0]
-            pieces = [(values[0], 0.0), *zip(values, slopes, strict=True)]
-            breaks = (float(places[0]) - 1.0, *map(float, places))
-            return at.of_table(
-                Table(breaks, tuple((float(c), float(d), 0.0, 0.0) for c, d in pieces))
-            )
+            pieces = np.zeros((len(places) + 1, 4))
+            pieces[:, 0] = values[0], *values
+            pieces[1:-1, 1] = np.diff(values) / np.diff(places)
+            return at.of_table(Table([places[0] - 1.0, *places], pieces))
         if len(places) > _MOST_PIECES:
             raise at.recorder.refusal(
                 f"interp of {len(places)} points",

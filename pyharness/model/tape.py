@@ -5,12 +5,14 @@ decimal numbers, Taylor series, or symbols again. A slot is the place of an inpu
 """
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
+
+from pyharness.model.array_type import Array
 from pyharness.model.functions import cosine, sine
 
 T = TypeVar("T")
@@ -38,15 +40,30 @@ class Linear(NamedTuple):
     terms: tuple[tuple[int, float], ...]
 
 
-class Table(NamedTuple):
-    """A function of time that consists of cubic polynomials.
+class Table:
+    """A function of time that consists of cubic polynomials, in arrays that are not changed.
 
-    Piece k is c0 + c1 s + c2 s^2 + c3 s^3, where s is the time (s) minus breaks[k]. It applies from
-    this break to the next; the first piece also before, the last without end.
+    Row k of `pieces`, shape (n, 4), has c0 to c3 of c0 + c1 s + c2 s^2 + c3 s^3, where s is the
+    time (s) minus breaks[k]. It applies from this break to the next; the first piece also before,
+    the last without end.
     """
 
-    breaks: tuple[float, ...]
-    pieces: tuple[tuple[float, float, float, float], ...]
+    def __init__(self, breaks: Any, pieces: Any) -> None:
+        """Store floats of shapes (n,) and (n, 4)."""
+        self.breaks: Array = np.asarray(breaks, dtype=float)
+        self.pieces: Array = np.asarray(pieces, dtype=float).reshape(-1, 4)
+
+    @cached_property
+    def _key(self) -> tuple[bytes, bytes]:
+        return self.breaks.tobytes(), self.pieces.tobytes()
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all bits are the same."""
+        return isinstance(other, Table) and self._key == other._key
+
+    def __hash__(self) -> int:
+        """Return the hash of the bits, which Python stores."""
+        return hash(self._key)
 
 
 class Operation(NamedTuple):
@@ -98,7 +115,8 @@ class Tape:
         """The times (s) at which a table changes, in ascending order."""
         tables = [each.table for each in self.operations if each.table is not None]
         # The first piece also holds before its break.
-        return sorted({time for table in tables for time in table.breaks[1:]})
+        times = [table.breaks[1:] for table in tables]
+        return np.unique(np.concatenate(times)).tolist() if times else []
 
 
 def slots_of(operation: Operation) -> tuple[int, ...]:
@@ -242,10 +260,10 @@ def selected(condition: float, first: float, second: float) -> float:
 
 
 def _value(table: Table, time: float) -> float:
-    piece = max(0, bisect_right(table.breaks, time) - 1)
-    c0, c1, c2, c3 = table.pieces[piece]
-    s = time - table.breaks[piece]
-    return c0 + s * (c1 + s * (c2 + s * c3))
+    piece = max(0, int(table.breaks.searchsorted(time, "right")) - 1)
+    c0, c1, c2, c3 = table.pieces[piece].tolist()
+    s = time - float(table.breaks[piece])
+    return float(c0 + s * (c1 + s * (c2 + s * c3)))
 
 
 # For arguments of type float. A division by zero raises ZeroDivisionError.

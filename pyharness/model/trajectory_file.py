@@ -185,7 +185,10 @@ def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
 def _tape_record(tape: Tape) -> dict[str, Any]:
     operations = []
     for kind, operands, linear, table in tape.operations:
-        operations.append([kind, *table] if table is not None else [kind, linear or operands])
+        own = [linear or operands]
+        if table is not None:
+            own = [table.breaks.tolist(), table.pieces.tolist()]
+        operations.append([kind, *own])
     return {"operations": operations, "outputs": tape.outputs}
 
 
@@ -236,7 +239,7 @@ def _table(breaks: Any, pieces: Any) -> Table:
     for piece, _ in zip(pieces, times, strict=True):
         c0, c1, c2, c3 = map(_number, piece)
         found.append((c0, c1, c2, c3))
-    return Table(times, tuple(found))
+    return Table(times, found)
 
 
 def _slot(value: Any, slots: int) -> int:

@@ -84,8 +84,8 @@ def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
         # The comparison of a fraction with a binary64 number is exact.
         place = (bisect_right if forward else bisect_left)(each.breaks, time)
         piece = max(0, place - 1)
-        c0, c1, c2, c3 = map(arb, each.pieces[piece])
-        s = at - arb(each.breaks[piece])
+        c0, c1, c2, c3 = map(arb, each.pieces[piece].tolist())
+        s = at - arb(float(each.breaks[piece]))
         return c0 + s * (c1 + s * (c2 + s * c3))
 
     functions = _sqrt, _exp, _tanh, _sine, _cosine, table, _log

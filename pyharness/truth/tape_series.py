@@ -85,7 +85,7 @@ class TapeSeries:
         self._outputs = [_sum(each, change) for each in tape.outputs]
         # By slot: the table, and the exact times at which its pieces begin.
         self._breaks = {
-            slot: (table, [Decimal(time) for time in table.breaks])
+            slot: (table, [Decimal(time) for time in table.breaks.tolist()])
             for slot, (_, _, _, table) in enumerate(tape.operations, N_INPUTS)
             if table is not None
         }
@@ -351,7 +351,7 @@ def _sum(linear: Linear | None, change: Decimal) -> _Sum:
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
     """Return coefficients 0 to 3 of a table's piece after (or before) `time` (s)."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
-    c0, c1, c2, c3 = map(Decimal, table.pieces[piece])
+    c0, c1, c2, c3 = map(Decimal, table.pieces[piece].tolist())
     s = time - breaks[piece]
     return [c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2 * c2 + s * 3 * c3), c2 + 3 * s * c3, +c3]
 

@@ -72,8 +72,7 @@ contains
     live = tape
     live%n_operations = i
     live%operations => switches%operations(:, :i)
-    s%arrays = arrays_of(live, c_loc(s%a), s%arrays%v, s%arrays%work)
-    call begin_work(s%arrays, tape%n_slots)
+    call use_operations(live, s)
 
   contains
 
@@ -87,6 +86,15 @@ contains
     end subroutine use_combination
 
   end subroutine keep_live
+
+  subroutine use_operations(live, s)
+    !! Compute the terms of the operations of a tape alone.
+    type(tape_t), intent(in) :: live
+    type(series_t), intent(inout) :: s
+
+    s%arrays = arrays_of(live, c_loc(s%a), s%arrays%v, s%arrays%work)
+    call begin_work(s%arrays, live%n_slots)
+  end subroutine use_operations
 
   subroutine settle(tape, t, y, h, switches, s, live, rates)
     !! Change switches until each result is that of its operand, and compute the rates.
@@ -102,8 +110,9 @@ contains
 
     if (switches%part == 0.0_dp) then
       live = tape
-      switches%matters = .false.
+      switches%matters = .true.
       switches%is_live = .false.
+      call use_operations(live, s)
     end if
     is_changed = .true.
     do while (is_changed)

@@ -17,6 +17,7 @@ from pyharness.checks.compare.findings import Comparison, ProgramFinding
 from pyharness.edition import ledger, story
 from pyharness.edition.decks import TITLES
 from pyharness.edition.package_runs import FAULTS_CASE
+from pyharness.engine.linearised import jacobians
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, largest
@@ -209,13 +210,17 @@ def _orders() -> dict[str, str]:
 
 
 def _limits() -> dict[str, dict[str, str]]:
-    """Return how the original programs converge: Runge-Kutta in Case 2, collocation in Case 5."""
+    """Return how the original programs converge: Runge-Kutta in two cases, the others in Case 5."""
     found = {}
-    for program, case in (("runge-kutta", 2), ("two-term", 5), ("four-term", 5)):
+    chosen = {
+        "runge_kutta": ("runge-kutta", 2), "runge_kutta_7": ("runge-kutta", 7),
+        "two_term": ("two-term", 5), "four_term": ("four-term", 5),
+    }  # fmt: skip
+    for name, (program, case) in chosen.items():
         measured = limit(program, case_scene(case))
         assert measured.order is not None
         last = measured.halvings[-1]
-        found[_name(program)] = {
+        found[name] = {
             "order": f"{measured.order:.2f}",
             "step_size": prose(last.step_size),
             "from_limit": prose(last.from_limit, 2),
@@ -266,9 +271,15 @@ def _share_of_largest(case: int) -> str:
 
 def _stop_test() -> dict[str, str]:
     bound = "case *: largest quotient over *"
+    lab = Laboratory(True)
+    *most, last = (
+        prose(np.linalg.norm(jacobians(lab.scene(n), lab.truth(n).omega), 2, axis=(1, 2)).max())
+        for n in range(2, 7)
+    )
     return {
         "original": _number("ii5-divergence", "original", bound),
         "corrected": _number("ii5-divergence", "corrected", bound),
+        "norms": f"{', '.join(most)} and {last}",
         "stopped": _number("iv3-guard", "original", "bounded runs stopped"),
         "needed": _number("iv3-constant-500", "corrected", "case *: constant needed (1/s)"),
     }

@@ -28,7 +28,9 @@ THESIS = ROOT.parent / "shared" / "thesis" / "thesis.txt"
 FORMULAS = (
     r"$I_1, I_2, I_3$", r"$A = (I_2 - I_3)/I_1$", r"$B = (I_3 - I_1)/I_2$",
     r"$C = (I_1 - I_2)/I_3$", r"$\frac{h}{2} F(p)$", r"$2 \sin 2.5t$",
-    r"$\sin 5t$", r"$\dot\omega = F - \frac{2}{9} t^2 Q(F)$", r"$C = 0$", r"$F_3 = 0$",
+    r"$(2 \sin 2.5t,\ 2 \cos 2.5t - 1,\ 10)$", r"$\dot p = \frac{1}{2} F(p, t)$",
+    r"$p(0) = \omega(0)$", r"$\sin 5t$", r"$\dot\omega = F - \frac{2}{9} t^2 Q(F)$",
+    r"$C = 0$", r"$F_3 = 0$",
     r"$y(t/2)$", r"$$y(0) + \int_0^t F(y(s/2))\,ds = 2\,y(t/2) - y(0).$$", r"$t/3$", r"$2t/3$",
     r"$g(s) = F + s F'F + s^2 Q(F)$", r"$g(t/3)$", r"$g(2t/3)$",
     r"$$2\,g(t/3) - g(2t/3) = F - \tfrac{2}{9} t^2 Q(F).$$",
@@ -58,7 +60,8 @@ COUNTS = (
     "with three choices", "for two terms", "for four,", "two terms",
     "as four", "about twice the time", "last fifth", "a known solution in two cases",
     "its three products", "one observation",
-    "two implementations", "one noisy scan", "second copy", "three or five terms", "the one that",
+    "two implementations", "one noisy scan", "three or five terms", "the one that",
+    "three or four terms",
     "four-term", "where one exists", "tends to zero", "are zero", "therefore zero",
     "the two errors",
 )  # fmt: skip

@@ -22,6 +22,7 @@ from pyharness.checks.theory.brouwer import LAWS, POWER, WALK, Noise, Orbit
 from pyharness.checks.tolerances import finest
 from pyharness.engine.problem import normalized
 from pyharness.engine.registry import METHODS
+from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.codes import Series
 from pyharness.model.errors import InputError
@@ -43,6 +44,7 @@ MOTIONS = {
 # Number of initial conditions of each motion. With so many, over two decades of steps, a random
 # walk is mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
+_EFFORT = 10.0  # on the work limit of the Taylor series
 # Below this number of revolutions the rounding of the result is not negligible.
 _FIT_FROM = 10**2.5
 # Half the difference between the powers for random and for biased rounding.
@@ -84,7 +86,7 @@ class Integrator:
 
 
 def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
-    found = method_candidate("taylor", METHODS["taylor"].finest).rows(scene, times)
+    found = solve(scene, times, "taylor", METHODS["taylor"].finest, effort=_EFFORT)
     return found.omega, found.steps * np.array(times) / times[-1]
 
 

@@ -161,17 +161,18 @@ contains
     switches%first = 0
     switches%touches = -1.0_dp
     switches%crosses = 0
+    do i = 1, switches%n
+      if (.not. (switches%is_live(i) .and. switches%is_new(i))) cycle
+      before = s%a(0, switches%slots(i))
+      call begin_switches(i, nearness(i, factor, switches, s), switches, s)
+      if (s%a(0, switches%slots(i)) /= before) then
+        verdict = IS_CHANGED
+        return
+      end if
+    end do
     roots = 2.0_dp*factor
     do i = 1, switches%n
       if (.not. switches%is_live(i)) cycle
-      if (switches%is_new(i)) then
-        before = s%a(0, switches%slots(i))
-        call begin_switches(i, nearness(i, factor, switches, s), switches, s)
-        if (s%a(0, switches%slots(i)) /= before) then
-          verdict = IS_CHANGED
-          return
-        end if
-      end if
       ! The operand may depend on another switch, and no more be on its level.
       if (switches%on_level(i) /= 0) then
         terms = terms_from(i, switches%on_level(i), switches, s)

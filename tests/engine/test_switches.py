@@ -383,6 +383,14 @@ def test_a_branch_may_be_singular_where_it_is_not_chosen(name: str) -> None:
     assert np.abs(batch.omega - wanted).max() <= 1e-11 * np.abs(wanted).max()
 
 
+def test_a_branch_that_begins_on_a_level_has_switches_of_its_own() -> None:
+    def torque(t: Any, omega: Any) -> Any:
+        return [np.where(omega[0] > 0.3, np.where(t > -1.0, 1.0, -1.0), 1.0), 0.0, 0.0]
+
+    scene = Scene("", (0.3, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    assert solve(scene, [2.0]).omega[0, 0] == pytest.approx(2.3)
+
+
 def test_a_direction_is_guarded_at_rest() -> None:
     scene = Scene("", (0.0, 0.0, 0.0), moments=BRICK, torque=BRANCHES["direction"])
     for method in ("taylor", "dop853"):

@@ -20,6 +20,7 @@ from docs.gallery.execution import executed, is_current, picture_file, picture_o
 from docs.text import page as about_text
 from pyharness import read_scene
 from pyharness.cli import options
+from pyharness.cli.json_help import fields
 from pyharness.cli.main import VERBS, main
 from pyharness.engine.registry import METHODS, SCIPY_METHODS
 from pyharness.history import figures
@@ -27,7 +28,7 @@ from pyharness.model.report import Report
 from pyharness.views import render as views
 from pyharness.views.render import csv_text
 from tests.conftest import Printed
-from tests.json_reference import SCHEMA, fields, meaning, schema_of
+from tests.json_reference import SCHEMA, schema_of
 
 ROOT = Path(__file__).parent.parent
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
@@ -249,8 +250,8 @@ def test_schema_describes_each_field_of_each_verb() -> None:
     assert {f"verb-{verb}" for verb in VERBS} <= set(SCHEMA["$defs"])
     for name, each in SCHEMA["$defs"].items():
         assert each["description"], name
-        for path, field in fields(each, name):
-            assert path.endswith(".schema") or meaning(field), path
+        for path, meaning in fields(SCHEMA, each, name):
+            assert meaning, path
 
 
 @pytest.mark.parametrize(("page", "text"), BUILT)

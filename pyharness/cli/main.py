@@ -91,6 +91,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str]) -> int:
     verb, *rest = arguments or ["--help"]
+    if verb == "help" and rest[:1] == ["json"]:
+        if len(rest) != 2 or rest[1] not in VERBS:
+            raise InputError(f"help json: give one verb; allowed: {', '.join(VERBS)}")
+        from pyharness.cli.json_help import json_help
+
+        sys.stdout.write(json_help(rest[1]))
+        return 0
     if verb == "help":
         verb, rest = (*rest, "--help")[0], ["--help"]
     if verb in ("-h", "--help"):
@@ -140,6 +147,7 @@ def _complete() -> int:
 
 def _overview() -> str:
     lines = ["usage: pyharness VERB [options]", "       pyharness help VERB"]
+    lines.append("       pyharness help json VERB    the fields of --format json")
     for title, verbs in _GROUPS.items():
         lines += ["", f"{title}:", *(f"  {verb:10s}{about}" for verb, about in verbs.items())]
     lines += ["", "example:", "  pyharness compare --case 3"]

@@ -57,6 +57,13 @@ def test_help_is_in_whole_sentences_and_fits(
         assert len(text.split()) >= 3, (option, text)
 
 
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_lists_the_fields_of_json(verb: str, printed: Printed) -> None:
+    told = printed(f"help json {verb}").splitlines()
+    assert "  schema" in told
+    assert max(map(len, told)) <= 100
+
+
 def test_overview_names_every_verb_once(printed: Printed) -> None:
     lines = printed("help").splitlines()
     named = [line.split()[0] for line in lines if re.match(r"  \w", line)]

@@ -59,6 +59,17 @@ def test_a_touch_that_an_error_may_turn_into_a_crossing_is_sensitive() -> None:
     assert touched(-1.0) == touched(-1.0 - 1e-12) == "sensitive"
     assert touched(-1.1) == touched(-0.9) == "complete"
 
+    def computed(t: Any, omega: Any) -> Any:
+        return [np.where(np.cos(t) > -1.0 - 1e-12, 0.1, np.exp(0.1 * t)), 0.0, 0.0]
+
+    assert solve(_ball(computed), [2.0, 8.0], tolerance=1e-10).ended == "sensitive"
+
+
+def test_a_switch_whose_operand_is_infinite_ends_the_motion() -> None:
+    found = solve(_ball(lambda t, omega: [np.floor(1.0 / t), 0.0, 0.0]), [2.0])
+    assert found.ended in ("singular", "overflow")
+    assert len(found.omega) == 0
+
 
 def test_roots_of_fast_and_of_slow_operands_are_exact() -> None:
     """A relay is off while a cosine is below a level: the impulse is known."""

@@ -284,12 +284,12 @@ def test_threads_may_use_lsoda_at_a_time() -> None:
 
 
 def test_an_opaque_torque_with_memory_is_refused() -> None:
-    total = 0.0
+    total = last = 0.0
 
     def integral(t: Any, omega: Any) -> Any:
-        nonlocal total
-        total += 0.1 * omega[0]
-        return [-total, 0.0, 0.0]
+        nonlocal total, last
+        total, last = total + omega[0] * (t - last), t
+        return [-0.1 * total, 0.0, 0.0]
 
     with pytest.raises(InputError, match="held_torque of a Stepper"):
         solve(Scene("", (1.0, 2.0, 3.0), (1.0, 2.0, 2.5), torque=opaque(integral)), [1.0])

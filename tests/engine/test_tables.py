@@ -281,6 +281,7 @@ def test_arrays_and_frames_are_those_of_lists() -> None:
         wanted = table(times.tolist(), values.tolist(), way)
         assert table(times, values, way) == wanted
         assert table(frame.index, frame, way) == wanted
+        assert table(times, 2.0 * values, way).tape != wanted.tape
         assert table(times, whole, way) == table(times, whole.tolist(), way)
 
 

@@ -12,6 +12,7 @@ from pyharness.engine.system import system_of
 from pyharness.model.dual import with_derivatives
 from pyharness.model.state_torque import StateTorque, recorded, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate
+from pyharness.torques import table
 
 SLOTS = (TIME, *OMEGA, *ATTITUDE)
 
@@ -86,6 +87,11 @@ def test_logarithms_arcs_and_switches(seed: int) -> None:
         ]  # fmt: skip
 
     check(recorded(torque), Random(f"switches {seed}"))
+
+
+def test_derivatives_of_a_spline() -> None:
+    values = np.random.default_rng(1).normal(size=(5, 3))
+    check(table([-0.2, 0.1, 0.5, 0.8, 1.1], values, "cubic"), Random("spline"))
 
 
 def test_derivatives_of_the_equations_of_motion() -> None:

@@ -40,20 +40,20 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original, with all defects (faults of its author; "
     "default), or corrected, without any.",
-    "--fix NAME,...": "Correct only these defects, readings or conjectures of the original "
-    "program (names: `pyharness defects`).",
-    "--keep NAME,...": "Keep only these defects, readings or conjectures, and correct all others.",
+    "--fix NAME,...": "Run the original program with these faults corrected and all others kept "
+    "(names: `pyharness defects`).",
+    "--keep NAME,...": "Run the original program with these faults kept and all others corrected.",
     "--reading NAME,...": "Read these doubtful statements of the original program in the other "
     "possible way (names: `pyharness defects --kind reading`; default: no statement).",
-    "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
-    "program, or none (names: `pyharness defects --kind conjecture`; default: torque-held).",
+    "--conjecture NAME,...": "Complete statements missing from the original program in these ways "
+    "(names: `pyharness defects --kind conjecture`, or none; default: torque-held).",
     "--lipschitz L": "Stop the Runge-Kutta program when a slope changes by more than L times the "
     "change of its variable; L in 1/s (default 500, as printed).",
     "--no-stop": "Omit this test, so that the Runge-Kutta program runs to its last step.",
 }
 EFFORT = {
-    "--effort F": "Multiply the work limit, beyond which a computation ends with an error, by F, "
-    "above 0 (default 1: about ten seconds, for a program half a minute)."
+    "--effort F": "Multiply the work limit of each computation by F, above 0 (default 1: some ten "
+    "seconds, 30 for a program of the thesis); beyond it the computation ends with an error."
 }
 STRICT = {
     "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance."

@@ -62,7 +62,7 @@ class Table:
         return isinstance(other, Table) and self._key == other._key
 
     def __hash__(self) -> int:
-        """Return the hash of the bits, which Python stores."""
+        """Return the hash of the bits."""
         return hash(self._key)
 
 
@@ -102,7 +102,7 @@ class Tape:
 
     @cached_property
     def has_branches(self) -> bool:
-        """Whether values on which the outputs do not depend may be singular."""
+        """Whether there is a "select", whose other operand may be singular."""
         return any(each.kind == "select" for each in self.operations)
 
     @property

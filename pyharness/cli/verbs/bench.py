@@ -25,8 +25,8 @@ _TERM_BODIES = 1000
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, s, up to 1000 (default: 3; Cases 3 and 4, with "
-    "--attitude all cases except 6, are measured to 100 too).",
+    "--horizon T": "End time of each integration, s, up to 1000 (default: 3, and also 100 for "
+    "Cases 3 and 4, with --attitude for all cases except 6).",
     "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
     "instead of the cases.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "

@@ -17,8 +17,8 @@ OPTIONS = {
     "--scene FILE": "Test the scene in this TOML file instead of our scenes, in the trials "
     f"{', '.join(SCENE_TRIALS)}. Its torque may depend on omega or attitude.",
     "--save DIR": "Save the scene with the worst result of each method in each trial as a TOML "
-    "file in this folder (default: only failures, in the folder worst).",
-    **shared.outputs(FORMATS, plot="the one trial that --only names"),
+    "file in this folder (default: only if a check fails, in the folder worst).",
+    **shared.outputs(FORMATS, plot="the trial, if --only names one,"),
 }
 EXAMPLE = "stress --only separatrix --plot separatrix.png"
 

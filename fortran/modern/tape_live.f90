@@ -6,7 +6,7 @@ module tape_live
   use operations, only: ARCSINE => ASIN, ARCTANGENT => ATAN, LINEAR, LOGARITHM => LOG, PRODUCT, &
                         QUOTIENT, SELECT_OF => SELECT, TABLE
   use tape, only: arrays_of, tape_t
-  use tape_series, only: begin_work, chosen, derivatives_at, series_t
+  use tape_series, only: begin_work, chosen, derivatives_at, series_t, value_of
   use tape_switches, only: switches_t, update
   implicit none(type, external)
   private
@@ -24,6 +24,7 @@ contains
     logical :: is_used(tape%n_slots), matters(tape%n_operations), before
     integer :: i, last, n
 
+    call set_conditions()
     is_used = .false.
     do n = size(tape%constants) - tape%n_unknowns + 1, size(tape%constants)
       call use_combination(n)
@@ -75,6 +76,28 @@ contains
     call use_operations(live, s)
 
   contains
+
+    subroutine set_conditions()
+      !! Compute what depends on the results of switches alone, such as the condition of a SELECT.
+      integer :: n
+
+      do n = 1, tape%n_operations
+        if (.not. switches%is_discrete(n)) cycle
+        associate (first => tape%operations(2, n), second => tape%operations(3, n), &
+                   out => s%a(0, tape%operations(4, n)))
+          select case (tape%operations(1, n))
+          case (LINEAR)
+            out = value_of(tape, first, s%a)
+          case (PRODUCT)
+            out = s%a(0, first)*s%a(0, second)
+          case (SELECT_OF)
+            out = value_of(tape, chosen(tape, n, s%a), s%a)
+          case default
+            cycle
+          end select
+        end associate
+      end do
+    end subroutine set_conditions
 
     subroutine use_combination(number)
       integer, intent(in) :: number

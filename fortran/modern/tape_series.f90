@@ -137,7 +137,7 @@ module tape_series
   end interface
 
   public :: allocate_series, begin_work, chosen, derivatives_at, expand, noise_of, perturb_tape, &
-            slot_gradient, sum_perturbations, vary_tape
+            slot_gradient, sum_perturbations, value_of, vary_tape
 
 contains
 

@@ -3,7 +3,7 @@ module tape_switches
   !! operand crosses one of its levels (Hairer, Norsett and Wanner 1993, section II.6). Term 0 of a
   !! switch is its result: 0 or 1 of SWITCH, a whole number of FLOOR.
   use kinds, only: dp
-  use operations, only: FLOOR_OF => FLOOR, SWITCH
+  use operations, only: FLOOR_OF => FLOOR, LINEAR, PRODUCT, SELECT_OF => SELECT, SWITCH
   use tape, only: tape_t
   use tape_roots, only: first_root, size_of
   use tape_series, only: LAST_TERM, series_t
@@ -29,6 +29,7 @@ module tape_switches
     ! All operations that matter in this step, and whether each operation of the tape does.
     integer, allocatable :: operations(:, :)
     logical, allocatable :: matters(:)
+    logical, allocatable :: is_discrete(:) !! operations that depend on results of switches alone
     ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
     integer :: first
     real(dp) :: slope
@@ -62,6 +63,7 @@ contains
     if (failed == 0) allocate (switches%is_new(switches%n), stat=failed)
     if (failed == 0) allocate (switches%operations(4, tape%n_operations), stat=failed)
     if (failed == 0) allocate (switches%matters(tape%n_operations), stat=failed)
+    if (failed == 0) allocate (switches%is_discrete(tape%n_operations), stat=failed)
     if (failed /= 0) return
     switches%is_turned = .false.
     switches%is_live = .false.
@@ -77,7 +79,37 @@ contains
     end do
     switches%on_level = 0
     switches%crosses = 0
+    call find_discrete(tape, switches%is_discrete)
   end subroutine find_switches
+
+  pure subroutine find_discrete(tape, is_discrete)
+    !! Find the operations that depend on the results of switches alone.
+    type(tape_t), intent(in) :: tape
+    logical, intent(out) :: is_discrete(:)
+    logical :: of_slot(tape%n_slots)
+    integer :: n
+
+    of_slot = .false.
+    do n = 1, tape%n_operations
+      associate (first => tape%operations(2, n), second => tape%operations(3, n), &
+                 starts => tape%starts, slots => tape%slots)
+        select case (tape%operations(1, n))
+        case (SWITCH, FLOOR_OF)
+          is_discrete(n) = .true.
+        case (LINEAR)
+          is_discrete(n) = all(of_slot(slots(starts(first):starts(first + 1) - 1)))
+        case (PRODUCT)
+          is_discrete(n) = of_slot(first) .and. of_slot(second)
+        case (SELECT_OF)
+          is_discrete(n) = of_slot(first) &
+                           .and. all(of_slot(slots(starts(second):starts(second + 2) - 1)))
+        case default
+          is_discrete(n) = .false.
+        end select
+        of_slot(tape%operations(4, n)) = is_discrete(n)
+      end associate
+    end do
+  end subroutine find_discrete
 
   pure subroutine begin_switches(i, near, switches, s)
     !! Set the result of a switch by the value of its operand. On a level, or as near to one as
@@ -247,12 +279,13 @@ contains
     end function has_level
 
     pure logical function leaves(i)
-      !! Return whether an operand on a level moves to the side of its result.
+      !! Return whether an operand on a level moves to the side of its result, or remains where the
+      !! result is that of NumPy.
       integer, intent(in) :: i
       real(dp) :: terms(0:LAST_TERM), total, power
       integer :: k
 
-      leaves = .true.
+      leaves = switches%on_level(i) == merge(LOWER, UPPER, switches%is_floor(i))
       terms = terms_from(i, switches%on_level(i), switches, s)
       total = 0.0_dp
       power = 1.0_dp

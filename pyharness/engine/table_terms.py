@@ -73,7 +73,9 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     rows = _rows(_as_array(values), len(found))
     make = _PIECES[interpolation]
     torque = _torque([make(found, axis) for axis in rows.T])
-    return ready_term("table", torque, times=found, values=rows, interpolation=interpolation)
+    return ready_term(
+        "table", torque, times=found, values=rows.tolist(), interpolation=interpolation
+    )
 
 
 def _as_array(values: Any) -> Any:
@@ -84,7 +86,7 @@ def _as_array(values: Any) -> Any:
 def _rows(values: Any, count: int) -> Array:
     """Return a user's rows of three numbers, shape (count, 3), or raise InputError."""
     where = "[torque] table values"
-    is_array = isinstance(values, np.ndarray) and values.dtype == float
+    is_array = type(values) is np.ndarray and values.dtype == float
     if is_array and values.shape == (count, 3) and np.isfinite(values).all():
         return np.asarray(values)
     given = list(islice(number_list(where, values, "allowed: a list of rows"), count + 1))
@@ -199,7 +201,7 @@ def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
 def _times(where: str, values: Any, fewest: int, most: int) -> Array:
     allowed = f"allowed: a list of {fewest} to {most} times, s"
     values = _as_array(values)
-    if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and values.ndim == 1:
+    if type(values) is np.ndarray and values.dtype.kind in "iuf" and values.ndim == 1:
         values = values.tolist()
     given = list(islice(number_list(where, values, allowed), most + 1))
     if not fewest <= len(given) <= most:

@@ -284,9 +284,18 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another large
     number, unless the outputs depend on which.
     """
+    found: list[float] = []
+    try:
+        found = evaluate(tape, inputs, FLOATS)
+    except ZeroDivisionError:
+        if not tape.has_branches:
+            raise
+    if found and all(map(math.isfinite, found)):
+        return found
     if tape.has_branches:
+        # A branch that is not chosen may be singular.
         tape = _without_branches(tape, inputs)
-    found = evaluate(tape, inputs, FLOATS)
+        found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
         return found
     own, other, large, moderate = (

@@ -56,14 +56,15 @@ class Switches:
 
         Raise TimedError if neither side leaves it.
         """
-        for slot, _, x in self._tape.operands_of_switches():
+        for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
             if level is None:
                 continue
             terms = [each * length**k for k, each in enumerate(x)][1:]
             total = sum(map(abs, terms))
             first = next((each for each in terms if abs(each) > _ZERO * total), Decimal(0))
-            if first == 0 or (first > 0) == (level < 0):
+            # An operand that remains on its level has the result of NumPy.
+            if (is_floor if first == 0 else first > 0) == (level < 0):
                 continue
             if slot in self._turned:
                 raise TimedError(f"reference: {SLIDING}", float(time))

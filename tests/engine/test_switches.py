@@ -3,6 +3,7 @@
 import math
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -375,6 +376,14 @@ BRANCHES: dict[str, Torque] = {
     "condition": lambda t, w: [
         np.where(t > 2, np.where(1 / (t - 1.5) > 0.5, 0.2, -0.2), 0.1), 0.0, 0.0,
     ],
+    "not after": lambda t, w: [np.where(t <= 0, 0.0, np.cos(t)), 0.0, 0.0],
+    "and": lambda t, w: [np.where((np.sin(2.86 * t) > -0.679) & (w[2] > 0.1), np.cos(t), 0), 0, 0],
+    "not": lambda t, w: [np.where(~(np.sin(3 * t) > 0), 0, np.cos(t)), 0.0, 0.0],
+    "jump": lambda t, w: [np.where(w[0] <= 1.5, np.cos(w[1]) * 0.2, 1 - 0.3 * np.sin(t)), 0, 0],
+    "at rest on a level": lambda t, w: [np.where(np.clip(t, 0, 1) > 1, 1.0, 0.1), 0.0, 0.0],
+    "at rest on levels": lambda t, w: [
+        np.floor(np.clip(t, 0, 1.0)) * 0.5 + np.floor(np.clip(-t, -2, 0.0)), 0.0, 0.0,
+    ],
     "exp": lambda t, w: [np.where(t < 3, 0.1, np.exp(-1000 * (t - 3))), 0.0, 0.0],
 }  # fmt: skip
 
@@ -385,6 +394,10 @@ def test_a_branch_may_be_singular_where_it_is_not_chosen(name: str) -> None:
     wanted = solve(scene, [3.0, 6.0], "reference").omega
     found = solve(scene, [3.0, 6.0], tolerance=1e-11)
     assert found.ended == "complete"
+    moved = replace(scene, omega=(1.0 + 1e-6, 0.2, 0.3))
+    change = np.abs(solve(moved, [3.0, 6.0], tolerance=1e-11).omega - found.omega).max() / 1e-6
+    assert found.growth is not None
+    assert found.growth >= 0.99 * change
     assert np.abs(found.omega - wanted).max() <= 1e-11 * np.abs(wanted).max()
     assert solve(scene, [3.0, 6.0], "dop853", 1e-9).omega == pytest.approx(wanted, abs=1e-8)
     stepper = Stepper(scene, tolerance=1e-11)

@@ -283,6 +283,12 @@ def test_arrays_and_frames_are_those_of_lists() -> None:
         assert table(frame.index, frame, way) == wanted
         assert table(times, 2.0 * values, way).tape != wanted.tape
         assert table(times, whole, way) == table(times, whole.tolist(), way)
+    masked = np.ma.masked_greater(values[:3], 2.0 * values.max())
+    assert table([0, 1, 2], masked) == table([0, 1, 2], values[:3])
+    with pytest.raises(InputError, match="values"):
+        table([0, 1, 2], np.ma.masked_less(values[:3], 0.0))
+    diagonal = table([0, 1, 2], np.eye(3))
+    assert diagonal.terms == table([0, 1, 2], np.eye(3).tolist()).terms
 
 
 def test_a_long_table_is_solved_piece_by_piece() -> None:

@@ -87,10 +87,13 @@ def taylor_series(
         length = equations.reach(length)
         length = length.copy_sign(times[-1])
         if switches is not None:
-            if switches.turns(begin, length):
-                is_settled = False
+            try:
+                is_settled = not switches.turns(begin, length)
+                length = switches.end(length) if is_settled else length
+            except ArithmeticError:  # an operand is infinite
+                return rows
+            if not is_settled:
                 continue
-            length = switches.end(length)
         if begin + length == begin and rest:
             return rows
         limit.check(step, stops, begin, length, rest)

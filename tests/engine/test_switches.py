@@ -135,6 +135,11 @@ def _torque(kind: str, source: np.random.Generator) -> Torque:
             c[0] + 0.3 * limit * np.where(w[0] + 0.5 * w[1] > 0.3 * np.sin(speed * t), 1.0, -1.0),
             c[1] * np.cos(t), c[2] * np.sin(2.0 * t),
         ],
+        "branches": lambda t, w: [
+            np.where((w[0] <= c[0]) | ~(np.sin(speed * t) > c[1]), c[2] / (3.0 + w[1]), -k * w[0]),
+            np.where((t > at) & (w[2] >= c[1]), np.where(w[0] < c[2], np.log(t), 0.1), c[0] * w[2]),
+            np.where(np.clip(w[1], -wide, wide) * speed > wide, np.exp(-w[2]), np.cos(t)) * limit,
+        ],
         "functions": lambda t, w: [
             0.1 * np.log(40.0 + w[0] * w[1]), 0.1 * np.arctan(3.0 * w[1]),
             -0.1 * np.arcsin(0.9 * np.sin(w[2])) - 0.05 * (w @ w) ** 0.75,
@@ -143,7 +148,8 @@ def _torque(kind: str, source: np.random.Generator) -> Torque:
 
 
 KINDS = (
-    "clip", "dead zone", "where", "time", "interp", "abs", "extremes", "relay", "functions",
+    "clip", "dead zone", "where", "time", "interp", "abs", "extremes", "relay", "branches",
+    "functions",
 )  # fmt: skip
 
 

@@ -187,7 +187,7 @@ contains
     real(dp), intent(inout) :: factor
     integer, intent(out) :: verdict
     real(dp) :: roots(2, switches%n), terms(0:LAST_TERM), root, touch, before
-    integer :: i, level, sign_of_level
+    integer :: degree, i, level, sign_of_level
 
     verdict = STAYS
     switches%first = 0
@@ -236,8 +236,14 @@ contains
       do level = LOWER, UPPER
         if (.not. has_level(i, level)) cycle
         sign_of_level = merge(1, -1, level == LOWER)
-        call first_root(sign_of_level*terms_from(i, level, switches, s), s%order - 1, factor, &
-                        nearly, root, touch)
+        terms = sign_of_level*terms_from(i, level, switches, s)
+        ! The root at the beginning is known, but for rounding.
+        degree = s%order - 1
+        if (switches%on_level(i) == level) then
+          terms(0:degree - 1) = terms(1:degree)
+          degree = degree - 1
+        end if
+        call first_root(terms, degree, factor, nearly, root, touch)
         roots(level, i) = root
         if (touch >= 0.0_dp .and. root > factor) then
           switches%touches = touch

@@ -66,6 +66,16 @@ def test_a_touch_that_an_error_may_turn_into_a_crossing_is_sensitive() -> None:
     assert solve(_ball(computed), [2.0, 8.0], tolerance=1e-10).ended == "sensitive"
 
 
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
+def test_a_touch_on_either_side_of_a_level_ends_no_step_twice(tolerance: float) -> None:
+    def steps(t: Any, omega: Any) -> Any:
+        return [np.where(np.sin(t) > 0.3, 0.1 * np.floor(3.0 / np.sin(t)), 0.0), 0.0, 0.0]
+
+    found = solve(_ball(steps), [3.0], tolerance=tolerance)
+    assert found.ended == "sensitive"
+    assert found.steps < 100
+
+
 def test_a_switch_whose_operand_is_infinite_ends_the_motion() -> None:
     found = solve(_ball(lambda t, omega: [np.floor(1.0 / t), 0.0, 0.0]), [2.0])
     assert found.ended in ("singular", "overflow")

@@ -287,6 +287,7 @@ class _StateRun(Run):
     def _check_memory(self) -> None:
         """Raise InputError if an opaque function does not return the same for the same state."""
         self._undefined = None
+        self.evaluations += 3
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             first = self.slopes(0.0, self.start)
             self.slopes(0.5 * self.end, [1.5 * each for each in self.start])

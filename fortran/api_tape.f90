@@ -1,10 +1,11 @@
 ! The interface that f2py reads for scenes whose equations of motion are a tape.
 
 subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_attitudes, &
-                     attitudes, effort, n_nodes, nodes, n, most, ends, at_nodes, rows, n_rows, &
-                     status, steps, n_steps)
-  ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude at `times`, which
-  ! have one sign and are ordered away from 0. If most > 0, the unknowns at nodes of each step too.
+                     attitudes, n_own, own_sizes, n_own_times, own, effort, n_nodes, nodes, n, &
+                     most, ends, at_nodes, rows, n_rows, status, steps, n_steps)
+  ! Integrate a tape by Taylor series: omega and, if n_attitudes > 0, the attitude, and n_own states
+  ! of the user's own, at `times`, which have one sign and are ordered away from 0. If most > 0, the
+  ! unknowns at nodes of each step too.
   !f2py threadsafe
   use levels, only: tape_solve
   use problem, only: request_nodes, request_t, solution_t
@@ -18,6 +19,11 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   real(8), intent(in) :: tolerance              ! allowed error: relative, and of the angle in rad
   integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
   real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
+  integer(4), intent(in) :: n_own               ! own states
+  ! Least sizes to which their errors are relative. f2py has no arrays of size 0: the last is unused.
+  real(8), intent(in), target :: own_sizes(n_own + 1)
+  integer(4), intent(in) :: n_own_times         ! n_times, or 0 without own states
+  real(8), intent(inout), target :: own(n_own + 1, n_own_times + 1) ! as attitudes; last row unused
   real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
   ! (3) estimated error, (4) error amplification, (5) steps of all integrations
   integer(4), intent(in) :: n_nodes
@@ -35,6 +41,10 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
 
   solution%rows => rows
   if (n_attitudes > 0) solution%attitudes(1:4, 0:n_attitudes) => attitudes
+  if (n_own > 0) then
+    solution%own(1:n_own + 1, 0:n_own_times) => own
+    solution%own_sizes => own_sizes
+  end if
   if (most > 0) call request_nodes(solution, nodes, ends, at_nodes)
   call tape_solve(tape_of(numbers), request_t(omega0, tolerance, effort(1), times), solution)
   n_rows = solution%n_rows

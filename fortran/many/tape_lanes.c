@@ -74,11 +74,11 @@ struct group {
   series *a;                      /* terms of each slot */
   int *depends;                   /* of each slot: the unknowns on which it depends, as bits */
   lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
-  lanes y[MOST_UNKNOWNS], low[MOST_UNKNOWNS]; /* unknowns and their rounding errors */
-  lanes error[MOST_UNKNOWNS];     /* truncation error, propagated so far */
-  lanes probes[PROBES][MOST_UNKNOWNS]; /* perturbations since time 0 */
-  lanes slope[MOST_UNKNOWNS];     /* derivatives times the step at its end, by the last series */
-  lanes weights[MOST_UNKNOWNS];   /* make the unknowns comparable */
+  lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
+  lanes error[WITH_ATTITUDE];     /* truncation error, propagated so far */
+  lanes probes[PROBES][WITH_ATTITUDE]; /* perturbations since time 0 */
+  lanes slope[WITH_ATTITUDE];     /* derivatives times the step at its end, by the last series */
+  lanes weights[WITH_ATTITUDE];   /* make the unknowns comparable */
   lanes end, t, t_low, rest, h, previous, scale, local, allowed, worst, noise;
   lanes growth;                   /* square of the amplification */
   bits is_first;                  /* before the first step */
@@ -404,7 +404,7 @@ static void find_dependences(struct group *g)
 }
 
 /* Compute the derivatives of the rates by the unknowns amid the step, times the step. */
-static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][MOST_UNKNOWNS])
+static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_ATTITUDE])
 {
   const struct tape *tape = &g->all->tape;
   const lanes half = 0.5 * factor, step = factor * g->h;
@@ -490,10 +490,10 @@ static void set_truncation(const struct group *g, lanes factor, lanes *left)
 
 /* Replace vectors by the products of the exponential of a matrix and each vector. */
 static inline __attribute__((always_inline)) void carry_of(const int n,
-                                                           lanes matrix[][MOST_UNKNOWNS],
-                                                           lanes vectors[][MOST_UNKNOWNS])
+                                                           lanes matrix[][WITH_ATTITUDE],
+                                                           lanes vectors[][WITH_ATTITUDE])
 {
-  lanes sums[VECTORS][MOST_UNKNOWNS], next[VECTORS][MOST_UNKNOWNS];
+  lanes sums[VECTORS][WITH_ATTITUDE], next[VECTORS][WITH_ATTITUDE];
   memcpy(sums, vectors, sizeof sums);
   for (int k = CARRIED; k > 0; k--) {
     const double part = 1.0 / k;
@@ -516,11 +516,11 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
   memcpy(vectors, sums, sizeof sums);
 }
 
-static void carry(int n, lanes matrix[][MOST_UNKNOWNS],
-                                            lanes vectors[][MOST_UNKNOWNS])
+static void carry(int n, lanes matrix[][WITH_ATTITUDE],
+                                            lanes vectors[][WITH_ATTITUDE])
 {
   if (n == 3) carry_of(3, matrix, vectors);
-  else carry_of(MOST_UNKNOWNS, matrix, vectors);
+  else carry_of(WITH_ATTITUDE, matrix, vectors);
 }
 
 /* Set the time, the unknowns and term 0 of all slots. */
@@ -570,8 +570,8 @@ static lanes ended(struct group *g, lanes factor, bits *arrives, bits *at_end, l
 static void step(struct group *g)
 {
   const int n = g->n, order = g->order;
-  lanes jacobian[MOST_UNKNOWNS][MOST_UNKNOWNS], left[MOST_UNKNOWNS], noise[MOST_UNKNOWNS];
-  lanes change[MOST_UNKNOWNS], slope[MOST_UNKNOWNS], size[MOST_UNKNOWNS];
+  lanes jacobian[WITH_ATTITUDE][WITH_ATTITUDE], left[WITH_ATTITUDE], noise[WITH_ATTITUDE];
+  lanes change[WITH_ATTITUDE], slope[WITH_ATTITUDE], size[WITH_ATTITUDE];
   lanes last = {0.0}, total = {0.0}, norm = {0.0}, stop;
   bits arrives, at_end;
 
@@ -633,7 +633,7 @@ static void step(struct group *g)
   set_truncation(g, factor, left);
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) jacobian[i][j] *= factor / tried;
-  lanes vectors[VECTORS][MOST_UNKNOWNS], worst = {0.0}, growth = {0.0};
+  lanes vectors[VECTORS][WITH_ATTITUDE], worst = {0.0}, growth = {0.0};
   lanes *const error = vectors[PROBES];
   memcpy(vectors, g->probes, sizeof g->probes);
   memcpy(vectors[PROBES], g->error, sizeof g->error);
@@ -728,7 +728,7 @@ static void take_out(struct group *g, int lane)
   const int body = g->body[lane];
   const double growth = sqrt(g->growth[lane]), trusted = TRUSTED / (1.0 + growth / DOUBTED);
   const double blurred = ROUNDING * growth * (1.0 + sqrt(g->noise[lane]));
-  double z[MOST_UNKNOWNS], square = 0.0;
+  double z[WITH_ATTITUDE], square = 0.0;
   g->body[lane] = -1;
   if (g->fails[lane] || !(g->worst[lane] <= trusted * all->tolerance)
       || !(blurred <= SURE * all->tolerance)) return;

@@ -66,6 +66,10 @@ module problem
     real(dp), pointer, contiguous :: rows(:, :)    !! omega at the first n_rows times, rad/s
     !! (4, 0:n): column 0 is the attitude at time 0, by the caller; null if not requested
     real(dp), pointer, contiguous :: attitudes(:, :) => null()
+    !! (states, 0:n): the user's own states, as attitudes; and the least sizes to which their
+    !! errors are relative
+    real(dp), pointer, contiguous :: own(:, :) => null()
+    real(dp), pointer, contiguous :: own_sizes(:) => null()
     ! The unknowns at nodes of each step; null if not requested.
     real(dp), pointer, contiguous :: nodes(:) => null()          !! in parts of a step, 0 to 1
     real(dp), pointer, contiguous :: at_nodes(:, :, :) => null() !! (unknowns, nodes, steps)

@@ -18,7 +18,7 @@ enum { IN_REGISTER = 2 };
 typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
 typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 
-enum { MOST_UNKNOWNS = 7 };
+enum { WITH_ATTITUDE = 7, MOST_UNKNOWNS = 15 }; /* numbers of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 
 /* Numbers of slots and combinations begin with 1. */

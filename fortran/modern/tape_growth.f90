@@ -5,7 +5,7 @@ module tape_growth
   implicit none(type, external)
   private
 
-  integer, parameter :: MOST_UNKNOWNS = 7
+  integer, parameter :: MOST_UNKNOWNS = 15
   integer, parameter :: STEPS_IN_BLOCK = 4
   integer, parameter :: MOST_BLOCKS = 64 ! even
   integer, parameter :: MOST_STEPS_IN_BLOCK = 2**28 ! within the range of the counter

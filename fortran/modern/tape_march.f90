@@ -1,19 +1,20 @@
 module tape_march
   !! One integration of a tape by Taylor series, from 0 to the last time. The order is fixed, the
   !! step is adapted, and the truncation error of the steps is propagated and subtracted.
+  use, intrinsic :: iso_c_binding, only: c_loc
   use, intrinsic :: iso_fortran_env, only: int64
   use interruption, only: interrupt_raised
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: FIRST_UNKNOWN, next_break, tape_t, TIME_SLOT
+  use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
-  use tape_series, only: derivatives_at, expand, noise_of, perturb_tape, series_t, SIDE_BY_SIDE, &
-                         slot_gradient, sum_perturbations, VARIATION_TOLERANCE
+  use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, perturb_tape, series_t, &
+                         SIDE_BY_SIDE, slot_gradient, sum_perturbations, VARIATION_TOLERANCE
   use tape_switches, only: CROSSES, IS_CHANGED, next_crossing, operand_error, resolve_switches, &
                            SLIDES, STAYS, switches_t
   use two_words, only: two_sum
@@ -83,7 +84,9 @@ contains
     real(dp) :: noise(tape%n_unknowns)        ! of the rates
     real(dp) :: sum_of_noise(tape%n_unknowns) ! squares, of all steps
     real(dp) :: change(tape%n_unknowns)       ! of the unknowns in the step
-    real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS) ! the error, and a perturbation of each unknown
+    ! The error, and a perturbation of each unknown, in blocks.
+    real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, MOST_BLOCKS)
+    real(dp) :: own_sizes(tape%n_unknowns)    ! of own states: the largest so far
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
@@ -97,14 +100,20 @@ contains
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch that is a touch
-    integer :: i, n, n_before, order, tries, last_term
+    integer :: i, n, n_before, order, tries
+    integer :: last_terms(MOST_BLOCKS)        ! of the perturbations
+    integer :: first_own, n_blocks
     integer :: verdict                        ! of `next_crossing`
     type(step_limit_t) :: limit
 
     n = tape%n_unknowns
     t_end = request%times(size(request%times))
     y(:3) = request%omega
-    y(4:) = attitude(:n - 3)
+    n_blocks = 1 + n/SIDE_BY_SIDE
+    first_own = n + 1
+    if (associated(solution%own)) first_own = n + 2 - size(solution%own, 1)
+    y(4:first_own - 1) = attitude(:first_own - 4)
+    call begin_own()
     y_low = 0.0_dp
     t = 0.0_dp
     rest = t_end
@@ -113,7 +122,7 @@ contains
     solution%n_steps = 0
     sum_of_noise = 0.0_dp
     s%a = 0.0_dp
-    s%v(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1) = 0.0_dp
+    s%blocks(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1, :) = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     live = tape
@@ -140,7 +149,7 @@ contains
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
-      if (from_rest) scale = largest_terms()
+      if (from_rest) scale = largest_terms(1, 3)
       call weigh()
       factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
@@ -169,8 +178,7 @@ contains
       if (is_rejected) factor = min(1.0_dp, factor)
       factor = to_end(factor)
       call set_lanes()
-      last_term = perturb_tape(s%arrays, s%h, s%order, factor, weights, VARIATION_TOLERANCE, &
-                               is_short)
+      call perturb()
       ! Perturbations may change faster than the motion, as about a steady rotation.
       if (is_short /= 0) factor = factor*fitting_lanes()
       call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
@@ -234,8 +242,9 @@ contains
         exit
       end if
       scale = max(scale, maxval(abs(y(:3))))
+      own_sizes(first_own:) = max(own_sizes(first_own:), abs(y(first_own:)))
       if (at_end) then
-        call add_row(y, y_low, lanes(1, :n), solution%n_rows + 1)
+        call add_row(y, y_low, lanes(1, :n, 1), solution%n_rows + 1)
         exit
       end if
       ! The steps shrink to nothing before a singularity.
@@ -243,7 +252,7 @@ contains
         solution%status = OVERFLOW
         exit
       end if
-      call count_step(solution%n_rows > n_before, transposed(lanes), transitions, is_full)
+      call count_step(solution%n_rows > n_before, transposed(n, lanes), transitions, is_full)
       if (is_full) call begin_block()
       t = t_next
       has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
@@ -257,27 +266,36 @@ contains
       if (solution%status /= COMPLETE) exit
     end do
     call weigh()
-    found%growth = growth_of(transposed(lanes), 1.0_dp/weights, transitions)
+    found%growth = growth_of(transposed(n, lanes), 1.0_dp/weights, transitions)
     found%noise = norm2(weights*sqrt(sum_of_noise))
     do i = 1, n
-      found%error = max(found%error, weights(i)*abs(lanes(1, i)))
+      found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
     end do
 
   contains
 
     subroutine begin_lanes()
       !! Set the error to zero, and the perturbations to the unit vector of each unknown.
-      lanes(1, :) = 0.0_dp
+      lanes(1, :, 1) = 0.0_dp
       call begin_block()
     end subroutine begin_lanes
+
+    subroutine begin_own()
+      !! Set the states of the user's own at time 0, and their sizes.
+      own_sizes = 0.0_dp
+      if (first_own > n) return
+      y(first_own:) = solution%own(:n - first_own + 1, 0)
+      own_sizes(first_own:) = max(abs(y(first_own:)), solution%own_sizes(:n - first_own + 1))
+    end subroutine begin_own
 
     subroutine begin_block()
       !! Set the perturbations to the unit vector of each unknown.
       integer :: i
 
-      lanes(2:, :) = 0.0_dp
+      lanes(2:, :, 1) = 0.0_dp
+      lanes(:, :, 2:n_blocks) = 0.0_dp
       do i = 1, n
-        lanes(i + 1, i) = 1.0_dp
+        lanes(1 + mod(i, SIDE_BY_SIDE), i, 1 + i/SIDE_BY_SIDE) = 1.0_dp
       end do
     end subroutine begin_block
 
@@ -305,23 +323,42 @@ contains
       integer :: i
 
       do i = 1, n
-        s%v(:, 0, FIRST_UNKNOWN - 1 + i) = lanes(:, i)
+        s%blocks(:, 0, FIRST_UNKNOWN - 1 + i, :) = lanes(:, i, :n_blocks)
       end do
     end subroutine set_lanes
+
+    subroutine perturb()
+      !! Expand the perturbations.
+      type(tape_arrays_t) :: arrays
+      integer :: block, block_is_short
+
+      last_terms(1) = perturb_tape(s%arrays, 0, s%h, s%order, factor, weights, &
+                                   VARIATION_TOLERANCE, is_short)
+      do block = 2, n_blocks
+        arrays = s%arrays
+        arrays%v = c_loc(s%blocks(1, 0, 1, block))
+        last_terms(block) = perturb_tape(arrays, SIDE_BY_SIDE*(block - 1), s%h, s%order, factor, &
+                                         weights, VARIATION_TOLERANCE, block_is_short)
+        is_short = max(is_short, block_is_short)
+      end do
+    end subroutine perturb
 
     real(dp) function fitting_lanes()
       !! Return the factor on the step with which the last terms of the perturbations are small.
       real(dp) :: first, size_of_last
-      integer :: i
+      integer :: i, block, lane
 
       first = 0.0_dp
       size_of_last = 0.0_dp
-      do i = 1, n
-        associate (slot => FIRST_UNKNOWN - 1 + i)
-          first = max(first, weights(i)*maxval(abs(s%v(2:, 0, slot))))
-          size_of_last = max(size_of_last, weights(i)*maxval(abs(s%v(2:, s%order, slot))), &
-                             weights(i)*maxval(abs(s%v(2:, s%order - 1, slot)))/factor)
-        end associate
+      do block = 1, n_blocks
+        lane = merge(2, 1, block == 1) ! the error does not count
+        do i = 1, n
+          associate (v => s%blocks(lane:, :, FIRST_UNKNOWN - 1 + i, block))
+            first = max(first, weights(i)*maxval(abs(v(:, 1))))
+            size_of_last = max(size_of_last, weights(i)*maxval(abs(v(:, 1 + s%order))), &
+                               weights(i)*maxval(abs(v(:, s%order)))/factor)
+          end associate
+        end do
       end do
       size_of_last = size_of_last*factor**s%order
       fitting_lanes = 0.25_dp
@@ -330,24 +367,35 @@ contains
       end if
     end function fitting_lanes
 
-    real(dp) function largest_terms()
-      !! Return the largest of the first terms of omega for a step that ends at the next breakpoint.
+    real(dp) function largest_terms(first, last)
+      !! Return the largest of the first terms of unknowns for a step that ends at the next
+      !! breakpoint.
+      integer, intent(in) :: first, last
       real(dp) :: part
       integer :: k
 
       part = min(1.0_dp, abs(to_stop/s%h))
       largest_terms = 0.0_dp
       do k = 1, 4
-        largest_terms = max(largest_terms, part**k &
-                            *maxval(abs(s%a(k, FIRST_UNKNOWN:FIRST_UNKNOWN + 2))))
+        largest_terms = max(largest_terms, part**k*maxval(abs(s%a(k, FIRST_UNKNOWN - 1 + first: &
+                                                                  FIRST_UNKNOWN - 1 + last))))
       end do
       largest_terms = min(huge(s%h), largest_terms)
     end function largest_terms
 
     subroutine weigh()
-      !! Make errors of omega relative to the scale, and those of the quaternion angles.
+      !! Make errors of omega relative to the scale, those of the quaternion angles, and those of own
+      !! states relative to their sizes, or to the sizes that they are about to reach.
+      real(dp) :: own_size
+      integer :: i
+
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
-      weights(4:) = 2.0_dp
+      weights(4:first_own - 1) = 2.0_dp
+      do i = first_own, n
+        own_size = own_sizes(i)
+        if (.not. own_size > 0.0_dp) own_size = largest_terms(i, i)
+        weights(i) = 1.0_dp/max(own_size, LEAST_SCALE)
+      end do
     end subroutine weigh
 
     real(dp) function to_end(factor)
@@ -423,7 +471,7 @@ contains
       !! beginning. The change of the unknowns is computed too.
       real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
       real(dp) :: defect(tape%n_unknowns), size_of_terms(tape%n_unknowns), rounded, allowed
-      real(dp) :: reached
+      real(dp) :: reached, cancelled
       integer :: i, k
 
       change = 0.0_dp
@@ -441,8 +489,12 @@ contains
       end do
       ! Large terms that cancel are rounded, and a shorter step has smaller terms.
       reached = max(scale, maxval(abs(y(:3) + change(:3))), LEAST_SCALE)
-      if (.not. max(maxval(size_of_terms(:3))/reached, 2.0_dp*sum(size_of_terms(4:))) &
-          <= max(MOST_CANCELLED, attempt%tolerance/epsilon(rounded))) then
+      cancelled = max(maxval(size_of_terms(:3))/reached, 2.0_dp*sum(size_of_terms(4:first_own - 1)))
+      do i = first_own, n
+        cancelled = max(cancelled, size_of_terms(i) &
+                        /max(1.0_dp/weights(i), abs(y(i) + change(i)), LEAST_SCALE))
+      end do
+      if (.not. cancelled <= max(MOST_CANCELLED, attempt%tolerance/epsilon(rounded))) then
         is_continued = .false.
         return
       end if
@@ -522,7 +574,7 @@ contains
       !! rates jump (Leine and Nijmeijer 2004).
       real(dp) :: gradient(tape%n_unknowns), after(tape%n_unknowns), jump(tape%n_unknowns)
       real(dp) :: slope, blur
-      integer :: i
+      integer :: block, i
 
       switches%on_level = 0
       if (verdict /= CROSSES) return
@@ -532,18 +584,28 @@ contains
       switches%part = factor
       call settle(tape, t_next, y + y_low, s%h, switches, s, live, after)
       jump = after - rates
-      do i = 1, SIDE_BY_SIDE
-        lanes(i, :n) = lanes(i, :n) + jump*(dot_product(gradient, lanes(i, :n))/slope)
+      do block = 1, n_blocks
+        do i = 1, SIDE_BY_SIDE
+          associate (lane => lanes(i, :n, block))
+            lane = lane + jump*(dot_product(gradient, lane)/slope)
+          end associate
+        end do
       end do
       sum_of_noise = sum_of_noise + (jump*blur)**2
     end subroutine cross
 
     subroutine take_step()
       !! Advance the unknowns, the error and the perturbations to the end of the step.
-      integer :: i
+      type(tape_arrays_t) :: arrays
+      integer :: block, i
 
-      call sum_perturbations(s%arrays, last_term, factor, lanes)
-      lanes(1, :n) = lanes(1, :n) - left
+      call sum_perturbations(s%arrays, last_terms(1), factor, lanes)
+      do block = 2, n_blocks
+        arrays = s%arrays
+        arrays%v = c_loc(s%blocks(1, 0, 1, block))
+        call sum_perturbations(arrays, last_terms(block), factor, lanes(1, 1, block))
+      end do
+      lanes(1, :n, 1) = lanes(1, :n, 1) - left
       do i = 1, n
         call two_sum((y(i)), change(i) + y_low(i), y(i), y_low(i))
       end do
@@ -560,8 +622,8 @@ contains
         do k = s%order, 1, -1
           change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
         end do
-        error(i) = s%v(1, last_term, FIRST_UNKNOWN - 1 + i)
-        do k = last_term - 1, 0, -1
+        error(i) = s%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i)
+        do k = last_terms(1) - 1, 0, -1
           error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i)
         end do
       end do
@@ -603,6 +665,7 @@ contains
       end if
       solution%rows(:, row) = z(:3)
       if (associated(solution%attitudes)) solution%attitudes(:, row) = z(4:7)/norm2(z(4:7))
+      if (first_own <= n) solution%own(:n - first_own + 1, row) = z(first_own:)
       solution%n_rows = row
     end subroutine add_row
 
@@ -635,12 +698,16 @@ contains
 
   end subroutine march
 
-  pure function transposed(lanes) result(matrix)
+  pure function transposed(n, lanes) result(matrix)
     !! Compute the matrix of the open block from the perturbations in the lanes.
-    real(dp), intent(in) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS)
-    real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    integer, intent(in) :: n !! number of unknowns
+    real(dp), intent(in) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, MOST_BLOCKS)
+    real(dp) :: matrix(n, n)
+    integer :: i
 
-    matrix = transpose(lanes(2:, :))
+    do i = 1, n
+      matrix(:, i) = lanes(1 + mod(i, SIDE_BY_SIDE), :n, 1 + i/SIDE_BY_SIDE)
+    end do
   end function transposed
 
 end module tape_march

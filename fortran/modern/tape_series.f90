@@ -39,6 +39,9 @@ module tape_series
   ! Largest terms of perturbations that a step leaves out, relative.
   real(dp), parameter, public :: VARIATION_TOLERANCE = 1e-3_dp
 
+  ! Blocks of perturbations: the error, and one for each unknown.
+  integer, parameter, public :: MOST_BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE)/SIDE_BY_SIDE
+
   ! Taylor series around the beginning of a step.
   type, public :: series_t
     real(dp) :: h                           !! s; a term includes its power of it
@@ -88,12 +91,13 @@ module tape_series
       integer(c_int), intent(in), value :: order
     end subroutine expand_tape
 
-    integer(c_int) function perturb_tape(tape, h, order, factor, weights, tolerance, is_short) &
-      bind(c, name="perturb_tape_level")
+    integer(c_int) function perturb_tape(tape, number, h, order, factor, weights, tolerance, &
+                                         is_short) bind(c, name="perturb_tape_level")
       !! Expand the perturbations to as many terms as they need, and return the last one's number.
       import :: c_int, dp, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape
+      integer(c_int), intent(in), value :: number !! of the first perturbation; 0 is the error
       real(dp), intent(in), value :: h
       integer(c_int), intent(in), value :: order
       real(dp), intent(in), value :: factor    !! the step over h

@@ -8,7 +8,7 @@ module tape_solve
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING
   use tape, only: tape_t
   use tape_march, only: attempt_t, march, outcome_t
-  use tape_series, only: allocate_series, series_t
+  use tape_series, only: allocate_series, series_t, SIDE_BY_SIDE
   use tape_switches, only: find_switches, switches_t
   implicit none(type, external)
   private
@@ -64,12 +64,13 @@ contains
     if (request%times(size(request%times)) == 0.0_dp) then
       solution%rows(:, 1) = request%omega
       if (associated(solution%attitudes)) solution%attitudes(:, 1) = attitude
+      if (associated(solution%own)) solution%own(:, 1) = solution%own(:, 0)
       solution%n_rows = 1
       solution%status = COMPLETE
       solution%growth = 1.0_dp
       return
     end if
-    call allocate_series(tape, 1, memory, s, fits)
+    call allocate_series(tape, 1 + tape%n_unknowns/SIDE_BY_SIDE, memory, s, fits)
     if (.not. fits) return
     call find_switches(tape, switches, failed)
     if (failed /= 0) return

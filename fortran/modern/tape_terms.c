@@ -42,6 +42,10 @@ typedef double row[SIDE_BY_SIDE];
 /* The Jacobian is computed at three nodes of a step, from as many terms as the least order has. */
 enum { NODES = 3, TERMS_AMID = 8 };
 
+/* Its columns, eight side by side: element [j / 8][i][j % 8] is that of rate i by unknown j. */
+enum { BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE - 1) / SIDE_BY_SIDE };
+typedef row matrix[BLOCKS][MOST_UNKNOWNS];
+
 /* Sums of products of the terms of two slots, for as many pairs of slots as a register holds: all
    products of terms that are not 0 nor the newest are known before any operation of an order. */
 enum { ABREAST = 4 };
@@ -356,13 +360,13 @@ static inline lanes largest_terms(const struct tape *tape, int k, const double *
   return most;
 }
 
-/* Return the largest term k of all perturbations but the error. */
+/* Return the largest term k of the first perturbations, whose units may be 0. */
 static inline double largest(const struct tape *tape, int k, const double *weights,
-                             const double *units)
+                             const double *units, int count)
 {
   const reg_bits magnitude = ~(reg_bits)(-(reg){0.0});
   double found = 0.0;
-  for (int p = 0; p <= tape->n_unknowns; p += IN_REGISTER) {
+  for (int p = 0; p < count; p += IN_REGISTER) {
     reg most = {0.0};
     for (int i = 0; i < tape->n_unknowns; i++) {
       const reg term = *(const reg *)(perturbations_of(tape)[FIRST_UNKNOWN + i][k] + p);
@@ -377,10 +381,10 @@ static inline double largest(const struct tape *tape, int k, const double *weigh
   return found;
 }
 
-/* Compute the derivatives of the rates by the unknowns at the time `part` of the step, times the
-   step: element [i][j] is that of rate i by unknown j. */
-static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int columns, double h,
-                                       double part, row *jacobian)
+/* Compute the derivatives of the rates by some unknowns, from `first_column` on, at the time `part` of
+   the step, times the step: element [i][j] is that of rate i by unknown j. */
+static ALWAYS_INLINE void set_columns(const struct tape *tape, const int first_column,
+                                      const int columns, double h, double part, row *jacobian)
 {
   const series *const a = tape->a;
   const struct work *work = tape->work;
@@ -394,7 +398,8 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
     m[n] = sum;
   }
   memset(v, 0, (FIRST_UNKNOWN + tape->n_unknowns) * sizeof *v);
-  for (int j = 0; j < tape->n_unknowns; j++) v[FIRST_UNKNOWN + j][j] = 1.0;
+  for (int j = 0; j < columns && first_column + j < tape->n_unknowns; j++)
+    v[FIRST_UNKNOWN + first_column + j][j] = 1.0;
   for (int n = 0; n < tape->n_operations + tape->n_unknowns; n++) {
     const int is_rate = n >= tape->n_operations;
     const int *operation = tape->operations[is_rate ? 0 : n];
@@ -436,28 +441,46 @@ static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int column
   }
 }
 
+static void set_later_columns(const struct tape *tape, double h, double part, matrix jacobian)
+{
+  for (int j = SIDE_BY_SIDE; j < tape->n_unknowns; j += SIDE_BY_SIDE)
+    set_columns(tape, j, SIDE_BY_SIDE, h, part, jacobian[j / SIDE_BY_SIDE]);
+}
+
+static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int columns, double h,
+                                       double part, matrix jacobian)
+{
+  set_columns(tape, 0, columns, h, part, jacobian[0]);
+  if (tape->n_unknowns > SIDE_BY_SIDE) set_later_columns(tape, h, part, jacobian);
+}
+
 /* Compute the derivatives of term 0 of a slot by the unknowns. */
 void OF_LEVEL(slot_gradient, LEVEL)(const struct tape *tape, int slot, double *gradient)
 {
   const struct work *work = tape->work;
   row jacobian[MOST_UNKNOWNS] __attribute__((aligned(64)));
-  set_jacobian(tape, SIDE_BY_SIDE, 1.0, 0.0, jacobian);
-  memcpy(gradient, work->tangents[slot - 1], tape->n_unknowns * sizeof *gradient);
+  for (int j = 0; j < tape->n_unknowns; j++) {
+    const int column = j % SIDE_BY_SIDE;
+    if (column == 0) set_columns(tape, j, SIDE_BY_SIDE, 1.0, 0.0, jacobian);
+    gradient[j] = work->tangents[slot - 1][column];
+  }
 }
 
 /* Compute term k + 1 of the perturbations of the unknowns, with the Jacobian as a polynomial of the
    part of the step. */
 static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbations *v,
-                                       const row (*jacobian)[MOST_UNKNOWNS], int k)
+                                       const matrix *jacobian, int k)
 {
   const double part = 1.0 / (k + 1);
   const int degree = k < NODES - 1 ? k : NODES - 1;
   for (int i = 0; i < n; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg sum = {0.0}, other = {0.0};
-      for (int j = 0; j < n; j++) sum += jacobian[0][i][j] * *(reg *)(v[j][k] + p);
+      for (int j = 0; j < n; j++)
+        sum += jacobian[0][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k] + p);
       for (int d = 1; d <= degree; d++)
-        for (int j = 0; j < n; j++) other += jacobian[d][i][j] * *(reg *)(v[j][k - d] + p);
+        for (int j = 0; j < n; j++)
+          other += jacobian[d][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k - d] + p);
       *(reg *)(v[i][k + 1] + p) = part * (sum + other);
     }
   }
@@ -466,7 +489,7 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbat
 /* Compute the coefficients of the Jacobian as a polynomial of the part of the step, through its
    values at the nodes of Gauss: the error of the perturbations is of order 2 NODES + 1. */
 static ALWAYS_INLINE void set_jacobians(const struct tape *tape, const int columns, double h,
-                                        double factor, row (*jacobian)[MOST_UNKNOWNS])
+                                        double factor, matrix *jacobian)
 {
   const double distance = 0.38729833462074170 * factor, middle = 0.5 * factor;
   set_jacobian(tape, columns, h, middle - distance, jacobian[0]);
@@ -474,39 +497,45 @@ static ALWAYS_INLINE void set_jacobians(const struct tape *tape, const int colum
   set_jacobian(tape, columns, h, middle + distance, jacobian[2]);
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int j = 0; j < tape->n_unknowns; j++) {
-      const double before = jacobian[0][i][j], at = jacobian[1][i][j], after = jacobian[2][i][j];
+      const int block = j / SIDE_BY_SIDE, column = j % SIDE_BY_SIDE;
+      const double before = jacobian[0][block][i][column], at = jacobian[1][block][i][column];
+      const double after = jacobian[2][block][i][column];
       const double slope = (after - before) / (2.0 * distance);
       const double curve = ((after - at) + (before - at)) / (2.0 * distance * distance);
-      jacobian[0][i][j] = at - middle * (slope - middle * curve);
-      jacobian[1][i][j] = slope - 2.0 * middle * curve;
-      jacobian[2][i][j] = curve;
+      jacobian[0][block][i][column] = at - middle * (slope - middle * curve);
+      jacobian[1][block][i][column] = slope - 2.0 * middle * curve;
+      jacobian[2][block][i][column] = curve;
     }
   }
 }
 
-/* Expand the perturbations, whose values are terms 0 of the unknowns, to as many terms as they need
-   for the part `factor` of the step, and return the number of the last term. `is_short` says that
-   all terms do not suffice. `tolerance` is the largest relative size of a term that is left out. */
-int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, double h, int order, double factor,
-                                  const double *weights, double tolerance, int *is_short)
+/* Expand eight perturbations, from number `number` on, whose values are terms 0 of the unknowns, to as
+   many terms as they need for the part `factor` of the step, and return the number of the last term.
+   `is_short` says that all terms do not suffice. `tolerance` is the largest relative size of a term
+   that is left out. */
+int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h, int order,
+                                  double factor, const double *weights, double tolerance,
+                                  int *is_short)
 {
-  row jacobian[NODES][MOST_UNKNOWNS] __attribute__((aligned(64)));
+  matrix jacobian[NODES] __attribute__((aligned(64)));
   perturbations *const v = (perturbations *)tape->v + FIRST_UNKNOWN;
   const int n = tape->n_unknowns;
   /* Perturbation n was a unit of unknown n when it began. The error, perturbation 0, does not count,
      because it may be zero. */
   double units[SIDE_BY_SIDE] = {0.0};
-  for (int i = 0; i < n; i++) units[i + 1] = 1.0 / weights[i];
-  const double first = largest(tape, 0, weights, units);
+  const int count = n + 1 - number < SIDE_BY_SIDE ? n + 1 - number : SIDE_BY_SIDE;
+  for (int i = number ? 0 : 1; i < count; i++) units[i] = 1.0 / weights[number + i - 1];
+  const double first = largest(tape, 0, weights, units, count);
   double before = first, power = 1.0;
   int k = 0;
   if (n == 3) set_jacobians(tape, 4, h, factor, jacobian);
   else set_jacobians(tape, SIDE_BY_SIDE, h, factor, jacobian);
   do {
     if (n == 3) perturb_with(3, 4, v, jacobian, k++);
-    else perturb_with(MOST_UNKNOWNS, SIDE_BY_SIDE, v, jacobian, k++);
+    else if (n == WITH_ATTITUDE) perturb_with(WITH_ATTITUDE, SIDE_BY_SIDE, v, jacobian, k++);
+    else perturb_with(n, SIDE_BY_SIDE, v, jacobian, k++);
     power *= factor;
-    const double size = power * largest(tape, k, weights, units);
+    const double size = power * largest(tape, k, weights, units, count);
     /* Every other term may be zero. */
     *is_short = !(size <= tolerance * first && before <= tolerance * first);
     before = size;

@@ -42,7 +42,7 @@ def with_events(
     `sol` is the solution as a function of time, `ends` are the first and last requested times (s),
     and `rows` computes further rows.
     """
-    events = no_events(len(functions), 3 if found.attitude is None else 7)
+    events = no_events(len(functions), len(found.y))
     if sol.t_min < sol.t_max:
         pieces, period = sol.states, 0.0
         if not isinstance(pieces, Pieces):

@@ -15,7 +15,15 @@ import numpy as np
 from pyharness.engine.stepper import step_lengths
 from pyharness.engine.steps import rates
 from pyharness.model.array_type import Array
-from pyharness.model.dense_output import NODES, POINTS, TO_COEFFICIENTS, DenseOutput, Pieces, nodes
+from pyharness.model.dense_output import (
+    NODES,
+    POINTS,
+    TO_COEFFICIENTS,
+    DenseOutput,
+    Pieces,
+    nodes,
+    sizes_of,
+)
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -50,14 +58,13 @@ class _Open:
     whole: Pieces | None = None  # that polynomial
 
     def is_rough(
-        self, tail: float, times: Array, values: Array, scale: float, rough: float
+        self, tail: float, times: Array, values: Array, sizes: Array, rough: float
     ) -> bool:
         """Return whether errors of the method, up to `rough`, keep the last coefficients large."""
         if self.whole is None or not self.tail / _DIVIDED < tail <= rough:
             return False
         # A fast wave between few nodes has small tails too, but differs from the longer polynomial.
-        apart = np.abs(self.whole(times) - values).max(axis=0)
-        apart[:3] /= scale or 1.0
+        apart = np.abs(self.whole(times) - values).max(axis=0) / sizes
         return bool(apart.max() <= rough)
 
 
@@ -91,7 +98,7 @@ def dense_output(
         states = _Solved(rows, tolerance)
     else:
         states = state_pieces(scene, found, rows, tolerance, finest)
-    return DenseOutput(ends[0], ends[-1], states, partial(rates, scene))
+    return DenseOutput(ends[0], ends[-1], states, partial(rates, scene), len(scene.states))
 
 
 def state_pieces(
@@ -104,7 +111,8 @@ def state_pieces(
     own = [max(finest, part * tolerance) for part in (_NODE_TOLERANCE, _LARGEST_NODE_TOLERANCE)]
     rough = tolerance + _OWN_ROUNDING * (found.growth or 0.0)
     edges = _first_edges(scene, found, ends, tolerance)
-    return _fitted(edges, rows, tolerance, own, rough)
+    n_own = len(scene.states)
+    return _fitted(edges, rows, tolerance, own, rough, n_own)
 
 
 def _first_edges(
@@ -140,13 +148,13 @@ def _first_edges(
 
 
 def _fitted(
-    edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float
+    edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float, n_own: int
 ) -> Pieces:
     """Return polynomials through the rows of a method on intervals that are divided as needed."""
     # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}
-    scale = 0.0
+    largest = np.zeros(1)
     aim = max(_LAST * tolerance, _ROUNDING)
     while open_pieces:
         if len(open_pieces) + len(done) > _MOST_PIECES:
@@ -166,11 +174,12 @@ def _fitted(
             continue
         if len(states) < len(times):
             raise InputError("dense_output: the method reached fewer times than before")
-        scale = max(scale, float(np.abs(states[:, :3]).max()))
+        largest = np.maximum(largest, np.abs(states).max(axis=0))
+        sizes = sizes_of(largest, n_own)
         values = states[place.reshape(each.shape)]
         coefficients = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, values)
         tails = np.abs(coefficients[:, -_TAIL:]).max(axis=1)
-        tails[:, :3] /= scale or 1.0
+        tails /= sizes
         following = []
         for piece, own_nodes, own_values, tail in zip(
             open_pieces, each, values, tails.max(axis=1).tolist(), strict=True
@@ -179,7 +188,7 @@ def _fitted(
             if (
                 tail <= aim
                 or high - low <= 64 * math.ulp(max(abs(low), abs(high)))
-                or piece.is_rough(tail, own_nodes, own_values, scale, rough)
+                or piece.is_rough(tail, own_nodes, own_values, sizes, rough)
             ):
                 done[low] = high, own_values
                 continue

@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import NODES, POINTS, TO_COEFFICIENTS, Fits, Index, Roots, joined
 from pyharness.model.array_type import Array
-from pyharness.model.dense_output import DenseOutput, Pieces, nodes
+from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
@@ -44,8 +44,8 @@ class Solution:
     tolerance: float
 
     def states(self, times: Array) -> Array:
-        """Return omega and attitude at n `times` (s), shape (n, 3) or (n, 7)."""
-        return _normalised(self.pieces(times))
+        """Return omega, attitude and own states at n `times` (s), shape (n, m)."""
+        return self.sol.normalized(self.pieces(times))
 
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
         """Return the values of an event's function at `times` (s)."""
@@ -55,7 +55,7 @@ class Solution:
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
         """Return the values at `times` (s) from the dense output, not the polynomials."""
-        return self.values(g, times, _normalised(self.sol.states(times)))
+        return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
         """Return the errors of a function due to errors of time, omega, attitude and rates."""
@@ -66,9 +66,9 @@ class Solution:
         # All arguments in one call: the state at a later time, the state, and with each component
         # changed.
         moved = np.tile(states, (width + 2, 1, 1))
-        largest = self._largest_until(times)
+        sizes = sizes_of(self._largest_until(times), self.sol.n_own)
         for k in range(width):
-            moved[k + 2, :, k] += _SHIFT * (largest if k < 3 else 1.0)
+            moved[k + 2, :, k] += _SHIFT * sizes[:, k]
         every = np.concatenate([later, np.tile(times, width + 1)])
         rates = None
         if g.event.needs_rates:
@@ -91,8 +91,8 @@ class Solution:
 
     @cached_property
     def _largest(self) -> Array:
-        """The largest |omega| (rad/s) from time 0 to the end of each polynomial."""
-        sizes = np.abs(self.pieces.values[:, :, :3]).max(axis=(1, 2))
+        """The largest values of each unknown from time 0 to the end of each polynomial."""
+        sizes = np.abs(self.pieces.values).max(axis=1)
         count = int(np.sum(self.pieces.edges[:-1] < 0.0))
         before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
         return np.concatenate([before, np.maximum.accumulate(after)])
@@ -102,12 +102,6 @@ class Solution:
         return self._largest[np.clip(piece, 0, len(self._largest) - 1)]
 
 
-def _normalised(states: Array) -> Array:
-    if states.shape[-1] > 3:
-        states[..., 3:] /= np.linalg.norm(states[..., 3:], axis=-1, keepdims=True)
-    return states
-
-
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     """Return converged polynomials through a function's values; elsewhere, its sign changes."""
     edges = solution.pieces.edges
@@ -115,7 +109,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
     coefficients = solution.pieces.coefficients
     basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
-    inner = _normalised(basis @ coefficients)
+    inner = solution.sol.normalized(basis @ coefficients)
     times = nodes(low, high, POINTS)
     values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
         times.shape

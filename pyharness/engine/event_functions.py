@@ -2,8 +2,9 @@
 
 import inspect
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from pyharness.engine.recorded import outputs_at
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import Recorder, recorded_twice
-from pyharness.model.tape import Tape
+from pyharness.model.tape import N_INPUTS, Tape
 from pyharness.model.values import converted
 
 _FUNCTIONS_ALLOWED = (
-    "allowed: a function of (t, omega) or (t, omega, attitude), or a list of such functions"
+    "allowed: a function of (t, omega) or (t, omega, attitude), or a list of such functions; with "
+    "states of your own, they are one more argument"
 )
 # Largest relative difference of values for one time and for many, due to rounding.
 _AGREEMENT = 1e-10
@@ -106,7 +109,7 @@ class EventFunction:
         """Return the values by a record of the function; None if it can't be recorded."""
         is_new = not self._tapes
         if is_new:
-            self._tapes.append(self._recorded())
+            self._tapes.append(self._recorded(states.shape[1]))
         (tape,) = self._tapes
         if tape is None:
             return None
@@ -116,19 +119,19 @@ class EventFunction:
             return None
         return found
 
-    def _recorded(self) -> Tape | None:
+    def _recorded(self, width: int) -> Tape | None:
         if self.event.needs_rates:
             return None
 
         def record(recorder: Recorder) -> Tape:
             time, *state = recorder.inputs()
-            omega, attitude = symbol_array(state[:3]), symbol_array(state[3:])
+            omega, attitude = symbol_array(state[:3]), symbol_array(state[3:width])
             given = time, omega, attitude, None
             (value,) = called_once(lambda *x: [self.event.function(*x)], given, recorder, "")
             return recorder.tape([value])
 
         try:
-            return recorded_twice(record, Recorder)
+            return recorded_twice(record, partial(Recorder, n_inputs=max(N_INPUTS, 1 + width)))
         except InputError:
             return None
 
@@ -149,23 +152,33 @@ class EventFunction:
         return found
 
 
-def event_functions(events: object, attitude: bool) -> list[EventFunction]:
+def event_functions(
+    events: object, attitude: bool, states: Sequence[OwnState] = ()
+) -> list[EventFunction]:
     """Return one event or a list of events as checked functions, or raise InputError."""
     if callable(events) or isinstance(events, Event):
         events = [events]
     if not isinstance(events, (list, tuple)):
         raise InputError(f"events: {kind_of(events)}; {_FUNCTIONS_ALLOWED}")
-    return [_checked(each, f"events: event {k}", attitude) for k, each in enumerate(events, 1)]
+    names = [each.name for each in states]
+    return [
+        _checked(each, f"events: event {k}", attitude, names) for k, each in enumerate(events, 1)
+    ]
 
 
-def _checked(given: Any, name: str, attitude: bool) -> EventFunction:
+def _checked(given: Any, name: str, attitude: bool, own: Sequence[str]) -> EventFunction:
+    n_attitude = 4 if attitude else 0
     if isinstance(given, Event):
         event, needs_attitude = given, given.needs_attitude
+        if own:
+            event = replace(event, function=_without_own(given.function, n_attitude))
     elif callable(given):
-        needs_attitude = _arguments(given, name) == 3
+        count = _arguments(given, name, len(own) > 0)
+        needs_attitude = count == 3
+        function = _with_attitude(given) if needs_attitude else _without_attitude(given)
         event = Event(
             name,
-            _with_attitude(given) if needs_attitude else _without_attitude(given),
+            _with_own(given, own, n_attitude, needs_attitude) if own else function,
             getattr(given, "terminal", False),
             getattr(given, "direction", 0),
         )
@@ -188,15 +201,32 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
     return lambda t, omega, attitude, rates: given(t, omega)
 
 
-def _arguments(given: Callable[..., Any], name: str) -> int:
-    """Return the number of arguments that a function accepts, 2 or 3."""
+def _without_own(function: Callable[..., Any], n_attitude: int) -> Callable[..., Any]:
+    return lambda t, omega, rest, rates: function(t, omega, rest[:n_attitude], rates)
+
+
+def _with_own(
+    given: Callable[..., Any], own: Sequence[str], n_attitude: int, needs_attitude: bool
+) -> Callable[..., Any]:
+    """Return an event's function, which gets the own states behind the attitude."""
+
+    def function(t: Any, omega: Any, rest: Any, rates: Any) -> Any:
+        states = dict(zip(own, rest[n_attitude:], strict=True))
+        attitude = (rest[:n_attitude],) if needs_attitude else ()
+        return given(t, omega, *attitude, states)
+
+    return function
+
+
+def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
+    """Return the number of arguments that a function accepts, 2 or 3, beside own states."""
     try:
         signature = inspect.signature(given)
     except (TypeError, ValueError):
         return 2
     for count in (2, 3):
         try:
-            signature.bind(*range(count))
+            signature.bind(*range(count + with_own))
         except TypeError:
             continue
         return count

@@ -15,6 +15,7 @@ from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
 from pyharness.engine.periodic_events import improved, repeated
 from pyharness.model.array_type import Array
+from pyharness.model.dense_output import sizes_of
 
 _BLOCK = 4_000  # polynomials whose roots are isolated together
 _STATE_ROUNDING = 2.0**-46  # error of the state's polynomials, relative to their largest values
@@ -158,11 +159,11 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
         return found
     states = solution.states(times)
     is_negative = solution.values(g, times, states) < 0.0
-    largest = np.abs(states[:, :3]).max(axis=1)
+    sizes = sizes_of(np.abs(states), solution.sol.n_own)
     for k in range(states.shape[1]):
         for side in (-1.0, 1.0):
             moved = states.copy()
-            moved[:, k] += side * _STATE_ROUNDING * (largest if k < 3 else 1.0)
+            moved[:, k] += side * _STATE_ROUNDING * sizes[:, k]
             found |= (solution.values(g, times, moved) < 0.0) != is_negative
     return found
 
@@ -262,7 +263,7 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return no events, of `count` functions, with states of 3 or 7 columns."""
+    """Return no events, of `count` functions, with states of so many columns."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 

@@ -50,6 +50,8 @@ def checked_names(
     allowed = "allowed: names, as in ['omega0', 'moments']"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
+    if scene.states:
+        raise InputError(f"{place}: the scene has states of its own; allowed: a scene without")
     if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
     if has_switches(scene.torque):

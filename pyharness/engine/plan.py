@@ -67,7 +67,9 @@ def plan(
     if not finest <= tolerance <= 1.0:
         place = " for quick" if method == "quick" else ""
         raise InputError(f"tolerance is {tolerance:g}; allowed{place}: {finest:g} to 1")
-    form = closed_form(checked_scene(scene, any_torque=True, any_state=True, changing=True))
+    form = closed_form(
+        checked_scene(scene, any_torque=True, any_state=True, changing=True, states=True)
+    )
     # The plan includes the attitude if the torque needs it.
     check_torque(scene, method, attitude=True)
     fallback = None

@@ -217,6 +217,8 @@ FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
 # The methods with a prepared solver for a torque that depends on the state.
 PREPARED_FOR_STATE = ("auto", "taylor")
+# The methods that integrate a scene's own states.
+WITH_STATES = ("auto", "taylor")
 # SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
@@ -252,6 +254,11 @@ def check_prepared(scene: Scene, method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if the method can't solve the scene because of its torque or inertia."""
     torque, chosen = scene.torque, REGISTRY[method]
+    if scene.states and method not in WITH_STATES:
+        raise InputError(
+            f"method {method} can't solve a scene with states of its own; "
+            f"allowed: {', '.join(WITH_STATES)}"
+        )
     kind = "a torque about the axes of space"
     able: list[str] = []
     if isinstance(torque, StateTorque):

@@ -14,7 +14,8 @@ _WORST_FIRST = ("singular", "sliding", "overflow", "unchecked", "sensitive", "co
 
 def row_names(found: Trajectory) -> tuple[str, ...]:
     """Return the names of the arrays with a row for each time."""
-    return _ROWS if found.attitude is None else (*_ROWS, "attitude")
+    more = ("attitude", "own")
+    return *_ROWS, *(name for name in more if getattr(found, name) is not None)
 
 
 def in_reverse(found: Trajectory) -> Trajectory:

@@ -88,10 +88,10 @@ def solve(
         of the integration; else further integrations are needed. With a fixed step it is a cubic on
         each step.
     events : callable, Event, or list of these
-        Functions of `(t, omega)` or `(t, omega, attitude)`, or events of `pyharness.events`, whose
-        roots between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are
-        as in SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept
-        arrays are called with arrays.
+        Functions with the arguments of a torque, or events of `pyharness.events`, whose roots
+        between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are as in
+        SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept arrays
+        are called with arrays.
     sensitivities : iterable of str
         Names of parameters. `sensitivities` of the trajectory then has the derivatives of omega and
         of the quaternion with respect to them. A name may be `omega0`, `moments`, `coefficients`,
@@ -125,7 +125,7 @@ def solve(
     array([[3.5, 3.5, 3.5],
            [6. , 6. , 6. ]])
     """
-    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True)
     attitude = boolean("attitude", attitude)
     dense_output = boolean("dense_output", dense_output)
     method = known("method", method, METHODS)
@@ -143,7 +143,7 @@ def solve(
             f"tolerance is {tolerance:g}; allowed for {method}: {chosen.finest:.2g} to 1"
         )
     check_torque(scene, method, attitude)
-    functions = None if events is None else event_functions(events, attitude)
+    functions = None if events is None else event_functions(events, attitude, scene.states)
     names = None if sensitivities is None else checked_names(scene, sensitivities, asked, attitude)
     if attitude:
         check_attitude(method)
@@ -179,7 +179,8 @@ def solve(
     reported = None if chosen.is_fixed_step else tolerance
     found = replace(found, moments=moments, tolerance=reported, scene=given)
     if axes is not None:
-        steps = transformed_steps(found.sol, partial(states_in_scene_axes, axes=axes))
+        turned_to = partial(states_in_scene_axes, axes=axes, own=7 if attitude else 3)
+        steps = transformed_steps(found.sol, turned_to)
         found = replace(in_scene_axes(found, axes), sol=steps)
     if found.ended == "unchecked" and (dense_output or functions is not None):
         raise InputError(
@@ -251,7 +252,7 @@ def _integrate(
     if not chosen.is_fixed_step and not is_ordinary(scene.omega):
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
-    factor = 1.0 if chosen.any_scale else rescaling_factor(scene, times[-1])
+    factor = 1.0 if chosen.any_scale or scene.states else rescaling_factor(scene, times[-1])
     if factor == 1.0:
         return chosen.solve(scene, times, tolerance, effort, *more)
     faster = [t / factor for t in times]

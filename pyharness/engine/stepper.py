@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -15,8 +15,9 @@ from pyharness.engine.singular import SingularError, undefined_operation
 from pyharness.engine.system import is_recorded, with_constant_body
 from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
+from pyharness.model.changing import rates_of_changing
 from pyharness.model.errors import InputError
-from pyharness.model.scene import CHANGING, Scene, checked_scene
+from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import Tape, float_outputs
@@ -38,11 +39,11 @@ class Stepper:
     Parameters
     ----------
     scene : Scene
-        The body, its torque and its state at time 0. Moments or inertia must not change with time,
-        and the torque must not be opaque.
+        The body, its torque and its state at time 0. The torque must not be opaque.
     tolerance : float, optional
         The largest error of a step, in a component of omega relative to the largest |omega| so far,
-        and in the attitude's angle (rad). Default is 1e-9.
+        in the attitude's angle (rad), and in an own state relative to its largest absolute value so
+        far. Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, from the scene's or (1, 0, 0, 0). Torques that depend on
         the attitude, or are about the axes of space, require it.
@@ -55,12 +56,14 @@ class Stepper:
         The angular velocity (rad/s). It may be set.
     attitude : ndarray, shape (4,), or None
         The quaternion from body to space, scalar first. It may be set.
+    states : dict of str to float
+        The scene's own states. Another dict, of some or all names, may be set.
     held_torque : ndarray, shape (3,)
         A torque about the body axes that is added to the scene's: in N m, or for a body given by
         coefficients as an acceleration, 1/s2. It is 0 at first, and applies until it is set again,
         even if another scene is set.
     scene : Scene
-        The scene. If another one is set, time, omega and attitude are kept.
+        The scene. If another one is set, time, omega, attitude and states are kept.
     steps : int
         The number of steps so far.
 
@@ -86,8 +89,8 @@ class Stepper:
 
     # With slots, setting another name, such as `torque`, is an error.
     __slots__ = (
-        "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_packed", "_scene", "_state",
-        "_steps", "_tape", "_time", "_tolerance", "_trial",
+        "_begin", "_breaks", "_largest", "_last", "_n", "_origin", "_own_sizes", "_packed",
+        "_scene", "_state", "_steps", "_tape", "_time", "_tolerance", "_trial",
     )  # fmt: skip
 
     def __init__(
@@ -100,8 +103,10 @@ class Stepper:
         if not _FINEST <= self._tolerance <= 1.0:
             raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
         self._n = 7 if attitude else 3
-        self._state = np.zeros(self._n + 3)
         self._change(scene)
+        own = [each.start for each in scene.states]
+        self._own_sizes = np.array([each.scale for each in scene.states])
+        self._state = np.array([0.0] * self._n + own + [0.0] * 3)
         self._state[:3] = scene.omega
         if attitude:
             self._state[3:7] = unit_quaternion("attitude", scene.attitude or IDENTITY)[0]
@@ -150,13 +155,28 @@ class Stepper:
         self._set(slice(3, 7), unit_quaternion("attitude", values)[0])
 
     @property
+    def states(self) -> dict[str, float]:
+        """The scene's own states by name."""
+        names = (each.name for each in self._scene.states)
+        return dict(zip(names, self._state[self._n : -3].tolist(), strict=True))
+
+    @states.setter
+    def states(self, values: Mapping[str, float]) -> None:
+        found = self.states
+        if not isinstance(values, Mapping) or not set(values) <= set(found):
+            allowed = ", ".join(found) or "none: the scene has no states of its own"
+            raise InputError(f"states: {values!r}; allowed: a dict of {allowed}")
+        found |= {name: finite(f"states: {name}", each) for name, each in values.items()}
+        self._set(slice(self._n, -3), list(found.values()))
+
+    @property
     def held_torque(self) -> Array:
         """The torque that is added to the scene's (N m, or 1/s2; body axes), shape (3,)."""
-        return _fixed(self._state[self._n :])
+        return _fixed(self._state[-3:])
 
     @held_torque.setter
     def held_torque(self, values: Sequence[float] | Array) -> None:
-        self._set(slice(self._n, None), _three("held_torque", values))
+        self._set(slice(-3, None), _three("held_torque", values))
 
     def step(self, longest: float = math.inf) -> float:
         """Take one step, as long as the tolerance allows, and return the new time (s).
@@ -190,10 +210,12 @@ class Stepper:
 
     def _take_step(self, longest: float) -> Step:
         scale = self._scale()
+        sizes = self._sizes_of_states(min(abs(longest), self._trial, 1.0 / scale))
         while True:
             tolerances = np.full(len(self._state), math.inf)
             tolerances[:3] = self._tolerance * scale
             tolerances[3 : self._n] = 0.5 * self._tolerance
+            tolerances[self._n : -3] = self._tolerance * sizes
             trial = math.copysign(min(self._trial, abs(longest)), longest)
             taken = taylor_step(
                 self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
@@ -202,9 +224,28 @@ class Stepper:
                 raise self._singular()
             # For a body at rest, the scale was a guess of the omega that it reaches.
             reached = float(np.abs(taken.state[:3]).max())
-            if self._largest > 0.0 or not 0.0 < reached < 0.5 * scale:
+            own = np.abs(taken.state[self._n : -3])
+            is_far = (self._own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
+            if (self._largest > 0.0 or not 0.0 < reached < 0.5 * scale) and not is_far.any():
                 return taken
-            scale, self._trial = reached, abs(taken.h)
+            if self._largest == 0.0 and reached > 0.0:
+                scale = min(scale, reached)
+            sizes, self._trial = np.where(is_far, own, sizes), abs(taken.h)
+
+    def _sizes_of_states(self, span: float) -> Array:
+        """Return the sizes to which errors of own states are relative; guesses from 0 on."""
+        self._own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
+        if self._own_sizes.all():
+            return self._own_sizes
+        rates = np.abs(self._rates()[self._n : -3])
+        guess = np.where(rates > 0.0, rates * span, math.inf)
+        return np.where(self._own_sizes > 0.0, self._own_sizes, guess)
+
+    def _rates(self) -> Array:
+        try:
+            return np.array(float_outputs(self._tape, [self._time, *self._state.tolist()]))
+        except ArithmeticError:
+            return np.zeros(len(self._state))
 
     def until(self, time: float) -> None:
         """Take steps to `time` (s), later or earlier; raise InputError as `step` does."""
@@ -218,8 +259,8 @@ class Stepper:
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without later changes by the user.
 
-        It is omega (rad/s), shape (3,), or with the quaternion, shape (7,), and has a column for
-        each of several times. Raise InputError for a time outside the step.
+        It is omega (rad/s), the quaternion if computed, and own states, shape (m,), and has a
+        column for each of several times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)
@@ -231,14 +272,14 @@ class Stepper:
         if not np.all((given >= low - slack) & (given <= high + slack)):
             raise InputError(f"t is outside the last step; allowed: {low!r} to {high!r} s")
         share: Any = (given - self._begin) / (self._last.h or 1.0)
-        state: Array = polyval(share, self._last.terms[:, : self._n])
-        state[3:] = _normalised(state[3:])
+        state: Array = polyval(share, self._last.terms[:, :-3])
+        state[3 : self._n] = _normalised(state[3 : self._n])
         return state
 
     def _change(self, scene: Scene) -> None:
-        checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-        if scene.changing is not None:
-            raise InputError(CHANGING)
+        checked_scene(
+            scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True
+        )
         torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
         if torque.tape is None:
             raise InputError(
@@ -247,6 +288,12 @@ class Stepper:
             )
         if torque.needs_attitude and self._n == 3:
             raise InputError("the torque depends on the attitude; give attitude=True")
+        names = [each.name for each in scene.states]
+        if hasattr(self, "_scene") and names != list(self.states):
+            raise InputError(
+                f"the scene has the states {names}; allowed: those of the first scene, "
+                f"{list(self.states)}"
+            )
         self._tape = _equations(scene, torque.tape, self._n == 7)
         self._packed = kernel_tape(self._tape)
         self._breaks = self._tape.breaks
@@ -269,11 +316,7 @@ class Stepper:
         if self._largest > 0.0:
             return self._largest
         # A guess of the omega that a body at rest reaches.
-        try:
-            rates = float_outputs(self._tape, [self._time, *self._state.tolist()])
-        except ArithmeticError:
-            return 1.0
-        return math.sqrt(max(map(abs, rates[:3]))) or 1.0
+        return math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
 
     def _next_break(self, forward: bool) -> float | None:
         if forward:
@@ -329,23 +372,26 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
     """Return the rates of omega, attitude if computed, and held torque as a tape."""
     n = 7 if attitude else 3
-    recorder = Recorder(2 * MOST_OPERATIONS, n + 4)
+    recorder = Recorder(2 * MOST_OPERATIONS, n + len(scene.states) + 4)
     time, *unknowns = recorder.inputs()
     omega: Any = np.array(unknowns[:3], dtype=object)
     q: Any = unknowns[3:n] or IDENTITY
-    total = torque_of(torque, time, omega, q) + np.array(unknowns[n:], dtype=object)
-    if scene.inertia is None:
+    found = torque_of(torque, time, omega, q, *unknowns[n:-3])
+    total = found[:3] + np.array(unknowns[-3:], dtype=object)
+    if scene.changing is not None:
+        rates: Any = rates_of_changing(scene.changing, time, omega, total)
+    elif scene.inertia is None:
         x, y, z = omega
         products = np.array([y * z, z * x, x * y], dtype=object)
         moments = np.array(scene.moments or (1.0, 1.0, 1.0))
-        rates: Any = np.array(scene.euler_coefficients) * products + total / moments
+        rates = np.array(scene.euler_coefficients) * products + total / moments
     else:
         inertia = np.array(scene.inertia)
         rates = np.linalg.inv(inertia) @ (total - np.cross(omega, inertia @ omega))
     rates = list(rates)
     if attitude:
         rates += quaternion_rates(omega, q)
-    return recorder.tape([*rates, 0.0, 0.0, 0.0])
+    return recorder.tape([*rates, *found[3:], 0.0, 0.0, 0.0])
 
 
 def _three(name: str, values: object) -> tuple[float, ...]:

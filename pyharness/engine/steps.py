@@ -21,7 +21,7 @@ MOST_STEPS = 20_000  # that `sol` has; it limits the memory
 
 
 def rates(scene: Scene, times: Array, state: Array) -> Array:
-    """Return the time derivatives of n states: omega (rad/s), (n, 3), or with quaternion, (n, 7).
+    """Return the time derivatives of n states, shape (n, m): omega, quaternion, own states.
 
     A derivative is not finite where the torque is singular.
     """
@@ -29,13 +29,17 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     bare = with_constant_body(bare)
     torque = of_law(bare.torque) if isinstance(bare.torque, TorqueLaw) else bare.torque
     bare = replace(bare, torque=torque)
-    omega, attitude = state[:, :3], state[:, 3:]
+    omega, attitude, own = np.split(state, [3, state.shape[1] - len(scene.states)], axis=1)
     inner = omega @ axes
     if attitude.size:
         turned = product(attitude.T, quaternion_of_axes(axes))
         inner = np.column_stack([inner, *turned])
+    inner = np.column_stack([inner, own])
+    more = own
     if torque.tape is not None:
-        found = outputs_at(system_of(bare, False), times, inner)
+        tape = system_of(bare, bool(attitude.size and own.size))
+        found = outputs_at(tape, times, inner)
+        found, more = found[:, :3], found[:, found.shape[1] - own.shape[1] :]
     else:
         slopes = slopes_of(bare)
         rows = zip(times.tolist(), inner.tolist(), strict=True)
@@ -43,13 +47,13 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     found = found @ axes.T
     if attitude.size:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
-    return found
+    return np.column_stack([found, more]) if own.size else found
 
 
 def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
     """Return the dense output of a scene from polynomials."""
     low, high = pieces.edges[[0, -1]].tolist()
-    return DenseOutput(low, high, pieces, partial(rates, scene))
+    return DenseOutput(low, high, pieces, partial(rates, scene), len(scene.states))
 
 
 def transformed_steps(

@@ -12,7 +12,7 @@ from pyharness.model.changing import rates_of_changing
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law, replayed, torque_of
 from pyharness.model.symbols import Recorder
-from pyharness.model.tape import Tape
+from pyharness.model.tape import N_INPUTS, Tape
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Triple
 
@@ -20,22 +20,27 @@ from pyharness.model.values import Triple
 def system_of(scene: Scene, attitude: bool) -> Tape:
     """Return the equations of motion of a scene with recorded torque and principal axes as a tape.
 
-    They are equations 16-18 of the thesis and, if `attitude`, q' = q (0, omega)/2.
+    They are equations 16-18 of the thesis and, if `attitude`, q' = q (0, omega)/2; then the rates
+    of the scene's own states. The inputs are the time and the unknowns in this order.
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
-    recorder = Recorder()
-    time, x, y, z, *q = recorder.inputs()
-    torque = torque_of(scene.torque.tape, time, (x, y, z), q)
+    own = 7 if attitude else 3
+    recorder = Recorder(n_inputs=max(N_INPUTS, 1 + own + len(scene.states)))
+    time, *unknowns = recorder.inputs()
+    x, y, z, *q = unknowns[: own if scene.states else 7]
+    states = unknowns[own : own + len(scene.states)]
+    torque = torque_of(scene.torque.tape, time, (x, y, z), q or IDENTITY, *states)
     rates: list[Any] = [
         coefficient * product + component / moment
         for coefficient, product, component, moment in zip(
-            scene.euler_coefficients, (y * z, z * x, x * y), torque, _divisors(scene), strict=True
+            scene.euler_coefficients, (y * z, z * x, x * y), torque[:3], _divisors(scene),
+            strict=True,
         )
-    ]
+    ]  # fmt: skip
     if attitude:
         rates += quaternion_rates((x, y, z), q)
-    return recorder.tape(rates)
+    return recorder.tape([*rates, *torque[3:]])
 
 
 def is_recorded(scene: Scene) -> bool:
@@ -56,11 +61,12 @@ def with_constant_body(scene: Scene) -> Scene:
         torque = of_law(torque)
     tape = torque.tape
     if tape is not None:
-        found = replayed(
-            lambda time, omega, q: rates_of_changing(
-                changing, time, omega, torque_of(tape, time, omega, q)
-            )
-        )
+
+        def rates(time: Any, omega: Any, q: Any, *own: Any) -> list[Any]:
+            torque = torque_of(tape, time, omega, q, *own)
+            return [*rates_of_changing(changing, time, omega, torque[:3]), *torque[3:]]
+
+        found = replayed(rates, torque.own)
     else:
         found = replace(
             torque,

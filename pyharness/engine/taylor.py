@@ -48,14 +48,19 @@ def taylor(
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
+    n_own = len(scene.states)
     kernel, given = series_kernel(scene)
     most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
-    at_nodes = np.empty((7 if n_attitudes else 3, NODES, most + 1), order="F")
+    at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
     room: dict[str, Any] = {}
     if kernel != "space_torque_rows":
         room = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
         room |= {"at_nodes": at_nodes, "n_nodes": NODES}
+    own = np.zeros((n_own + 1, len(times) + 1 if n_own else 1), order="F")
+    own[:n_own, 0] = [each.start for each in scene.states]
+    if kernel == "tape_rows":
+        room |= {"own": own, "own_sizes": [*(each.scale for each in scene.states), 0.0]}
     rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work, **room,
@@ -74,6 +79,8 @@ def taylor(
     found = trajectory_of(
         times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
     )
+    if n_own:
+        found = replace(found, own=own[:n_own, 1 : 1 + len(found.time)].T)
     if found.ended == "sliding":
         found = replace(found, reason=str(TimedError(SLIDING, work[1])))
     kept = others[0] if others else 0

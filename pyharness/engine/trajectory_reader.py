@@ -20,6 +20,7 @@ import numpy as np
 from pyharness.engine.scene_reader import scene_of_file
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
+from pyharness.model.own_states import checked_states
 from pyharness.model.pipes import read_input
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
@@ -32,6 +33,7 @@ from pyharness.model.trajectory_file import (
     EVENTS,
     KIND,
     MOST_FUNCTIONS,
+    OWN,
     ROWS,
     SENSITIVITIES,
     TEXTS,
@@ -110,7 +112,7 @@ def _arrays(content: bytes, names: Sequence[str] = ()) -> tuple[dict[str, Any], 
     """Return the arrays with these names, by default all, and their digest without `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, AXES, *EVENTS, SENSITIVITIES)}
+        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, OWN, AXES, *EVENTS, SENSITIVITIES)}
         entries = [archive.getinfo(f"{name}.npy") for name in names] or archive.infolist()
         for each in entries:
             allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
@@ -158,12 +160,20 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         raise ValueError("no omega, or axes of another type or shape")
     if header["ended"] not in ENDINGS:
         raise ValueError("an unknown ending")
-    t_events, y_events = _events(arrays, rows["time"], 3 if rows["attitude"] is None else 7)
     scene = None
     if header["scene"] is not None:
         scene = _scene(_text(arrays, "scene"), header["scene"], where)
+    own = arrays.get(OWN)
+    n_own = 0 if own is None else own.shape[1]
+    if own is not None and (own.dtype, own.shape) != ("f8", (count, n_own)):
+        raise ValueError("own states of another type or shape")
+    if scene is not None and n_own != len(scene.states):
+        raise ValueError("another number of own states")
+    width = (3 if rows["attitude"] is None else 7) + n_own
+    t_events, y_events = _events(arrays, rows["time"], width)
     return Trajectory(
         **rows,
+        own=own,
         axes=axes,
         steps=_count(header["steps"]),
         evaluations=_count(header["evaluations"]),
@@ -220,8 +230,11 @@ def _events(
 def _scene(text: str, record: dict[str, Any], where: str) -> Scene:
     scene = scene_of_file(text.encode(), "", where)
     if record["torque"] is not None:
-        tape = tape_of(record["torque"])
-        scene = replace(scene, torque=StateTorque(tape, None, tape.needs_attitude))
+        states = checked_states({name: pair for name, *pair in record.get("states", ())})
+        tape = tape_of(record["torque"], len(states))
+        names = tuple(each.name for each in states)
+        torque = StateTorque(tape, None, tape.needs_attitude, own=names)
+        scene = replace(scene, torque=torque, states=states)
     others = {name: record[name] for name in ("masses", "forces", "case")}
     if record["moments_low"] is None:
         return replace(scene, **others)

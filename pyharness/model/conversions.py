@@ -56,6 +56,7 @@ class Conversions:
     time: Array
     omega: Array
     attitude: Array | None
+    own: Array | None
     moments: Triple | ChangingMoments | ChangingInertia | None
     axes: Array | None
     scene: "Scene | None"
@@ -156,7 +157,9 @@ class Conversions:
             # A torque that does not depend on the attitude gets any.
             needed = torque.needs_attitude
             attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
-            rows = zip(self.time.tolist(), self.omega.tolist(), attitudes.tolist(), strict=True)
+            own = np.zeros((len(self.time), 0)) if self.own is None else self.own
+            columns = (self.time, self.omega, attitudes, own)
+            rows = zip(*(each.tolist() for each in columns), strict=True)
             values = [torque.at(*row) for row in rows]
         power: Array = (np.array(values).reshape(-1, 3) * omega).sum(axis=1)
         return power
@@ -233,7 +236,7 @@ class Conversions:
         pandas.DataFrame
             Its index is `time` (s). Its columns, if present, are `omega1` to `omega3` (rad/s),
             `velocity1` to `velocity3` (m/s), `q0` to `q3`, `recorded_time` (s, if it differs from
-            `time`) and `ier`. ``attrs["units"]`` has the units.
+            `time`), `ier` and the scene's own states. ``attrs["units"]`` has the units.
 
         Raises
         ------
@@ -267,8 +270,9 @@ class Conversions:
         -------
         xarray.Dataset
             Its variables, if present, are `omega` and `velocity` (dimensions `time` and `axis`),
-            `attitude` (`time` and `component`), `recorded_time` (if it differs from `time`) and
-            `ier`. Each has `units` and `long_name`. Attributes say how the integration ended.
+            `attitude` (`time` and `component`), `recorded_time` (if it differs from `time`), `ier`
+            and the scene's own states. Each has `units` and `long_name`. Attributes say how the
+            integration ended.
 
         Raises
         ------
@@ -387,10 +391,14 @@ class Conversions:
 
     def _quantities(self) -> list[_Quantity]:
         is_late = not np.array_equal(self.recorded_time, self.time, equal_nan=True)
-        return [
+        found = [
             _Quantity(name, about, unit, tuple(columns.split()), values)
             for name, (about, unit, columns) in _QUANTITIES.items()
             if (values := getattr(self, name)) is not None and (is_late or name != "recorded_time")
+        ]
+        own = cast("Trajectory", self).states.items()
+        return found + [
+            _Quantity(name, "state of the scene's own", "", (name,), each) for name, each in own
         ]
 
 

@@ -91,6 +91,19 @@ class Pieces:
         return found
 
 
+def sizes_of(largest: Array, n_own: int) -> Array:
+    """Return the sizes to which errors are relative, from the largest value of each unknown.
+
+    They are the largest component of omega, 1 for the quaternion, and the own sizes of own states.
+    The shape is that of `largest`, (..., m).
+    """
+    sizes = np.ones_like(largest)
+    sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
+    own = largest.shape[-1] - n_own
+    sizes[..., own:] = largest[..., own:]
+    return np.where(sizes > 0.0, sizes, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class DenseOutput:
     """The solution of a scene as a function of time, the attribute `sol` of a trajectory.
@@ -100,8 +113,10 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        Functions that return the states (omega, rad/s, and the attitude if requested) and their
-        derivatives, in rows.
+        Functions that return the states (omega, rad/s, the attitude if requested, and the scene's
+        own states) and their derivatives, in rows.
+    n_own : int
+        The number of own states.
 
     Examples
     --------
@@ -117,6 +132,7 @@ class DenseOutput:
     t_max: float
     states: Callable[[Array], Array]
     rates: Callable[[Array, Array], Array]
+    n_own: int = 0
 
     def __call__(self, t: Any) -> Array:
         """Return the state at one or more times.
@@ -130,7 +146,7 @@ class DenseOutput:
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            Omega (rad/s), and if requested the unit quaternion, scalar first: m is 3 or 7.
+            Omega (rad/s), if requested the unit quaternion, scalar first, and own states.
 
         Raises
         ------
@@ -163,9 +179,14 @@ class DenseOutput:
         return self._shaped(self.rates(times, self._states(times)), shape)
 
     def _states(self, times: Array) -> Array:
-        found = self.states(times)
-        found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
-        return found
+        return self.normalized(self.states(times))
+
+    def normalized(self, states: Array) -> Array:
+        """Return states, shape (..., m), whose quaternions, if any, have norm 1."""
+        own = states.shape[-1] - self.n_own
+        if own > 3:
+            states[..., 3:own] /= np.linalg.norm(states[..., 3:own], axis=-1, keepdims=True)
+        return states
 
     def _checked(self, t: Any) -> tuple[Array, tuple[int, ...]]:
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"

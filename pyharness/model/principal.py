@@ -73,7 +73,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
            [-0.707,  0.707,  0.   ],
            [ 0.   ,  0.   ,  1.   ]])
     """
-    checked_scene(scene, True, True, True, True)
+    checked_scene(scene, True, True, True, True, True)
     if scene.inertia is None:
         return scene, np.eye(3)
     frame = principal_frame(scene.inertia)
@@ -100,6 +100,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
         forces=scene.forces,
         case=scene.case,
         attitude=attitude,
+        states=scene.states,
         moments_low=frame.moments_low,
     )
     return bare, frame.axes.copy()
@@ -113,10 +114,12 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
     return replace(found, omega=found.omega @ axes.T, attitude=attitude, axes=axes)
 
 
-def states_in_scene_axes(states: Array, axes: Array) -> Array:
-    """Return rows of omega, with the attitude if there is one, transformed from principal axes."""
-    turned = _attitude_in_scene_axes(states[:, 3:], axes) if states.shape[1] > 3 else states[:, 3:]
-    return np.column_stack([states[:, :3] @ axes.T, turned])
+def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
+    """Return rows of omega, attitude up to column `own`, and own states, from principal axes."""
+    turned, rest = states[:, 3:own], states[:, own:]
+    if own > 3:
+        turned = _attitude_in_scene_axes(turned, axes)
+    return np.column_stack([states[:, :3] @ axes.T, turned, rest])
 
 
 def _attitude_in_scene_axes(attitude: Array, axes: Array) -> Array:

@@ -4,7 +4,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
@@ -12,6 +12,7 @@ from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
+from pyharness.model.own_states import OwnState, checked_states, torque_with_states
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
@@ -55,6 +56,10 @@ STATE_TORQUE = (
 CHANGING = (
     "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "
     "inertia: solve, prepare, solve_many, and the verbs prove and run --method"
+)
+OWN_STATES = (
+    "the scene has states of its own, and this takes omega and the attitude alone; allowed: solve "
+    "with the methods auto and taylor, and Stepper"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "
@@ -115,6 +120,11 @@ class Scene:
         A symmetric inertia matrix about the body axes (kg m2); None if the inertia changes.
     changing : ChangingMoments or ChangingInertia, optional
         An inertia that changes with time.
+    states : dict of str to float, or to pair of floats, optional
+        States of the user's own, at most eight, in any unit: their values at time 0, by name. The
+        torque is then a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)`` that
+        returns the torque and a dict of the states' rates. Errors of a state are relative to its
+        largest absolute value so far, or to the second number of a pair if that is larger.
 
     Raises
     ------
@@ -142,6 +152,7 @@ class Scene:
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
     changing: ChangingMoments | ChangingInertia | None = None
+    states: tuple[OwnState, ...] = ()
     # Norm of the attitude before normalisation.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
@@ -162,6 +173,7 @@ class Scene:
             attitude: Numbers | Rotation | None = None,
             inertia: Iterable[Numbers] | ChangingInertia | None = None,
             changing: ChangingMoments | None = None,
+            states: Mapping[str, Number | Sequence[Number]] | tuple[OwnState, ...] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -188,7 +200,8 @@ class Scene:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
             self._set("attitude", unit)
             self._set("attitude_length", length)
-        self._set("torque", checked_torque(self.torque))
+        self._set("states", checked_states(self.states))
+        self._set("torque", torque_with_states(self.torque, self.states, checked_torque))
         if self.torque.in_space and self.coefficients is not None:
             # Torque over moment has components about the axes of the body, which rotate.
             raise InputError(
@@ -219,7 +232,8 @@ class Scene:
     def __repr__(self) -> str:
         """Return the fields as the arguments of a call."""
         names = [each.name for each in fields(self) if each.repr]
-        shown = [x for x in names if x != "changing" or self.changing is not None]
+        absent = {x for x in ("changing", "states") if not getattr(self, x)}
+        shown = [x for x in names if x not in absent]
         return f"Scene({', '.join(f'{x}={getattr(self, x)!r}' for x in shown)})"
 
     def _set(self, name: str, value: object) -> None:
@@ -376,9 +390,12 @@ def checked_scene(
     any_torque: bool = False,
     any_state: bool = False,
     changing: bool = False,
+    states: bool = False,
 ) -> Scene:
     """Return the argument `scene`; raise InputError unless it is a Scene of an accepted kind."""
     if isinstance(scene, Scene):
+        if scene.states and not states:
+            raise InputError(OWN_STATES)
         if scene.changing is not None and not changing:
             raise InputError(CHANGING)
         if isinstance(scene.torque, StateTorque) and not any_state:

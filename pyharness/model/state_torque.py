@@ -47,6 +47,9 @@ class StateTorque:
         Names and values of the recorded function's keyword arguments with numbers as defaults.
     varied : Tape or None
         The recorded function with these parameters as further inputs.
+    own : tuple of str
+        The names of the scene's own states, which are further inputs of the tape; their rates are
+        further outputs.
     parts : tuple
         The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
@@ -61,6 +64,7 @@ class StateTorque:
     terms: tuple[TorqueLaw | tuple[tuple[str, Any], ...], ...] = ()
     parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
     varied: Tape | None = field(default=None, repr=False)
+    own: tuple[str, ...] = ()
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
     # Attributes in common with a torque law.
     is_zero: bool = field(default=False, init=False, repr=False)
@@ -82,17 +86,24 @@ class StateTorque:
             f"needs_attitude={self.needs_attitude})"
         )
 
-    def at(self, time: float, omega: Sequence[float], attitude: Sequence[float]) -> Triple:
+    def at(
+        self,
+        time: float,
+        omega: Sequence[float],
+        attitude: Sequence[float],
+        own: Sequence[float] = (),
+    ) -> Triple:
         """Return the torque at `time` (s), omega (rad/s) and attitude; NaN where it is singular.
 
-        Raise InputError if an opaque function does not return three numbers.
+        `own` are the values of the scene's own states. Raise InputError if an opaque function does
+        not return three numbers.
         """
         if self.tape is None:
             assert self.function is not None
             given = [time, np.array(omega)] + ([np.array(attitude)] if self.needs_attitude else [])
             return three_floats("[torque]", self.function(*given))
         try:
-            return triple(float_outputs(self.tape, [time, *omega, *attitude]))
+            return triple(float_outputs(self.tape, [time, *omega, *attitude, *own])[:3])
         except ZeroDivisionError:
             return math.nan, math.nan, math.nan
 
@@ -123,22 +134,26 @@ class StateTorque:
         old = self.tape
         w, x, y, z = quaternion_of_axes(axes)
 
-        def turned(time: Any, omega: Any, attitude: Any) -> Any:
-            own = product(attitude, (w, -x, -y, -z))  # the attitude of the body's old axes
-            return axes.T @ torque_of(old, time, axes @ omega, own)
+        def turned(time: Any, omega: Any, attitude: Any, *own: Any) -> Any:
+            before = product(attitude, (w, -x, -y, -z))  # the attitude of the body's old axes
+            found = torque_of(old, time, axes @ omega, before, *own)
+            return [*(axes.T @ found[:3]), *found[3:]]
 
-        return replayed(turned)
-
-
-def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any) -> Array:
-    """Return the three outputs of a tape for symbols as its inputs."""
-    return np.array(evaluate(tape, [time, *omega, *attitude], SYMBOLS), dtype=object)
+        return replayed(turned, self.own)
 
 
-def replayed(function: Function) -> StateTorque:
+def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Array:
+    """Return the outputs of a tape for symbols as its inputs: torque, and rates of own states."""
+    return np.array(evaluate(tape, [time, *omega, *attitude, *own], SYMBOLS), dtype=object)
+
+
+def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
     """Return a torque recorded from a function of this project, without checks."""
-    tape = _tape_of(function)
-    return StateTorque(tape, None, tape.needs_attitude)
+    recorder = Recorder(n_inputs=N_INPUTS + len(own))
+    time, *state = recorder.inputs()
+    omega, attitude = map(symbol_array, (state[:3], state[3:7]))
+    tape = recorder.tape(list(function(time, omega, attitude, *state[7:])))
+    return StateTorque(tape, None, tape.needs_attitude, own=own)
 
 
 def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:

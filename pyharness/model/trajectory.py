@@ -125,6 +125,8 @@ class Trajectory(Conversions):
         The time and the operation at which a recorded torque is undefined, or slides.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
+    own : ndarray, shape (n, k), or None
+        The scene's own states, in the order of its `states`.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
         Principal moments, kg m2, or an inertia that changes; None for coefficients.
     axes : ndarray, shape (3, 3), or None
@@ -141,7 +143,8 @@ class Trajectory(Conversions):
     t_events : list of ndarray, or None
         The times (s) of the events of each function, in order.
     y_events : list of ndarray, or None
-        Omega (rad/s), with the attitude if requested, at these times: shape (k, 3) or (k, 7).
+        Omega (rad/s), with the attitude if requested and own states, at these times: shape (k, m)
+        for m rows of `y`.
     sensitivities : dict of ndarray, or None
         By name of a parameter, the derivatives of omega (rad/s), with the quaternion if requested:
         shape (n, 3, m) or (n, 7, m) for m values.
@@ -167,6 +170,7 @@ class Trajectory(Conversions):
     growth: float | None = None
     reason: str | None = field(default=None, repr=False)
     attitude: Array | None = None
+    own: Array | None = None
     moments: tuple[float, float, float] | ChangingMoments | ChangingInertia | None = None
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
@@ -196,10 +200,19 @@ class Trajectory(Conversions):
 
     @property
     def y(self) -> Array:
-        """The state at each time in columns: omega (rad/s), (3, n), or with quaternion, (7, n)."""
-        if self.attitude is None:
-            return self.omega.T
-        return np.concatenate([self.omega.T, self.attitude.T])
+        """The state at each time in columns, shape (m, n).
+
+        It is omega (rad/s), the quaternion if requested, and the scene's own states.
+        """
+        parts = [each.T for each in (self.omega, self.attitude, self.own) if each is not None]
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+    @property
+    def states(self) -> dict[str, Array]:
+        """The scene's own states by name, each of shape (n,)."""
+        if self.own is None or self.scene is None:
+            return {}
+        return {each.name: self.own[:, k] for k, each in enumerate(self.scene.states)}
 
     @property
     def success(self) -> bool:

@@ -46,6 +46,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "attitude": ("f8", (4,)),
     "ier": ("i4", ()),
 }
+OWN = "own"  # an array of rows, whose width is the number of the scene's own states
 AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
 EVENTS = ("event_counts", "event_times", "event_states")
@@ -105,6 +106,8 @@ def file_content(found: "Trajectory") -> bytes:
         if name != "recorded_time" or found.recorded_time is not found.time:
             value = getattr(found, name)
             arrays |= {} if value is None else {name: np.asarray(value, kind)}
+    if found.own is not None:
+        arrays[OWN] = found.own
     if found.axes is not None:
         arrays[AXES] = found.axes
     if found.t_events is not None and found.y_events is not None:
@@ -114,7 +117,7 @@ def file_content(found: "Trajectory") -> bytes:
                 f"file: up to {MOST_FUNCTIONS}"
             )
         counts = np.array([len(times) for times in found.t_events], "i8")
-        width = 3 if found.attitude is None else 7
+        width = len(found.y)
         times = np.concatenate([np.zeros(0), *found.t_events])
         states = np.concatenate([np.zeros((0, width)), *found.y_events])
         arrays |= dict(zip(EVENTS, (counts, times, states), strict=True))
@@ -179,7 +182,9 @@ def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
         if not isinstance(torque, StateTorque) or torque.tape is None:
             raise
         record["torque"] = _tape_record(torque.tape)
-        return record, scene_text(replace(scene, torque=TorqueLaw()), [_TAPED])
+        if scene.states:
+            record["states"] = scene.states
+        return record, scene_text(replace(scene, torque=TorqueLaw(), states=()), [_TAPED])
 
 
 def _tape_record(tape: Tape) -> dict[str, Any]:
@@ -192,19 +197,20 @@ def _tape_record(tape: Tape) -> dict[str, Any]:
     return {"operations": operations, "outputs": tape.outputs}
 
 
-def tape_of(record: Any) -> Tape:
-    """Return the tape that a dictionary from JSON describes.
+def tape_of(record: Any, n_own: int = 0) -> Tape:
+    """Return the tape that a dictionary from JSON describes, with `n_own` own states.
 
     Raise ValueError, TypeError, KeyError or OverflowError if it describes no tape.
     """
     operations = record["operations"]
     if len(operations) > MOST_OPERATIONS:
         raise ValueError("more operations than can be recorded")
-    known = tuple(_operation(each, N_INPUTS + n) for n, each in enumerate(operations))
-    outputs = tuple(_linear(each, N_INPUTS + len(known)) for each in record["outputs"])
-    if len(outputs) != 3:
-        raise ValueError("the outputs are not three")
-    return Tape(known, outputs)
+    inputs = N_INPUTS + n_own
+    known = tuple(_operation(each, inputs + n) for n, each in enumerate(operations))
+    outputs = tuple(_linear(each, inputs + len(known)) for each in record["outputs"])
+    if len(outputs) != 3 + n_own:
+        raise ValueError("not an output for each component of the torque and rate of a state")
+    return Tape(known, outputs, inputs)
 
 
 def _operation(record: Any, slots: int) -> Operation:

@@ -63,6 +63,9 @@ def trajectory_report(
     if attitude is not None:
         columns += _ATTITUDE[form]
         parts.append(_shown(attitude, form))
+    for name, values in trajectory.states.items():
+        columns.append(Column(name, _NUMBER, name=name))
+        parts.append(values)
     rows = np.column_stack(parts)
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
@@ -87,6 +90,11 @@ def trajectory_report(
                 "omega": trajectory.omega.tolist(),
                 "velocity": None if velocity is None else velocity.tolist(),
                 "attitude": None if attitude is None else attitude.tolist(),
+                **(
+                    {"states": {name: x.tolist() for name, x in trajectory.states.items()}}
+                    if trajectory.states
+                    else {}
+                ),
                 "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },

@@ -25,7 +25,9 @@ SCENE_TABLES = {
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
     "torque": ("constant", "rate", "sines", "cosines", "frame", *_TEXTS, "terms"),
     "run": ("step_size", "steps"),
+    "states": (),
 }
+_STATE = ("start", "scale", "rate")
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
@@ -78,16 +80,18 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
         tables[table] = data.get(table, {})
         if not isinstance(tables[table], dict):
             raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")
-        if table != "torque":
+        if table not in ("torque", "states"):
             check_keys(tables[table], keys, f"[{table}]")
     body, initial, run = _body(tables["body"]), tables["initial"], tables["run"]
     if "omega" not in initial:
         raise InputError("[initial] omega is missing; give three numbers in rad/s")
+    states, rates = _states(tables["states"])
     return Scene(
         name=data.get("name", default_name),
         omega=initial["omega"],
         attitude=_attitude(initial),
-        torque=_torque(tables["torque"], body),
+        states=states,
+        torque=_torque(tables["torque"], body, rates),
         **body,
         **run,
     )
@@ -101,6 +105,21 @@ def _body(table: dict[str, Any]) -> dict[str, Any]:
     if isinstance(inertia, list) and any(map(_has_lists, inertia)):
         return {**table, "inertia": ChangingInertia(inertia)}
     return table
+
+
+def _states(table: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return starts and scales, and the expressions of the rates, by name of a state."""
+    states, rates = {}, {}
+    for name, values in table.items():
+        where = f"[states.{name}]"
+        if not isinstance(values, dict):
+            raise InputError(f"{where} is {kind_of(values)}; it must be a table with start, rate")
+        check_keys(values, _STATE, where)
+        if "rate" not in values:
+            raise InputError(f"{where}: rate is missing; give an expression, as in '0.4*w3'")
+        states[name] = (values.get("start", 0.0), values.get("scale", 0.0))
+        rates[name] = values["rate"]
+    return states, rates
 
 
 def _has_lists(value: Any) -> bool:
@@ -118,10 +137,15 @@ def _attitude(initial: dict[str, Any]) -> Any:
     return of_angles("[initial] angles_deg", initial["angles_deg"], initial["sequence"])
 
 
-def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTorque:
+def _torque(
+    table: dict[str, Any], body: dict[str, Any], rates: dict[str, Any]
+) -> TorqueLaw | StateTorque:
     check_keys(table, SCENE_TABLES["torque"], "[torque]")
     given = {key: value for key, value in table.items() if key != "terms"}
-    first = _expressions(given) if any(key in given for key in _TEXTS) else law_of_table(given)
+    if rates or any(key in given for key in _TEXTS):
+        first = _expressions(given, rates)
+    else:
+        first = law_of_table(given)
     if "terms" not in table:
         return first
     # Imported late, because few scenes have ready terms.
@@ -131,10 +155,11 @@ def _torque(table: dict[str, Any], body: dict[str, Any]) -> TorqueLaw | StateTor
     return sum(terms[1:], terms[0]) + first if terms else first
 
 
-def _expressions(table: dict[str, Any]) -> StateTorque | TorqueLaw:
+def _expressions(table: dict[str, Any], rates: dict[str, Any]) -> StateTorque | TorqueLaw:
     if "expression" not in table:
+        what = "states" if rates else "constants"
         raise InputError(
-            "[torque]: constants without expression; give an expression, a list of three texts, or "
+            f"[torque]: {what} without expression; give an expression, a list of three texts, or "
             "constant, three numbers"
         )
     if others := [key for key in table if key not in _TEXTS]:
@@ -142,4 +167,4 @@ def _expressions(table: dict[str, Any]) -> StateTorque | TorqueLaw:
             f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
             "constant, rate, sines, cosines and frame"
         )
-    return parsed(table["expression"], table.get("constants", {}))
+    return parsed(table["expression"], table.get("constants", {}), rates)

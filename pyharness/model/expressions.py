@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from keyword import iskeyword
+from types import MappingProxyType
 from typing import Any
 
 from pyharness.model.errors import InputError, kind_of, unknown
@@ -54,27 +55,37 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 }
 
 
-def parsed(expressions: object, constants: object) -> StateTorque | TorqueLaw:
+def parsed(
+    expressions: object, constants: object, rates: Mapping[str, object] = MappingProxyType({})
+) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
-    Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, and `constants`. Values
-    are in N m, or in 1/s2 for a body with coefficients. Raise InputError, which names the place,
-    for an invalid expression.
+    Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and own
+    states, whose rates by name are expressions too. Values are in N m, or in 1/s2 for a body with
+    coefficients. Raise InputError, which names the place, for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
-    recorder = Recorder(has_lines=False)
-    tape = recorder.tape(components(texts, recorder.inputs(), values))
+    for name, text in rates.items():
+        place = f"[states.{name}] rate"
+        if name in (*INPUTS, "pi", *FUNCTIONS, *values):
+            raise InputError(f"[states]: '{name}' has another meaning in expressions already")
+        texts[place] = _checked_text(text, place)
+    recorder = Recorder(has_lines=False, n_inputs=len(INPUTS) + len(rates))
+    inputs = recorder.inputs()
+    own = dict(zip(rates, inputs[len(INPUTS) :], strict=True))
+    tape = recorder.tape(components(texts, inputs[: len(INPUTS)], {**values, **own}))
     torque = StateTorque(
-        tape, None, tape.needs_attitude, tuple(texts.values()), tuple(values.items())
-    )
+        tape, None, tape.needs_attitude, tuple(texts.values()), tuple(values.items()),
+        own=tuple(rates),
+    )  # fmt: skip
     return law_of(torque) or torque
 
 
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of three checked expressions, `texts` by place, for eight symbols."""
+    """Return the values of checked expressions, `texts` by place, for eight symbols."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
@@ -107,22 +118,21 @@ def _three_texts(expressions: object) -> dict[str, str]:
     if len(given) != 3:
         count = "more than 3" if len(given) > 3 else len(given)
         raise InputError(f"{where}: {count} entries; {_THREE}")
-    texts = {}
-    for number, text in enumerate(given, 1):
-        place = f"{where} {number}"
-        if not isinstance(text, str):
-            raise InputError(f"{place} is {kind_of(text)}; it must be text, as in '-0.1*w1'")
-        if len(text) > _LONGEST:
-            raise InputError(
-                f"{place}: {len(text)} characters; allowed: at most {_LONGEST} characters"
-            )
-        if foreign := _FOREIGN.search(text):
-            character = foreign[0]
-            if character.isspace():  # a message shows white space as a blank
-                character = character.encode("unicode_escape").decode()
-            raise InputError(f"{place}: unknown character '{character}'; {_ALLOWED}")
-        texts[place] = " ".join(text.split())
-    return texts
+    places = (f"{where} {number}" for number in (1, 2, 3))
+    return {place: _checked_text(text, place) for place, text in zip(places, given, strict=True)}
+
+
+def _checked_text(text: object, place: str) -> str:
+    if not isinstance(text, str):
+        raise InputError(f"{place} is {kind_of(text)}; it must be text, as in '-0.1*w1'")
+    if len(text) > _LONGEST:
+        raise InputError(f"{place}: {len(text)} characters; allowed: at most {_LONGEST} characters")
+    if foreign := _FOREIGN.search(text):
+        character = foreign[0]
+        if character.isspace():  # a message shows white space as a blank
+            character = character.encode("unicode_escape").decode()
+        raise InputError(f"{place}: unknown character '{character}'; {_ALLOWED}")
+    return " ".join(text.split())
 
 
 def _component(text: str, names: Mapping[str, Any], place: str) -> Any:

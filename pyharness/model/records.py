@@ -28,6 +28,16 @@ def scene_record(scene: Scene) -> dict[str, Any]:
         },
         "torque": _torque(scene.torque),
         "run": {"step_size": scene.step_size, "steps": scene.steps},
+        **({"states": _states(scene)} if scene.states else {}),
+    }
+
+
+def _states(scene: Scene) -> dict[str, Any]:
+    assert isinstance(scene.torque, StateTorque)
+    rates = scene.torque.expression[3:] or (None,) * len(scene.states)
+    return {
+        each.name: {"start": each.start, "scale": each.scale, "rate": rate}
+        for each, rate in zip(scene.states, rates, strict=True)
     }
 
 
@@ -41,7 +51,7 @@ def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
         return {"recorded": len(torque.tape.operations)}
     record: dict[str, Any] = {}
     if torque.expression:
-        record = {"expression": list(torque.expression), "constants": dict(torque.constants)}
+        record = {"expression": list(torque.expression[:3]), "constants": dict(torque.constants)}
     for part in torque.terms:
         if isinstance(part, TorqueLaw):
             record |= _torque(part)

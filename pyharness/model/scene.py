@@ -12,7 +12,7 @@ from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
-from pyharness.model.own_states import OwnState, checked_states, torque_with_states
+from pyharness.model.own_states import OwnState, checked_states
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import (
@@ -58,7 +58,7 @@ CHANGING = (
     "inertia: solve, prepare, solve_many, and the verbs prove and run --method"
 )
 OWN_STATES = (
-    "the scene has states of its own, and this takes omega and the attitude alone; allowed: solve "
+    "the scene has states of its own, which this can't integrate; allowed: solve and the verb run "
     "with the methods auto and taylor, and Stepper"
 )
 SPACE_TORQUE = (
@@ -201,7 +201,8 @@ class Scene:
             self._set("attitude", unit)
             self._set("attitude_length", length)
         self._set("states", checked_states(self.states))
-        self._set("torque", torque_with_states(self.torque, self.states, checked_torque))
+        names = tuple(each.name for each in self.states)
+        self._set("torque", checked_torque(self.torque, names))
         if self.torque.in_space and self.coefficients is not None:
             # Torque over moment has components about the axes of the body, which rotate.
             raise InputError(

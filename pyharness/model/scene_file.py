@@ -142,7 +142,7 @@ def _torque_lines(scene: Scene) -> list[str]:
     lines = ["[torque]"]
     if torque.expression:
         # The texts need no escapes: they have neither quotes, backslashes nor control characters.
-        texts = ", ".join(f'"{text}"' for text in torque.expression)
+        texts = ", ".join(f'"{text}"' for text in torque.expression[:3])
         lines += [f"expression = [{texts}]", "[torque.constants]"]
         lines += [f"{name} = {value!r}" for name, value in torque.constants]
     for part in torque.terms:
@@ -150,6 +150,9 @@ def _torque_lines(scene: Scene) -> list[str]:
             lines += _law_lines(part)
         else:
             lines += ["[[torque.terms]]", *_term_lines(part, scene.changing)]
+    for state, rate in zip(scene.states, torque.expression[3:], strict=True):
+        lines += [f"[states.{state.name}]", f"start = {state.start!r}", f"scale = {state.scale!r}"]
+        lines.append(f'rate = "{rate}"')
     return lines
 
 

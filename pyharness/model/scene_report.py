@@ -1,13 +1,14 @@
 """Lines of a report on a scene and a run."""
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from pyharness.model.changing import ChangingMoments
 from pyharness.model.report import counted, short
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import ATTITUDE, OMEGA, TIME
+from pyharness.model.tape import ATTITUDE, N_INPUTS, OMEGA, TIME
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 
@@ -41,6 +42,10 @@ def heading(scene: Scene) -> list[str]:
         lines.append("no rigid body has these moments: the largest exceeds the sum of the others")
     if scene.attitude is not None:
         lines.append(f"attitude(0) = {_tuple(scene.attitude)}")
+    rates = scene.torque.expression[3:] if isinstance(scene.torque, StateTorque) else ()
+    for state, rate in itertools.zip_longest(scene.states, rates):
+        law = "" if rate is None else f", rate {_shortened(rate)}"
+        lines.append(f"{state.name}(0) = {state.start:g}{law}")
     return lines
 
 
@@ -67,7 +72,7 @@ def _state_torque(torque: StateTorque, unit: str) -> str:
     if torque.expression or torque.terms:
         parts = []
         if torque.expression:
-            shown = ", ".join(map(_shortened, torque.expression))
+            shown = ", ".join(map(_shortened, torque.expression[:3]))
             constants = ", ".join(f"{name} = {value:g}" for name, value in torque.constants)
             parts = [f"({shown}) {unit}" + (f" with {_shortened(constants)}" if constants else "")]
         for part in torque.terms:
@@ -79,9 +84,10 @@ def _state_torque(torque: StateTorque, unit: str) -> str:
     if torque.tape is None:
         names = ["t", "omega", "attitude"] if torque.needs_attitude else ["t", "omega"]
         return f"N is an opaque function of {_joined(names)}, in {unit}"
-    inputs = {"t": (TIME,), "omega": OMEGA, "attitude": ATTITUDE}
+    inputs: dict[str, Iterable[int]] = {"t": (TIME,), "omega": OMEGA, "attitude": ATTITUDE}
+    inputs["states"] = range(N_INPUTS, torque.tape.n_inputs)
     names = [name for name, slots in inputs.items() if not torque.tape.inputs.isdisjoint(slots)]
-    return f"N is a recorded function of {_joined(names)}, in {unit}"
+    return f"N is a recorded function of {_joined(names or ['constants'])}, in {unit}"
 
 
 def _shortened(text: str) -> str:

@@ -1,7 +1,7 @@
 """Torques that depend on the state, recorded or opaque."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from inspect import Parameter, signature
@@ -20,6 +20,10 @@ from pyharness.model.values import Triple, converted, three_floats, triple
 
 Function = Callable[..., Any]
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
+_WITH_STATES = (
+    "a function of (t, omega, states) or (t, omega, attitude, states) that returns the torque and "
+    "the rates of the states"
+)
 
 
 @dataclass(frozen=True)
@@ -176,7 +180,7 @@ def of_law(law: TorqueLaw) -> StateTorque:
     return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
 
 
-def recorded(function: Function) -> StateTorque:
+def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
     A scene records its function itself; this function is for sums.
@@ -186,6 +190,9 @@ def recorded(function: Function) -> StateTorque:
     function : callable
         A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
         (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
+    states : sequence of str
+        The names of the scene's own states. With some, they are one more argument, a dict, and the
+        function returns the torque and a dict of their rates.
 
     Returns
     -------
@@ -206,6 +213,9 @@ def recorded(function: Function) -> StateTorque:
     >>> total.at(0.0, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
     (0.5, -1.0, -1.5)
     """
+    names = tuple(states)
+    if names:
+        return _with_states(function, names)
     takes_attitude = _takes_attitude(function)
 
     def called(time: Symbol, omega: Any, attitude: Any, **values: Symbol) -> list[Any]:
@@ -220,6 +230,62 @@ def recorded(function: Function) -> StateTorque:
     tape = recorded_twice(lambda recorder: _recorded_with(recorder, called), Recorder)
     torque = StateTorque(tape, None, tape.needs_attitude)
     return _with_parameters(torque, function, called)
+
+
+def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
+    """Return a torque recorded from a function that also returns the rates of own states."""
+    takes_attitude = _count_arguments(function) == 4
+
+    def record(recorder: Recorder) -> Tape:
+        time, *state = recorder.inputs()
+        omega, attitude = map(symbol_array, (state[:3], state[3:7]))
+        own = dict(zip(names, state[7:], strict=True))
+        given = (time, omega, attitude, own) if takes_attitude else (time, omega, own)
+        parts = called_once(function, given, recorder, _WITH_STATES)
+        if len(parts) != 2:
+            raise InputError(
+                f"[torque]: the function returned {len(parts)} values; it must be {_WITH_STATES}"
+            )
+        components = list(parts[0])
+        if len(components) != 3:
+            raise InputError(f"[torque]: {len(components)} components; allowed: three")
+        return recorder.tape([*components, *_ordered_rates(parts[1], names)])
+
+    tape = recorded_twice(record, partial(Recorder, n_inputs=N_INPUTS + len(names)))
+    return StateTorque(tape, None, tape.needs_attitude, own=names)
+
+
+def _ordered_rates(rates: Any, names: tuple[str, ...]) -> list[Any]:
+    if not isinstance(rates, Mapping):
+        found = list(np.atleast_1d(np.asarray(rates, dtype=object)))
+        if len(found) != len(names):
+            raise InputError(
+                f"[torque]: {len(found)} rates of states; allowed: {len(names)}, those of "
+                f"{_listed(names)}"
+            )
+        return found
+    if set(rates) != set(names):
+        raise InputError(
+            f"[torque]: rates of {_listed(map(str, rates))}; allowed: of {_listed(names)}"
+        )
+    return [rates[name] for name in names]
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"
+
+
+def _count_arguments(function: Function) -> int:
+    try:
+        parameters = signature(function).parameters.values()
+    except (TypeError, ValueError):
+        raise InputError(
+            f"[torque]: the function's arguments are unknown; allowed: {_WITH_STATES}"
+        ) from None
+    count = sum(each.kind in _POSITIONAL for each in parameters)
+    if count not in (3, 4):
+        raise InputError(f"[torque]: the function has {count} arguments; allowed: {_WITH_STATES}")
+    return count
 
 
 def opaque(function: Any) -> StateTorque:
@@ -267,8 +333,19 @@ def has_switches(torque: object) -> bool:
     )
 
 
-def checked_torque(value: object) -> TorqueLaw | StateTorque:
+def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
     """Return a user's torque, recorded if it is a function, or raise InputError."""
+    found = _torque(value, states)
+    own = found.own if isinstance(found, StateTorque) else ()
+    if own != states:
+        raise InputError(
+            f"states: {_listed(states)}, but the torque has rates of {_listed(own)}; "
+            f"allowed: {_WITH_STATES}"
+        )
+    return found
+
+
+def _torque(value: object, states: tuple[str, ...]) -> TorqueLaw | StateTorque:
     if isinstance(value, (TorqueLaw, StateTorque)):
         return value
     if isinstance(value, (list, tuple, np.ndarray)):
@@ -278,14 +355,14 @@ def checked_torque(value: object) -> TorqueLaw | StateTorque:
             f"[torque] is {kind_of(value)}; it must be three numbers, a TorqueLaw, or a function "
             "of (t, omega) or (t, omega, attitude)"
         )
-    torque = recorded(value)
+    torque = recorded(value, states)
     return law_of(torque) or torque
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
     """Return the torque law that equals a recorded torque, or None; laws have faster methods."""
     tape = torque.tape
-    if tape is None or tape.inputs - {TIME}:
+    if tape is None or torque.own or tape.inputs - {TIME}:
         return None
     frequencies, waves = {TIME: 1.0}, {}
     for slot, (kind, operands, linear, _) in enumerate(tape.operations, N_INPUTS):
@@ -362,12 +439,23 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
     frames = [[law for law in given if law.frame == frame] for frame in FRAMES]
     laws = [law for each in frames if not (law := sum(each, TorqueLaw())).is_zero]
 
-    def total(time: Any, omega: Any, attitude: Any) -> Any:
-        values = [torque_of(tape, time, omega, attitude) for tape in tapes]
-        values += [body_torque(law, time, attitude) for law in laws]
-        return sum(values[1:], values[0])
+    owners = [each for each in torques if each.own]
+    if len(owners) > 1:
+        raise InputError(
+            "[torque]: two summands have states; allowed: one function with all states"
+        )
 
-    found = replace(replayed(total), parts=tuple(parts))
+    def total(time: Any, omega: Any, attitude: Any, *own: Any) -> list[Any]:
+        given = (own if each.own else () for each in torques)
+        values = [
+            torque_of(x, time, omega, attitude, *y) for x, y in zip(tapes, given, strict=True)
+        ]
+        rates = [rate for each in values for rate in each[3:]]
+        values = [each[:3] for each in values]
+        values += [body_torque(law, time, attitude) for law in laws]
+        return [*sum(values[1:], values[0]), *rates]
+
+    found = replace(replayed(total, owners[0].own if owners else ()), parts=tuple(parts))
     expressions = [each for each in torques if each.expression]
     terms = [term for each in torques for term in each.terms]
     if len(terms) + len(expressions) < len(torques) or len(expressions) + len(laws) > 1:

@@ -62,7 +62,12 @@ def run(options: argparse.Namespace) -> int:
     """
     by_method = options.method is not None
     scene = shared.chosen_scene(
-        options, any_axes=by_method, any_torque=by_method, any_state=by_method, changing=by_method
+        options,
+        any_axes=by_method,
+        any_torque=by_method,
+        any_state=by_method,
+        changing=by_method,
+        states=by_method,
     )
     if (options.program is None) == (options.method is None):
         from pyharness.engine.registry import METHODS

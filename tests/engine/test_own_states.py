@@ -1,0 +1,441 @@
+"""States of the user's own: examples with a closed form or conserved quantity, random ones."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pyharness import (
+    ChangingMoments,
+    Scene,
+    Stepper,
+    events,
+    load,
+    prepare,
+    read_scene,
+    solve,
+    solve_many,
+)  # fmt: skip
+from pyharness.model.attitude import quaternion_rates
+from pyharness.model.errors import InputError
+from pyharness.model.scene_file import scene_text
+from pyharness.model.trajectory import turned_to_space
+from pyharness.torques import damping, recorded
+
+MOMENTS = (2.0, 3.0, 4.0)
+TOLERANCES = (1e-4, 1e-8, 1e-12)
+
+
+def integral(t: Any, omega: Any, states: Any) -> Any:
+    """Return the torque about axis 3 of a controller with an integral term, and its rate."""
+    return [0.0, 0.0, -0.8 * omega[2] - 2.0 * states["turned"]], {"turned": omega[2]}
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_an_integral_term_makes_a_damped_oscillation(tolerance: float) -> None:
+    scene = Scene("integral", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
+    times = np.linspace(-4.0, 20.0, 60)
+    found = solve(scene, times, tolerance=tolerance)
+    decay, frequency = 0.1, math.sqrt(0.5 - 0.01)
+    turned = np.exp(-decay * times) * np.sin(frequency * times) / frequency
+    assert np.abs(found.states["turned"] - turned).max() <= tolerance * np.abs(turned).max() + 1e-14
+    assert found.error is not None
+    assert found.error <= tolerance
+
+
+def wheel(t: Any, omega: Any, attitude: Any, states: Any) -> Any:
+    """Return the torque of a wheel about axis 3 on a body, whose motor damps the body."""
+    motor = 0.4 * omega[2] - 0.1 * np.sin(attitude[3])
+    about = np.array([0.0, 0.0, states["wheel"]], dtype=object)
+    return -np.cross(omega, about) - np.array([0.0, 0.0, motor]), {"wheel": motor}
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_a_wheel_under_a_law_keeps_the_angular_momentum(tolerance: float) -> None:
+    scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
+    found = solve(scene, np.linspace(0.0, 30.0, 40), tolerance=tolerance, attitude=True)
+    momentum = found.omega * np.array(MOMENTS)
+    momentum[:, 2] += found.states["wheel"]
+    assert found.attitude is not None
+    kept = turned_to_space(found.attitude, momentum)
+    assert np.ptp(kept, axis=0).max() <= 20.0 * tolerance + 1e-13
+    assert np.ptp(found.states["wheel"]) > 0.5
+
+
+def flexible(t: Any, omega: Any, states: Any) -> Any:
+    """Return the torque of an appendage on a spring about axis 3, of moment 0.5 kg m2."""
+    push = 3.0 * states["angle"]
+    # The appendage turns relative to the body: 0.5 (rate' + omega3') = -push.
+    return [0.0, 0.0, push], {"angle": states["rate"], "rate": -push / 0.5 - push / 4.0}
+
+
+def test_a_flexible_appendage_keeps_energy_and_has_its_frequency() -> None:
+    start = {"angle": 0.1, "rate": 0.0}
+    scene = Scene("flexible", (0.0, 0.0, 0.2), MOMENTS, torque=flexible, states=start)
+    times = np.linspace(0.0, 50.0, 80)
+    found = solve(scene, times)
+    angle, rate = found.states["angle"], found.states["rate"]
+    frequency = math.sqrt(3.0 / 0.5 + 3.0 / 4.0)
+    assert np.abs(angle - 0.1 * np.cos(frequency * times)).max() < 1e-13
+    spin = found.omega[:, 2]
+    energy = 2.0 * spin**2 + 0.25 * (spin + rate) ** 2 + 1.5 * angle**2
+    assert np.ptp(energy) < 1e-14
+
+
+def pendulum(t: Any, omega: Any, states: Any) -> Any:
+    """Return the torque of a slosh pendulum in a body that is accelerated along axis 1."""
+    pull = 0.3 * np.sin(states["angle"])
+    return [0.0, 0.0, pull], {"angle": states["rate"], "rate": -pull / 0.2 - pull / 4.0}
+
+
+def test_a_slosh_pendulum_keeps_its_energy() -> None:
+    start = {"angle": 2.0, "rate": 0.3}
+    scene = Scene("slosh", (0.0, 0.0, 0.0), MOMENTS, torque=pendulum, states=start)
+    found = solve(scene, np.linspace(0.0, 60.0, 100))
+    angle, rate = found.states["angle"], found.states["rate"]
+    # In the relative motion, the reduced moment is that of both bodies in series.
+    energy = 0.5 / (1.0 / 0.2 + 1.0 / 4.0) * rate**2 - 0.3 * np.cos(angle)
+    assert np.ptp(energy) < 2e-13
+    assert np.abs(4.0 * found.omega[:, 2] + 0.2 * (found.omega[:, 2] + rate) - 0.06).max() < 1e-13
+
+
+def lagging(t: Any, omega: Any, states: Any, *, lag: float = 0.25) -> Any:
+    """Return the torque of an actuator that follows a step of its command with a lag."""
+    return [states["torque"], 0.0, 0.0], [(1.0 - states["torque"]) / lag]
+
+
+def test_an_actuator_follows_its_command_with_a_lag() -> None:
+    scene = Scene("lag", (0.0, 0.0, 0.0), MOMENTS, torque=lagging, states={"torque": 0.0})
+    times = np.linspace(0.0, 3.0, 20)
+    found = solve(scene, times)
+    assert np.abs(found.states["torque"] - (1.0 - np.exp(-times / 0.25))).max() < 1e-14
+    spin = 0.5 * (times - 0.25 * (1.0 - np.exp(-times / 0.25)))
+    assert np.abs(found.omega[:, 0] - spin).max() < 1e-14
+
+
+def held(t: Any, omega: Any, states: Any) -> Any:
+    """Return the torque of a saturated controller, whose integral waits while it is saturated."""
+    wanted = -4.0 * omega[2] - 0.5 * states["integral"]
+    torque = np.clip(wanted, -0.5, 0.5)
+    return [0.0, 0.0, torque], {"integral": np.where(abs(wanted) < 0.5, omega[2], 0.0)}
+
+
+def test_an_integrator_with_anti_windup_waits() -> None:
+    scene = Scene("held", (0.0, 0.0, 1.0), MOMENTS, torque=held, states={"integral": 0.0})
+    found = solve(scene, np.linspace(0.0, 12.0, 60), tolerance=1e-10)
+    leaves = 7.0  # where omega3, which decreases by 1/8 rad/s2, is 1/8 rad/s
+    assert found.ended == "complete"
+    assert (found.states["integral"][found.time < leaves] == 0.0).all()
+    t = found.time[found.time > leaves] - leaves
+    slow, fast = (-0.5 + sign * math.sqrt(0.125) for sign in (1, -1))
+    turned = 0.125 * (np.exp(slow * t) - np.exp(fast * t)) / (slow - fast)
+    assert np.abs(found.states["integral"][found.time > leaves] - turned).max() < 1e-10
+
+
+def test_an_integral_that_waits_may_hold_the_body_at_its_limit() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        wanted = -1.5 * omega[2] - 2.0 * states["integral"]
+        held = np.where(abs(wanted) < 0.5, omega[2], 0.0)
+        return [0.0, 0.0, np.clip(wanted, -0.5, 0.5)], {"integral": held}
+
+    scene = Scene("slides", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"integral": 0.0})
+    found = solve(scene, 12.0)
+    assert found.ended == "sliding"
+    assert found.reason is not None
+    assert "t = 5.33333 s" in found.reason
+
+
+NAMES = ("a", "b", "c", "d", "e", "f", "g", "h")
+
+
+def random_scene(seed: int) -> tuple[Scene, Any, float, np.ndarray[Any, Any]]:
+    """Return a scene, the right-hand side of its unknowns, the last time, and their sizes."""
+    draw = np.random.default_rng(seed)
+    k, attitude = 1 + seed % 8, seed % 3 > 0
+    own, by, of = (draw.normal(size=(k, m)) for m in (k, 3, 3))
+    turned, size = draw.normal(size=(3, 4)) * 0.3, 10.0 ** draw.uniform(-5, 5, k)
+    own = 0.4 * own - np.eye(k)
+
+    def parts(t: Any, omega: Any, q: Any, states: Any) -> Any:
+        u = [states[j] / size[j] for j in range(k)]
+        torque = [
+            np.tanh(sum(0.3 * of[j, i] * u[j] for j in range(k)) - 0.4 * omega[i])
+            + sum(turned[i, m] * q[m] for m in range(len(q)))
+            for i in range(3)
+        ]
+        rates = [
+            size[i]
+            * (
+                sum(own[i, j] * u[j] for j in range(k))
+                + sum(by[i, j] * omega[j] for j in range(3))
+                + 0.3 * np.sin(1.3 * t + u[0])
+            )
+            for i in range(k)
+        ]
+        return torque, rates
+
+    def plain(t: Any, omega: Any, states: Any) -> Any:
+        torque, rates = parts(t, omega, (), [*states.values()])
+        return torque, dict(zip(states, rates, strict=True))
+
+    def with_attitude(t: Any, omega: Any, q: Any, states: Any) -> Any:
+        return parts(t, omega, q, [*states.values()])
+
+    moments = draw.uniform(1.0, 2.0, 3)
+    axes = np.linalg.qr(draw.normal(size=(3, 3)))[0]
+    inertia = axes @ np.diag(moments) @ axes.T
+    inertia = 0.5 * (inertia + inertia.T)
+    start = np.where(draw.random(k) < 0.6, size, 0.0)
+    scene = Scene(
+        "random", draw.normal(size=3), inertia=inertia.tolist(),
+        torque=with_attitude if attitude else plain,
+        states=dict(zip(NAMES[:k], start.tolist(), strict=True)),
+    )  # fmt: skip
+
+    def slopes(t: float, y: Any) -> Any:
+        omega, q, states = np.split(y, [3, 7 if attitude else 3])
+        torque, rates = parts(t, omega, q, states)
+        push = np.array(torque, dtype=float) - np.cross(omega, inertia @ omega)
+        turning = quaternion_rates(omega, q) if attitude else []
+        return [*np.linalg.solve(inertia, push), *turning, *rates]
+
+    sizes = np.array([1.0] * (7 if attitude else 3) + size.tolist())
+    return scene, slopes, float(draw.uniform(2.0, 6.0)), sizes
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_states_are_within_the_tolerance(seed: int) -> None:
+    scene, slopes, end, sizes = random_scene(seed)
+    attitude = len(sizes) - len(scene.states) == 7
+    times = np.linspace(0.0, end, 6)[1:]
+    start = [*scene.omega, *([1.0, 0.0, 0.0, 0.0] if attitude else [])]
+    start += [each.start for each in scene.states]
+    truth = solve_ivp(
+        lambda t, z: np.array(slopes(t, z * sizes)) / sizes, (0.0, end), np.array(start) / sizes,
+        "DOP853", times, rtol=1e-12, atol=1e-14,
+    ).y.T * sizes  # fmt: skip
+    largest = np.abs(np.vstack([truth, start])).max(axis=0)
+    largest[:3] = largest[:3].max()
+    if attitude:
+        largest[3:7] = 0.5
+    for tolerance in (1e-4, 1e-9):
+        found = solve(scene, times, tolerance=tolerance, attitude=attitude, dense_output=True)
+        assert found.ended == "complete"
+        assert found.sol is not None
+        growth = found.growth or 1.0
+        assert (np.abs(found.y.T - truth) <= largest * (tolerance + 1e-11 * growth)).all()
+        assert (np.abs(found.sol(times).T - found.y.T) <= largest * 2.0 * tolerance).all()
+        rates = np.array([slopes(t, found.sol(t)) for t in times])
+        assert (np.abs(found.sol.derivative(times).T - rates) <= 1e-11 * sizes * 10.0).all()
+
+
+def test_size_of_a_state_does_not_matter() -> None:
+    found = []
+    for power in (0, 100, -100):
+        size = 2.0**power
+
+        def law(t: Any, omega: Any, states: Any, *, size: float = size) -> Any:
+            return [0.0, 0.0, -states["x"] / size], {"x": size * (omega[2] - states["x"] / size)}
+
+        scene = Scene("sized", (0.1, 0.2, 1.0), MOMENTS, torque=law, states={"x": 0.0})
+        rows = solve(scene, np.linspace(0.0, 9.0, 10), tolerance=1e-9)
+        found.append((rows.omega.tolist(), (rows.states["x"] / size).tolist(), rows.steps))
+    assert found[0] == found[1] == found[2]
+
+
+def test_a_larger_scale_is_a_looser_tolerance() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"fast": np.sin(40.0 * t)}
+
+    steps = [
+        solve(Scene("scaled", (0.0, 0.0, 0.1), MOMENTS, torque=law, states={"fast": x}), 9.0).steps
+        for x in (0.0, (0.0, 1e6))
+    ]
+    assert steps[1] < 0.8 * steps[0]
+
+
+def test_events_and_their_states() -> None:
+    def low(t: Any, omega: Any, states: Any) -> Any:
+        return states["turned"] - 0.3
+
+    low.terminal = 2  # type: ignore[attr-defined]
+    scene = Scene("integral", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
+    found = solve(scene, [1.0, 20.0], events=[low, events.crosses(3, 0.0)], tolerance=1e-11)
+    assert found.ended == "event"
+    assert found.t_events is not None
+    assert found.y_events is not None
+    decay, frequency = 0.1, 0.7
+    for time, state in zip(found.t_events[0], found.y_events[0], strict=True):
+        turned = math.exp(-decay * time) * math.sin(frequency * time) / frequency
+        assert abs(turned - 0.3) < 1e-10
+        assert abs(state[3] - 0.3) < 1e-10
+    assert len(found.t_events[0]) == 2
+    # The largest angle is where omega3 is 0.
+    assert math.tan(frequency * found.t_events[1][0]) == pytest.approx(frequency / decay, rel=1e-9)
+
+
+def test_stepper_agrees_and_states_may_be_set() -> None:
+    scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
+    stepper = Stepper(scene, 1e-12, attitude=True)
+    stepper.until(5.0)
+    found = solve(scene, 5.0, attitude=True)
+    assert stepper.states["wheel"] == pytest.approx(found.states["wheel"][0], rel=1e-12)
+    assert stepper.at(5.0) == pytest.approx(found.y[:, 0], rel=1e-11)
+    stepper.states = {"wheel": 0.0}
+    stepper.until(6.0)
+    later = Scene(
+        "later", found.omega[0], MOMENTS, attitude=found.attitude[0],  # type: ignore[index]
+        torque=wheel, states={"wheel": 0.0},
+    )  # fmt: skip
+    assert stepper.omega == pytest.approx(solve(later, 1.0, attitude=True).omega[0], rel=1e-11)
+    with pytest.raises(InputError, match="allowed: a dict of wheel"):
+        stepper.states = {"wheels": 0.0}
+    with pytest.raises(InputError, match="allowed: those of the first scene"):
+        stepper.scene = Scene("none", (0.0, 0.0, 1.0), MOMENTS)
+
+
+def test_stepper_takes_an_inertia_that_changes() -> None:
+    moments = ChangingMoments([(2.0, 0.1), (3.0, 0.0, 0.01), (4.0,)])
+    scene = Scene("fuel", (0.3, -0.2, 1.0), moments, torque=integral, states={"turned": 0.0})
+    stepper = Stepper(scene, 1e-13)
+    stepper.until(7.0)
+    found = solve(scene, 7.0)
+    assert stepper.omega == pytest.approx(found.omega[0], rel=1e-12)
+    assert stepper.states["turned"] == pytest.approx(found.states["turned"][0], rel=1e-12)
+    stepper.held_torque = (0.0, 0.0, 0.4)
+    stepper.until(7.5)
+
+    def pushed(t: Any, omega: Any, states: Any) -> Any:
+        torque, rates = integral(t, omega, states)
+        return [*torque[:2], torque[2] + np.where(t > 7.0, 0.4, 0.0)], rates
+
+    other = Scene("pushed", (0.3, -0.2, 1.0), moments, torque=pushed, states={"turned": 0.0})
+    assert stepper.omega == pytest.approx(solve(other, 7.5).omega[0], rel=1e-11)
+
+
+def test_results_have_the_states_by_name(tmp_path: Any) -> None:
+    scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
+    found = solve(
+        scene, [4.0, 2.0], attitude=True, events=lambda t, omega, states: states["wheel"] - 1.7
+    )
+    assert found.to_pandas()["wheel"].tolist() == found.states["wheel"].tolist()
+    assert found.to_xarray()["wheel"].sel(time=2.0) == found.states["wheel"][1]
+    assert found.y.shape == (8, 2)
+    found.save(tmp_path / "wheel.npz")
+    read = load(tmp_path / "wheel.npz")
+    assert read.states["wheel"].tolist() == found.states["wheel"].tolist()
+    assert read.scene == scene
+    assert read.y_events is not None
+    assert read.y_events[0].tolist() == found.y_events[0].tolist()  # type: ignore[index]
+    again = solve(read.scene, [4.0, 2.0], attitude=True)
+    assert again.own.tolist() == found.own.tolist()  # type: ignore[union-attr]
+    assert found.power().shape == (2,)
+
+
+FILE = """\
+[body]
+moments = [2.0, 3.0, 4.0]
+[initial]
+omega = [0.3, -0.2, 1.0]
+[torque]
+expression = ["-w2*wheel", "w1*wheel", "-k*w3 + 0.1*sin(t)"]
+constants = { k = 0.4 }
+[[torque.terms]]
+kind = "damping"
+matrix = [[0.05, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, 0.0, 0.05]]
+[states.wheel]
+start = 1.5
+scale = 2.0
+rate = "k*w3 - 0.1*sin(t)"
+"""
+
+
+def test_a_scene_file_has_states(tmp_path: Any) -> None:
+    (tmp_path / "wheel.toml").write_text(FILE)
+    scene = read_scene(tmp_path / "wheel.toml")
+
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        motor = 0.4 * omega[2] - 0.1 * np.sin(t)
+        h = states["wheel"]
+        return [-omega[1] * h, omega[0] * h, -motor], {"wheel": motor}
+
+    torque = damping(0.05) + recorded(law, ["wheel"])
+    other = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=torque, states={"wheel": (1.5, 2.0)})
+    found, expected = (solve(each, [1.0, 6.0]) for each in (scene, other))
+    assert found.y == pytest.approx(expected.y, rel=1e-12)
+    written = scene_text(scene)
+    (tmp_path / "again.toml").write_text(written)
+    assert read_scene(tmp_path / "again.toml") == scene
+    found.save(tmp_path / "wheel.npz")
+    assert load(tmp_path / "wheel.npz").scene == scene
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rate =", "rates =", "unknown key"),
+        ('rate = "k*w3 - 0.1*sin(t)"', "", "rate is missing"),
+        ("[states.wheel]", "[states.w1]", "another meaning"),
+        ("[states.wheel]", "[states.k]", "another meaning"),
+        ("expression = [", "constant = [1.0]  # [", "states without expression"),
+        ('rate = "k', 'rate = "u', "'u'"),
+        ("scale = 2.0", "scale = -2.0", "from 0 on"),
+    ],
+)
+def test_a_mistake_in_a_scene_file_is_told(tmp_path: Any, old: str, new: str, words: str) -> None:
+    assert old in FILE
+    (tmp_path / "wrong.toml").write_text(FILE.replace(old, new))
+    with pytest.raises(InputError, match=words) as raised:
+        read_scene(tmp_path / "wrong.toml")
+    assert "\n" not in str(raised.value)
+
+
+def test_states_that_no_series_ends_are_told_with_their_time() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": states["x"] ** 2}
+
+    scene = Scene("pole", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"x": 0.5})
+    found = solve(scene, [1.0, 3.0])
+    assert found.ended == "overflow"
+    assert found.states["x"] == pytest.approx([1.0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: solve(s, 1.0, "dop853"), "allowed: auto, taylor"),
+        (lambda s: prepare(s), "states of its own"),
+        (lambda s: solve_many(s, 1.0), "states of its own"),
+        (lambda s: solve(s, 1.0, sensitivities=["omega0"]), "states of its own"),
+    ],
+)
+def test_what_takes_no_states_says_so(call: Any, words: str) -> None:
+    scene = Scene("integral", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
+    with pytest.raises(InputError, match=words):
+        call(scene)
+
+
+@pytest.mark.parametrize(
+    ("torque", "states", "words"),
+    [
+        (integral, [1.0], "must be a dict"),
+        (integral, {"turned": "x"}, "states: turned"),
+        (integral, {"turned": (1.0, 2.0, 3.0)}, "a start, or a start and scale"),
+        (integral, {"turned": (1.0, -2.0)}, "from 0 on"),
+        (integral, {"omega1": 1.0}, "Python identifier, but none of"),
+        (integral, {"turned": 1.0, "other": 2.0}, "rates of turned; allowed: of turned, other"),
+        (integral, {"unturned": 1.0}, "KeyError"),
+        (integral, dict.fromkeys("abcdefghi", 1.0), "at most 8"),
+        (lambda t, omega, states: [1.0, 0.0, 0.0], {"x": 0.0}, "returned 3 values"),
+        (lambda t, omega, states: ([1.0], [0.0]), {"x": 0.0}, "1 components"),
+        (lambda t, omega, states: ([1.0] * 3, [0.0] * 2), {"x": 0.0}, "2 rates"),
+        (lambda t, omega: [1.0, 0.0, 0.0], {"x": 0.0}, "has 2 arguments"),
+        ((1.0, 0.0, 0.0), {"x": 0.0}, "states: x, but the torque has rates of none"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_line(torque: Any, states: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words) as raised:
+        Scene("wrong", (0.0, 0.0, 1.0), MOMENTS, torque=torque, states=states)
+    assert "\n" not in str(raised.value)

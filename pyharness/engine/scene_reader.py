@@ -1,6 +1,7 @@
 """Reading of scenes from TOML files; `pyharness.model.scene_file` writes these."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ SCENE_TABLES = {
     "initial": ("omega", "attitude", "angles_deg", "sequence"),
     "torque": ("constant", "rate", "sines", "cosines", "frame", *_TEXTS, "terms"),
     "run": ("step_size", "steps"),
-    "states": (),
 }
 _STATE = ("start", "scale", "rate")
 
@@ -74,9 +74,10 @@ def scene_of_file(content: bytes, default_name: str, where: str) -> Scene:
 def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     """Return the scene of a file's data, or raise InputError."""
     check_written_schema(data, "scene file")
-    check_keys(data, ("schema", "name", *SCENE_TABLES), "top level")
+    every: dict[str, Sequence[str]] = {**SCENE_TABLES, "states": ()}
+    check_keys(data, ("schema", "name", *every), "top level")
     tables: dict[str, dict[str, Any]] = {}
-    for table, keys in SCENE_TABLES.items():
+    for table, keys in every.items():
         tables[table] = data.get(table, {})
         if not isinstance(tables[table], dict):
             raise InputError(f"{table} is {kind_of(tables[table])}; it must be a table [{table}]")

@@ -69,7 +69,7 @@ def test_the_schema_is_printed_and_is_one(printed: Printed) -> None:
 
 def test_the_schema_has_the_keys_of_the_reader() -> None:
     mend = "add it to data/scene.schema.json"
-    assert SCHEMA["properties"].keys() == {"schema", "name", *TABLES}, mend
+    assert SCHEMA["properties"].keys() == {"schema", "name", "states", *TABLES}, mend
     for table, keys in TABLES.items():
         assert SCHEMA["properties"][table]["properties"].keys() == set(keys), f"{table}: {mend}"
     kinds = SCHEMA["properties"]["torque"]["properties"]["terms"]["items"]["oneOf"]

@@ -13,10 +13,8 @@ from pyharness import (
     Stepper,
     events,
     load,
-    prepare,
     read_scene,
     solve,
-    solve_many,
 )  # fmt: skip
 from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
@@ -400,42 +398,3 @@ def test_states_that_no_series_ends_are_told_with_their_time() -> None:
     found = solve(scene, [1.0, 3.0])
     assert found.ended == "overflow"
     assert found.states["x"] == pytest.approx([1.0], rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda s: solve(s, 1.0, "dop853"), "allowed: auto, taylor"),
-        (lambda s: prepare(s), "states of its own"),
-        (lambda s: solve_many(s, 1.0), "states of its own"),
-        (lambda s: solve(s, 1.0, sensitivities=["omega0"]), "states of its own"),
-    ],
-)
-def test_what_takes_no_states_says_so(call: Any, words: str) -> None:
-    scene = Scene("integral", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
-    with pytest.raises(InputError, match=words):
-        call(scene)
-
-
-@pytest.mark.parametrize(
-    ("torque", "states", "words"),
-    [
-        (integral, [1.0], "must be a dict"),
-        (integral, {"turned": "x"}, "states: turned"),
-        (integral, {"turned": (1.0, 2.0, 3.0)}, "a start, or a start and scale"),
-        (integral, {"turned": (1.0, -2.0)}, "from 0 on"),
-        (integral, {"omega1": 1.0}, "Python identifier, but none of"),
-        (integral, {"turned": 1.0, "other": 2.0}, "rates of turned; allowed: of turned, other"),
-        (integral, {"unturned": 1.0}, "KeyError"),
-        (integral, dict.fromkeys("abcdefghi", 1.0), "at most 8"),
-        (lambda t, omega, states: [1.0, 0.0, 0.0], {"x": 0.0}, "returned 3 values"),
-        (lambda t, omega, states: ([1.0], [0.0]), {"x": 0.0}, "1 components"),
-        (lambda t, omega, states: ([1.0] * 3, [0.0] * 2), {"x": 0.0}, "2 rates"),
-        (lambda t, omega: [1.0, 0.0, 0.0], {"x": 0.0}, "has 2 arguments"),
-        ((1.0, 0.0, 0.0), {"x": 0.0}, "states: x, but the torque has rates of none"),
-    ],
-)  # fmt: skip
-def test_a_mistake_is_one_line(torque: Any, states: Any, words: str) -> None:
-    with pytest.raises(InputError, match=words) as raised:
-        Scene("wrong", (0.0, 0.0, 1.0), MOMENTS, torque=torque, states=states)
-    assert "\n" not in str(raised.value)

@@ -13,14 +13,22 @@ from pyharness.model.scene_file import scene_text
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.sweeps import BASE, PROGRAM, TILT, text
 
-__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GRAVITY", "LAW",
-           "PROGRAM", "READINGS", "START", "TILT", "TILTED", "Decimal", "Fraction",
+__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GRAVITY", "INTEGRAL", "LAW",
+           "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNED", "Decimal", "Fraction",
            "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
            "text", "torque"]  # fmt: skip
 
 LAW = TorqueLaw((1.0, 2.0, 3.0), sines=[((1.0, 0.0, 0.5), 4.0)])
 TILTED = ((40.0, 2.0, -1.0), (2.0, 30.0, 3.0), (-1.0, 3.0, 20.0))
 BOOMS = ChangingMoments([[40.0, 1.5], [30.0, 0.5], [20.0]])
+
+
+def INTEGRAL(t: Any, omega: Any, states: Any) -> Any:
+    """Return a torque and the rate of the scene's own state `turned`."""
+    return [0.0, 0.0, -states["turned"]], {"turned": omega[2]}
+
+
+TURNED = Scene("turned", (0.0, 0.0, 1.0), (2.0, 3.0, 4.0), torque=INTEGRAL, states={"turned": 0.0})
 # Parts of scene files.
 BODY = "[body]\nmoments = [3, 2, 1]\n"
 START = "[initial]\nomega = [1, 2, 3]\n"

@@ -45,8 +45,8 @@ _LIBRARIES = tuple(str(Path(each).parents[1]) for each in (np.__file__, __file__
 
 HAS_MEMORY = (
     "two calls of the function differ, or it keeps its arguments; allowed: a function of its "
-    "arguments alone, without random numbers and memory; for a controller with memory, set "
-    "held_torque of a Stepper"
+    "arguments alone, without random numbers and memory; for a controller with memory, give the "
+    "scene states, or set held_torque of a Stepper"
 )
 
 

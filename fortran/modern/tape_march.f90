@@ -242,7 +242,9 @@ contains
         exit
       end if
       scale = max(scale, maxval(abs(y(:3))))
-      own_sizes(first_own:) = max(own_sizes(first_own:), abs(y(first_own:)))
+      do i = first_own, n
+        own_sizes(i) = max(own_sizes(i), abs(y(i)))
+      end do
       if (at_end) then
         call add_row(y, y_low, lanes(1, :n, 1), solution%n_rows + 1)
         exit
@@ -292,8 +294,8 @@ contains
       !! Set the perturbations to the unit vector of each unknown.
       integer :: i
 
-      lanes(2:, :, 1) = 0.0_dp
-      lanes(:, :, 2:n_blocks) = 0.0_dp
+      lanes(2:, :n, 1) = 0.0_dp
+      lanes(:, :n, 2:n_blocks) = 0.0_dp
       do i = 1, n
         lanes(1 + mod(i, SIDE_BY_SIDE), i, 1 + i/SIDE_BY_SIDE) = 1.0_dp
       end do
@@ -320,10 +322,12 @@ contains
 
     subroutine set_lanes()
       !! Set term 0 of the perturbations.
-      integer :: i
+      integer :: block, i
 
-      do i = 1, n
-        s%blocks(:, 0, FIRST_UNKNOWN - 1 + i, :) = lanes(:, i, :n_blocks)
+      do block = 1, n_blocks
+        do i = 1, n
+          s%blocks(:, 0, FIRST_UNKNOWN - 1 + i, block) = lanes(:, i, block)
+        end do
       end do
     end subroutine set_lanes
 
@@ -702,11 +706,11 @@ contains
     !! Compute the matrix of the open block from the perturbations in the lanes.
     integer, intent(in) :: n !! number of unknowns
     real(dp), intent(in) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, MOST_BLOCKS)
-    real(dp) :: matrix(n, n)
+    real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
     integer :: i
 
     do i = 1, n
-      matrix(:, i) = lanes(1 + mod(i, SIDE_BY_SIDE), :n, 1 + i/SIDE_BY_SIDE)
+      matrix(:n, i) = lanes(1 + mod(i, SIDE_BY_SIDE), :n, 1 + i/SIDE_BY_SIDE)
     end do
   end function transposed
 

@@ -25,6 +25,8 @@ from pyharness.model.state_torque import StateTorque, of_law
 from pyharness.model.tape import SLIDING
 from pyharness.model.trajectory import Array, Trajectory
 
+_NO_STATES = np.zeros((1, 1))
+
 
 def taylor(
     scene: Scene,
@@ -57,10 +59,13 @@ def taylor(
     if kernel != "space_torque_rows":
         room = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
         room |= {"at_nodes": at_nodes, "n_nodes": NODES}
-    own = np.zeros((n_own + 1, len(times) + 1 if n_own else 1), order="F")
-    own[:n_own, 0] = [each.start for each in scene.states]
-    if kernel == "tape_rows":
+    own = _NO_STATES
+    if n_own:
+        own = np.zeros((n_own + 1, len(times) + 1), order="F")
+        own[:n_own, 0] = [each.start for each in scene.states]
         room |= {"own": own, "own_sizes": [*(each.scale for each in scene.states), 0.0]}
+    elif kernel == "tape_rows":
+        room |= {"own": own, "own_sizes": own[0]}
     rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work, **room,

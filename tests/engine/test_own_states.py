@@ -398,3 +398,31 @@ def test_states_that_no_series_ends_are_told_with_their_time() -> None:
     found = solve(scene, [1.0, 3.0])
     assert found.ended == "overflow"
     assert found.states["x"] == pytest.approx([1.0], rel=1e-12)
+
+
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("unstable", range(8))
+def test_growth_is_that_of_any_state(unstable: int, attitude: bool) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        rates = [-0.1 * x + 0.1 * omega[0] for x in states.values()]
+        rates[unstable] = 0.5 * states[NAMES[unstable]]
+        return [-0.1 * omega[0], 0.0, 0.0], rates
+
+    scene = Scene("grows", (0.5, 0.0, 0.0), MOMENTS, torque=law, states=dict.fromkeys(NAMES, 1.0))
+    found = solve(scene, 10.0, tolerance=1e-9, attitude=attitude)
+    assert found.growth is not None
+    assert math.exp(5.0) * 0.9 < found.growth < math.exp(5.0) * 20.0
+    assert found.states[NAMES[unstable]][0] == pytest.approx(math.exp(5.0), rel=1e-9)
+
+
+def test_rounding_that_grows_is_told() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": states["y"], "y": states["x"] - omega[2] * states["y"] * 0.0}
+
+    # A saddle: the start is on the stable direction, and any error grows as exp(t).
+    start = {"x": (1.0, 1.0), "y": (-1.0, 1.0)}
+    scene = Scene("saddle", (0.0, 0.0, 0.1), MOMENTS, torque=law, states=start)
+    found = solve(scene, 32.0, tolerance=1e-9)
+    assert found.ended == "sensitive"
+    assert found.error is not None
+    assert abs(found.states["x"][0] - math.exp(-32.0)) <= 100.0 * found.error

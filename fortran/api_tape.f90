@@ -126,7 +126,8 @@ subroutine tape_derivatives(n_numbers, numbers, n, state, n_columns, starts, for
 end subroutine tape_derivatives
 
 subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, attitude0, &
-                     given_up, omega, n_results, attitude, status, n_estimates, estimates, raised)
+                     n_parameters, n_sets, parameters, given_up, omega, n_results, attitude, &
+                     status, n_estimates, estimates, raised)
   ! Solve many bodies under one torque: omega of each body at its time and, if n_attitudes > 0, its
   ! attitude. The status is 0, or -1 if a body is left to `tape_rows`.
   !f2py threadsafe
@@ -143,6 +144,9 @@ subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, a
   real(8), intent(in), target :: times(n_times) ! s
   integer(4), intent(in) :: n_attitudes         ! n, or 0 without attitude
   real(8), intent(in), target :: attitude0(4, n_attitudes) ! unit quaternions
+  integer(4), intent(in) :: n_parameters        ! further inputs of the tape
+  integer(4), intent(in) :: n_sets              ! of parameters: 0, 1 or n
+  real(8), intent(in), target :: parameters(n_parameters, n_sets)
   integer(4), intent(inout), target :: given_up(1) ! not 0: another thread ends this call
   real(8), intent(inout), target :: omega(3, n)
   integer(4), intent(in) :: n_results           ! as n_attitudes
@@ -158,6 +162,7 @@ subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, a
   bodies%omega0 => omega0
   bodies%times => times
   bodies%attitude0 => attitude0
+  bodies%parameters => parameters
   bodies%attitude => attitude
   bodies%estimates => estimates
   call watch(c_loc(given_up))

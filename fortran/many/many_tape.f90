@@ -17,7 +17,7 @@ contains
     !! Compute omega of each body at its time, and its attitude. The status is COMPLETE, or
     !! NEEDS_FALLBACK of a body that is left to the single-body kernel.
     real(dp), intent(in), target, contiguous :: packed(0:)      !! the scene, as in prepared.f90
-    type(bodies_t), intent(in) :: many !! n, omega0, times and estimates of it; attitude0 has unit
+    type(bodies_t), intent(in) :: many !! all but the body and its torque; attitude0 has unit
     !! quaternions, and both its attitudes have n columns, or none if the tape has no attitude
     real(dp), intent(inout), target, contiguous :: omega(:, :)  !! (3, n), rad/s
     integer(i1), intent(inout), target, contiguous :: status(:) !! (n)
@@ -46,6 +46,9 @@ contains
     bodies%status = c_loc(status)
     bodies%estimates = c_null_ptr
     if (size(many%estimates) > 0) bodies%estimates = c_loc(many%estimates)
+    bodies%n_parameters = size(many%parameters, 1)
+    bodies%n_sets = merge(size(many%parameters, 2), 0, bodies%n_parameters > 0)
+    bodies%parameters = c_loc(many%parameters)
     call tape_bodies(bodies)
     raised = bodies%interrupted
   end subroutine solve_tape_bodies

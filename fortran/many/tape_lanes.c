@@ -64,6 +64,8 @@ struct bodies {
   double (*omega)[3], (*attitude)[4];
   int8_t *status;
   double (*estimates)[2]; /* relative error, amplification; or NULL */
+  int n_parameters, n_sets; /* sets of parameters: one, or one for each body */
+  const double *parameters; /* of each set */
 };
 
 /* What is known of the bodies that are being integrated. */
@@ -686,6 +688,19 @@ static void step(struct group *g)
   }
 }
 
+/* Set the inputs of the tape that are parameters, and return whether they are finite. */
+static int set_parameters(struct group *g, int lane, int set)
+{
+  const int n = g->all->n_parameters;
+  double sum = 0.0;
+  for (int i = 0; i < n; i++) {
+    const double value = g->all->parameters[set * (size_t)n + i];
+    g->a[N_INPUTS + i][0][lane] = value;
+    sum += fabs(value);
+  }
+  return sum <= FAR;
+}
+
 /* Put body number `body` into a lane, and return whether this kernel takes it. */
 static int put_in(struct group *g, int lane, int body)
 {
@@ -698,6 +713,7 @@ static int put_in(struct group *g, int lane, int body)
   /* A sum, because a maximum may lose a NaN. */
   if (!(sum <= FAR && scale >= 1.0 / FAR && fabs(end) <= FAR && fabs(end) >= 1.0 / FAR)) return 0;
   if (!(scale * fabs(end) <= MOST_ANGLE)) return 0;
+  if (!set_parameters(g, lane, all->n_sets == 1 ? 0 : body)) return 0;
   for (int i = 0; i < g->n; i++) {
     g->y[i][lane] = i < 3 ? omega[i] : all->attitude0[body][i - 3];
     g->weights[i][lane] = i < 3 ? 1.0 / scale : 2.0;
@@ -754,6 +770,7 @@ static void clear(struct group *g, int lane)
   }
   g->fails[lane] = -1;
   g->body[lane] = -1;
+  if (g->all->n_sets > 0) set_parameters(g, lane, 0);
 }
 
 /* Return the largest number of factors of a product. */

@@ -51,6 +51,8 @@ module tape
     type(c_ptr) :: omega, attitude      !! (3, n), (4, n): results
     type(c_ptr) :: status               !! (n), of one byte
     type(c_ptr) :: estimates            !! (2, n): relative error, amplification; or null
+    integer(c_int) :: n_parameters, n_sets !! sets of parameters: 0, 1 or n
+    type(c_ptr) :: parameters           !! (n_parameters, n_sets): further inputs of the tape
   end type tape_bodies_t
 
   public :: arrays_of, next_break, piece_at, tape_of

@@ -20,6 +20,7 @@ typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 
 enum { WITH_ATTITUDE = 7, MOST_UNKNOWNS = 15 }; /* numbers of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
+enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
 
 /* Numbers of slots and combinations begin with 1. */
 struct tape {

@@ -3,7 +3,7 @@
 Each result is bit-for-bit independent of the other bodies, their order and the number of threads.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from pyharness.engine.many_alone import (
 )
 from pyharness.engine.many_scenes import (
     BODIES,
+    PARAMETER,
     TORQUES,
     Axes,
     Bodies,
@@ -27,6 +28,7 @@ from pyharness.engine.many_scenes import (
     from_scenes,
     rows_of_scene,
 )
+from pyharness.engine.parameters import check_values
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
 from pyharness.engine.solve import ascending_times
@@ -36,13 +38,12 @@ from pyharness.model.attitude import scalar_first
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
-from pyharness.model.errors import InputError, known
+from pyharness.model.errors import InputError, kind_of, known
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, finite
 
-_STARTS = ("omega0", "attitude0")
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
@@ -60,6 +61,7 @@ def solve_many(
     torque_rate: Any = None,
     sines: Any = None,
     cosines: Any = None,
+    parameters: Mapping[str, Any] | None = None,
     method: str = "auto",
     tolerance: Number | None = None,
     step: Number | None = None,
@@ -97,6 +99,9 @@ def solve_many(
     sines, cosines : array, shape (n, k, 4) or (k, 4)
         The k waves of each torque: three amplitudes (in the unit of `torque_constant`) and a
         frequency (rad/s).
+    parameters : dict of arrays, shape (n,), or of float
+        Values of keyword arguments of the torque's function, or of constants of its expressions, by
+        name. Bodies that differ in them, in moments and in starts are solved side by side.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses closed forms or the Taylor
         series.
@@ -161,6 +166,9 @@ def solve_many(
             raise InputError("out is given beside times; allowed: only one of the two")
         values, turned = ascending_times(times)
         rows = np.array(values[::-1] if turned else values)
+    if parameters is not None:
+        scene, own = _with_parameters(scene, parameters)
+        arrays |= own
     if scene and (events is not None or sensitivities is not None):
         details = Details(
             scene, t_end if rows is None else rows, arrays, method=method, tolerance=tolerance,
@@ -182,6 +190,20 @@ def solve_many(
         return replace(found, **_NO_DETAILS) if has_details else found
     with bar_of_bodies(progress):
         return details.added_to(found)
+
+
+def _with_parameters(
+    scene: Scene | Sequence[Scene], parameters: Mapping[str, Any]
+) -> tuple[Scene, dict[str, Array]]:
+    """Return a scene whose torque is recorded, and arrays of parameters; check their names."""
+    if not isinstance(scene, Scene):
+        raise InputError("parameters: given beside many scenes; allowed: with one scene")
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters: {kind_of(parameters)}; allowed: a dict of names and arrays")
+    check_values(scene, parameters)
+    # A torque of time alone is a law, which has no names.
+    scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
+    return scene, {f"{PARAMETER}{name}": value for name, value in parameters.items()}
 
 
 def _at_each_time(
@@ -214,7 +236,7 @@ def _solved(
         if is_solved_alone(scene, {name: own[name] for name in TORQUES if name in own}):
             _, asked = _chosen(method, tolerance)
             return solve_one_by_one(
-                scene, t_end, {name: arrays[name] for name in (*TORQUES, *BODIES, *_STARTS)}, out,
+                scene, t_end, arrays, out,
                 method=method, tolerance=asked, effort=checked_effort(effort),
                 estimates=estimates, threads=threads_of(threads),
             )  # fmt: skip

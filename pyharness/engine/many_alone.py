@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.event_functions import event_functions
-from pyharness.engine.many_prepared import solve_each, solve_row
-from pyharness.engine.many_scenes import BODIES, rows_of_bodies, scene_of_row
+from pyharness.engine.many_prepared import solve_each, solve_lanes, solve_row
+from pyharness.engine.many_scenes import BODIES, PARAMETER, rows_of_bodies, scene_of_row
+from pyharness.engine.packed import packed_tape
 from pyharness.engine.parameter_sensitivity import checked_names
+from pyharness.engine.parameters import tape_of_bodies
 from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import check_prepared, check_torque, requested_tolerance
 from pyharness.engine.solve import solve
-from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, unit_quaternions
+from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spread, unit_quaternions
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
@@ -29,6 +31,7 @@ from pyharness.model.trajectory import Array
 from pyharness.model.values import Number
 
 _REST: Triple = (0.0, 0.0, 0.0)
+_ONES: Triple = (1.0, 1.0, 1.0)
 _MOST_KEPT = 8  # prepared solvers
 NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes with an attitude"
 
@@ -85,6 +88,7 @@ def solve_one_by_one(
     settings: Any = {"effort": effort, "attitude": with_attitude}
     # Bodies that differ in their starts alone share one solver.
     shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
+    lanes = _lanes(scene, rows, tolerance, effort, with_attitude) if rows else None
     # `omega0` or `attitude0` may share memory with `out`.
     attitudes = np.full((n, 4), np.nan) if with_attitude else None
     own = Ensemble(np.full((n, 3), np.nan), found.status, attitudes, found.estimates)
@@ -95,7 +99,10 @@ def solve_one_by_one(
         if shared is not None:
             solve_each(shared, starts, times, turns, own, piece, given_up)
             return
-        for i in range(piece.start, piece.stop):
+        left = list(range(piece.start, piece.stop))
+        if lanes is not None:
+            left = solve_lanes(*lanes, starts, times, turns, own, piece, given_up)
+        for i in left:
             if given_up[0]:
                 return
             with suppress(InputError):
@@ -107,6 +114,44 @@ def solve_one_by_one(
     if found.attitude is not None:
         found.attitude[:] = own.attitude
     return found
+
+
+def _lanes(
+    scene: Scene, rows: Mapping[str, Array], tolerance: float, effort: float, attitude: bool
+) -> tuple[Array, Array] | None:
+    """Return the packed equations and parameters of bodies that one kernel call can solve, or None.
+
+    Parameters of an invalid body are NaN, which the kernel refuses.
+    """
+    names = [name for name in rows if name.startswith(PARAMETER)]
+    kind = next((name for name in ("moments", "coefficients") if name in rows), None)
+    if (
+        rows.keys() - {*names, kind}
+        or not isinstance(scene.torque, StateTorque)
+        or scene.changing is not None
+        or (scene.inertia is not None and kind is None)
+    ):
+        return None
+    columns, body = [], None
+    with np.errstate(all="ignore"):
+        if kind == "moments":
+            first, second, third = moments = np.where(rows[kind] > 0.0, rows[kind], np.nan).T
+            differences = (
+                (second - third) / first,
+                (third - first) / second,
+                (first - second) / third,
+            )
+            columns = [*differences, *(1.0 / moments)]
+        elif kind == "coefficients":
+            columns = [*rows[kind].T, *np.ones((3, 1))]
+        else:
+            i1, i2, i3 = scene.moments or _ONES
+            body = scene.euler_coefficients, (1.0 / i1, 1.0 / i2, 1.0 / i3)
+    columns += [rows[name] for name in names]
+    own = tuple(name.removeprefix(PARAMETER) for name in names)
+    tape = tape_of_bodies(scene.torque, body, own, attitude)
+    packed = packed_tape(tape, scene.step_size, tolerance, effort)
+    return packed, np.column_stack([spread(each, max(map(len, columns))) for each in columns])
 
 
 _kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}

@@ -141,7 +141,20 @@ def solve_side_by_side(
     packed = solver.packed_for_lanes
     if packed[Places.METHOD] != Methods.TAPE or solver.scene.inertia is not None:
         return list(range(piece.start, piece.stop))
+    times = times_within(solver.scene, times)
+    return solve_lanes(packed, _NO_PARAMETERS, starts, times, turns, found, piece, given_up)
+
+
+_NO_PARAMETERS = np.empty((0, 0))
+
+
+def solve_lanes(
+    packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
+    found: Ensemble, piece: slice, given_up: NDArray[np.int32],
+) -> list[int]:  # fmt: skip
+    """Solve bodies whose equations are a tape with `parameters`, (n, k) or (1, k), side by side."""
     n = piece.stop - piece.start
+    sets = parameters if len(parameters) < 2 else parameters[piece]
 
     def part(rows: Array) -> Array:
         return spread(rows if len(rows) == 1 else rows[piece], n)
@@ -151,8 +164,8 @@ def solve_side_by_side(
         first, last = unit_quaternions(part(turns)), np.empty((n, 4))
     omega, status = np.empty((n, 3)), np.empty(n, np.int8)
     extension().tape_many(
-        packed, part(starts).T, part(times_within(solver.scene, times)), first.T, given_up, omega.T,
-        last.T, status, found.estimates_of(piece),
+        packed, part(starts).T, part(times), first.T, sets.T, given_up, omega.T, last.T, status,
+        found.estimates_of(piece),
     )  # fmt: skip
     taken = status == Statuses.COMPLETE
     found.omega[piece][taken] = omega[taken]

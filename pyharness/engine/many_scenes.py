@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.parameters import torque_with_values
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
@@ -35,6 +36,7 @@ _NOTHING = np.empty((4, 0), order="F")  # in place of attitudes
 _UNKNOWN = -1.0  # in place of an estimate that the kernel does not compute
 _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
+PARAMETER = "parameters: "  # before the names of parameters of a torque
 TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
 
 
@@ -236,12 +238,15 @@ def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
             rows[name] = rows_of(name, values, *shapes[name])
         elif values is not None and name in ("sines", "cosines"):
             rows[name] = waves_of(name, values)
+        elif name.startswith(PARAMETER):
+            rows[name] = rows_of(name, values)
     return rows
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
     """Return the scene of body `i`, or raise InputError if its numbers are invalid."""
     own = {name: row_of(each, i) for name, each in rows.items()}
+    values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {
         name.removeprefix("torque_"): own.pop(name)
         for name in ("torque_constant", "torque_rate", "sines", "cosines")
@@ -260,6 +265,10 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
         if isinstance(law, StateTorque):
             raise InputError(STATE_TORQUE)
         law = replace(law, **torque)
+    if values:
+        law = torque_with_values(
+            law, {name.removeprefix(PARAMETER): value for name, value in values.items()}
+        )
     return replace(scene, torque=law, **own)
 
 

@@ -5,18 +5,15 @@ import numpy as np
 from pyharness.engine.problem import normalized, normalized_in_space, remainders
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.system import is_recorded, with_constant_body
-from pyharness.model.codes import Places
+from pyharness.model.codes import Methods, Places
 from pyharness.model.scene import Scene
+from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
 
 
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`."""
-    packed = np.zeros(Places.WAVES)
-    packed[Places.METHOD] = code
-    packed[Places.TOLERANCE] = tolerance
-    packed[Places.STEP] = scene.step_size
-    packed[Places.EFFORT] = effort
+    packed = _settings(code, scene.step_size, tolerance, effort)
     if is_recorded(scene):
         return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
     coefficients, constant, rate, sines, cosines = _torque_of(scene)
@@ -29,6 +26,22 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
     packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
     packed[Places.MOMENTS_LOW : Places.WAVES] = scene.moments_low
     return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
+
+
+def packed_tape(tape: Tape, step_size: float, tolerance: float, effort: float) -> Array:
+    """Return equations of motion and settings as one array."""
+    return np.concatenate(
+        [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
+    )
+
+
+def _settings(code: int, step_size: float, tolerance: float, effort: float) -> Array:
+    packed = np.zeros(Places.WAVES)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = step_size
+    packed[Places.EFFORT] = effort
+    return packed
 
 
 def _torque_of(scene: Scene) -> tuple[Array, ...]:

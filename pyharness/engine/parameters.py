@@ -1,7 +1,7 @@
 """Parameters of a scene, and partial derivatives of its equations."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -13,15 +13,17 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, quaternion_rates
 from pyharness.model.changing import Changing, rates_of_changing, rates_of_inertia
 from pyharness.model.dual import with_parameters
+from pyharness.model.errors import InputError
 from pyharness.model.expressions import components
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque, torque_of
+from pyharness.model.state_torque import StateTorque, replayed, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import N_INPUTS, Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Triple
 
 OMEGA0, ATTITUDE = "omega0", "attitude"
+_TORQUE = "torque."  # before the names of its parameters
 # The elements of an inertia matrix that are parameters, in this order.
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -71,6 +73,76 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
     return _equations(body, tuple(_list_summands(scene.torque)), values, attitude)
+
+
+def check_values(scene: Scene, names: Iterable[str]) -> None:
+    """Raise InputError unless `names` are numbers of the scene's recorded torque."""
+    known = {
+        name.removeprefix(_TORQUE): values
+        for name, values in parameters_of(scene).items()
+        if name.startswith(_TORQUE) and (values is None or len(values) == 1)
+    }
+    for name in names:
+        if not isinstance(name, str) or known.get(name) is None:
+            allowed = ", ".join(each for each, values in known.items() if values) or "none here"
+            raise InputError(
+                f"parameters: {name!r}; allowed: keyword arguments of the torque's function with "
+                f"numbers as defaults, and constants of its expressions: {allowed}"
+            )
+
+
+def torque_with_values(torque: StateTorque | TorqueLaw, values: Mapping[str, float]) -> StateTorque:
+    """Return a recorded torque with other numbers, by name of a parameter, which remain its own."""
+    try:
+        parts = [_with_values(each, values) for each in _list_summands(torque)]
+    except ArithmeticError as error:
+        raise InputError(f"parameters: the torque is not defined: {error}") from None
+    found = sum(parts[1:], parts[0])
+    assert isinstance(found, StateTorque)
+    return found
+
+
+def _with_values(part: StateTorque | TorqueLaw, values: Mapping[str, float]) -> Any:
+    if isinstance(part, TorqueLaw) or not dict(part.constants + part.parameters).keys() & values:
+        return part
+    given = {f"{_TORQUE}{name}": [float(value)] for name, value in values.items()}
+    constants, parameters = (
+        tuple((name, float(values.get(name, value))) for name, value in pairs)
+        for pairs in (part.constants, part.parameters)
+    )
+    found = replayed(lambda time, omega, q: _torque(part, time, omega, q, given))
+    return replace(
+        found, expression=part.expression, constants=constants, parameters=parameters,
+        varied=part.varied,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def tape_of_bodies(
+    torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
+    attitude: bool,
+) -> Tape:  # fmt: skip
+    """Return the equations of motion of bodies that differ in parameters, as further inputs.
+
+    These are A, B, C and the reciprocal moments, unless `body` has them for all, and the `names` of
+    numbers of the torque.
+    """
+    n_body = 0 if body else 6
+    recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
+    time, x, y, z, *inputs = recorder.inputs()
+    q, rest = inputs[:4], inputs[4:]
+    coefficients, reciprocals = body or (rest[:3], rest[3:6])
+    given = {f"{_TORQUE}{name}": [x] for name, x in zip(names, rest[n_body:], strict=True)}
+    omega = np.array([x, y, z], dtype=object)
+    total = sum(_torque(part, time, omega, q, given) for part in _list_summands(torque))
+    products = y * z, z * x, x * y
+    rates = [
+        a * product_ + component * reciprocal
+        for a, product_, component, reciprocal in zip(
+            coefficients, products, total, reciprocals, strict=True
+        )
+    ]
+    return recorder.tape(rates + quaternion_rates((x, y, z), q) if attitude else rates)
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:

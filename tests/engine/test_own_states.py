@@ -426,3 +426,18 @@ def test_rounding_that_grows_is_told() -> None:
     assert found.ended == "sensitive"
     assert found.error is not None
     assert abs(found.states["x"][0] - math.exp(-32.0)) <= 100.0 * found.error
+
+
+@pytest.mark.parametrize("attitude", [False, True])
+def test_perturbations_of_states_that_rest_may_be_fast(attitude: bool) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        rates = [0.0 * x for x in states.values()]
+        rates[6:] = [90.0 * states["h"], -90.0 * states["g"]]
+        return [0.0, 0.0, -0.1 * omega[2]], rates
+
+    states = dict.fromkeys(NAMES, (0.0, 1.0))
+    scene = Scene("rests", (0.0, 0.0, 0.5), MOMENTS, torque=law, states=states)
+    found = solve(scene, 10.0, tolerance=1e-9, attitude=attitude)
+    assert found.growth is not None
+    assert found.growth < 20.0
+    assert found.ended == "complete"

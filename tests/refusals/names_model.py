@@ -13,8 +13,8 @@ from pyharness.model.scene_file import scene_text
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.sweeps import BASE, PROGRAM, TILT, text
 
-__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GRAVITY", "INTEGRAL", "LAW",
-           "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNED", "Decimal", "Fraction",
+__all__ = ["BASE", "BODY", "BOOMS", "DAMPED_BASE", "DAMPING", "GAINED", "GRAVITY", "INTEGRAL",
+           "LAW", "PROGRAM", "READINGS", "START", "TILT", "TILTED", "TURNED", "Decimal", "Fraction",
            "axis", "expression", "in_file", "parsed", "scene", "scene_text", "sweep",
            "text", "torque"]  # fmt: skip
 
@@ -29,6 +29,13 @@ def INTEGRAL(t: Any, omega: Any, states: Any) -> Any:
 
 
 TURNED = Scene("turned", (0.0, 0.0, 1.0), (2.0, 3.0, 4.0), torque=INTEGRAL, states={"turned": 0.0})
+
+
+def _gained(t: Any, omega: Any, *, gain: float = 0.5) -> Any:
+    return -gain * omega
+
+
+GAINED = Scene("gained", (0.0, 0.0, 1.0), (2.0, 3.0, 4.0), torque=_gained)
 # Parts of scene files.
 BODY = "[body]\nmoments = [3, 2, 1]\n"
 START = "[initial]\nomega = [1, 2, 3]\n"

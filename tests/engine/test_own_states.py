@@ -441,3 +441,16 @@ def test_perturbations_of_states_that_rest_may_be_fast(attitude: bool) -> None:
     assert found.growth is not None
     assert found.growth < 20.0
     assert found.ended == "complete"
+
+
+def test_growth_counts_what_a_state_does_to_the_time_of_a_switch() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        rates = [0.0 * x for x in states.values()]
+        # An error of h by d changes the time of the switch by d, and g by 10 d.
+        rates[6:] = [np.where(states["h"] > 1.0, 5.0, -5.0), 1.0]
+        return [0.0, 0.0, 0.0], rates
+
+    scene = Scene("late", (0.0, 0.0, 0.5), MOMENTS, torque=law, states=dict.fromkeys(NAMES, 0.0))
+    found = solve(scene, 2.0, tolerance=1e-9)
+    assert found.growth == pytest.approx(math.hypot(1.0, 10.0 * 2.0 / 5.0), rel=0.01)
+    assert found.states["g"] == pytest.approx([0.0], abs=1e-12)

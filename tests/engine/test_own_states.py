@@ -454,3 +454,18 @@ def test_growth_counts_what_a_state_does_to_the_time_of_a_switch() -> None:
     found = solve(scene, 2.0, tolerance=1e-9)
     assert found.growth == pytest.approx(math.hypot(1.0, 10.0 * 2.0 / 5.0), rel=0.01)
     assert found.states["g"] == pytest.approx([0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("start", [0.0, 2.0])
+def test_steps_are_as_short_as_a_fast_state_needs(start: float) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": 40.0 * np.cos(40.0 * t)}
+
+    scene = Scene("fast", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"x": start})
+    for tolerance in (1e-4, 1e-10):
+        stepper = Stepper(scene, tolerance)
+        while stepper.time < 3.0:
+            stepper.step(3.0 - stepper.time)
+            exact = start + math.sin(40.0 * stepper.time)
+            allowed = 3.0 * tolerance * stepper.steps + 1e-13
+            assert abs(stepper.states["x"] - exact) <= allowed

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.closed_form import period_of
+from pyharness.engine.differences import States, slopes_by_differences
 from pyharness.engine.parameters import (
     ATTITUDE,
     OMEGA0,
@@ -50,15 +51,8 @@ def checked_names(
     allowed = "allowed: names, as in ['omega0', 'moments']"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
-    if scene.states:
-        raise InputError(f"{place}: the scene has states of its own; allowed: a scene without")
     if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
-    if has_switches(scene.torque):
-        raise InputError(
-            f"{place}: the torque has switches; allowed: a torque without where, clip, minimum, "
-            "maximum, sign, abs, floor and comparisons"
-        )
     values = parameters_of(scene)
     known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}
@@ -74,22 +68,36 @@ def checked_names(
         found[name] = None
     if sum(len(values.get(name) or _THREE) for name in found) > _MOST_COLUMNS:
         raise InputError(f"{place}: more than {_MOST_COLUMNS} values; give fewer names")
-    if found and not attitude and varied_equations(scene, tuple(found), False).tape.needs_attitude:
+    is_smooth = not scene.states and not has_switches(scene.torque)
+    if (
+        found
+        and is_smooth
+        and not attitude
+        and varied_equations(scene, tuple(found), False).tape.needs_attitude
+    ):
         raise InputError(f"{place}: the torque depends on the attitude; give attitude=True")
     return tuple(found)
 
 
 def sensitivities_at(
-    scene: Scene, found: Trajectory, names: Sequence[str], tolerance: float, effort: float
+    scene: Scene,
+    found: Trajectory,
+    names: Sequence[str],
+    tolerance: float,
+    effort: float,
+    states: States,
 ) -> dict[str, Array]:
-    """Return the derivatives with respect to each parameter, (n, 3, m) or (n, 7, m) for m values.
+    """Return the derivatives with respect to each parameter, (n, k, m) for k unknowns, m values.
 
-    `tolerance` is relative to the largest derivative in a column so far. Raise InputError if the
-    work limit is exceeded, or a derivative overflows.
+    `states` returns the unknowns of a changed scene at the times. `tolerance` is relative to the
+    largest derivative in a column so far. Raise InputError if the work limit is exceeded, or a
+    derivative overflows.
     """
     if not names:
         return {}
     times, attitude = found.time, found.attitude is not None
+    if scene.states or has_switches(scene.torque):
+        return slopes_by_differences(scene, names, states)
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
     # Closed forms alone take no evaluations.

@@ -23,9 +23,9 @@ from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Triple
 
 OMEGA0, ATTITUDE = "omega0", "attitude"
-_TORQUE = "torque."  # before the names of its parameters
+TORQUE = "torque."  # before the names of its parameters
 # The elements of an inertia matrix that are parameters, in this order.
-_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class _Body(NamedTuple):
@@ -60,7 +60,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
     if scene.coefficients is not None:
         found["coefficients"] = list(scene.coefficients)
     if scene.inertia is not None:
-        found["inertia"] = [scene.inertia[i][j] for i, j in _ELEMENTS]
+        found["inertia"] = [scene.inertia[i][j] for i, j in INERTIA_ELEMENTS]
     for part in _list_summands(scene.torque):
         own = _parameters_of(part)
         found |= {name: None if name in found else values for name, values in own.items()}
@@ -78,9 +78,9 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 def check_values(scene: Scene, names: Iterable[str]) -> None:
     """Raise InputError unless `names` are numbers of the scene's recorded torque."""
     known = {
-        name.removeprefix(_TORQUE): values
+        name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
-        if name.startswith(_TORQUE) and (values is None or len(values) == 1)
+        if name.startswith(TORQUE) and (values is None or len(values) == 1)
     }
     for name in names:
         if not isinstance(name, str) or known.get(name) is None:
@@ -105,7 +105,7 @@ def torque_with_values(torque: StateTorque | TorqueLaw, values: Mapping[str, flo
 def _with_values(part: StateTorque | TorqueLaw, values: Mapping[str, float]) -> Any:
     if isinstance(part, TorqueLaw) or not dict(part.constants + part.parameters).keys() & values:
         return part
-    given = {f"{_TORQUE}{name}": [float(value)] for name, value in values.items()}
+    given = {f"{TORQUE}{name}": [float(value)] for name, value in values.items()}
     constants, parameters = (
         tuple((name, float(values.get(name, value))) for name, value in pairs)
         for pairs in (part.constants, part.parameters)
@@ -132,7 +132,7 @@ def tape_of_bodies(
     time, x, y, z, *inputs = recorder.inputs()
     q, rest = inputs[:4], inputs[4:]
     coefficients, reciprocals = body or (rest[:3], rest[3:6])
-    given = {f"{_TORQUE}{name}": [x] for name, x in zip(names, rest[n_body:], strict=True)}
+    given = {f"{TORQUE}{name}": [x] for name, x in zip(names, rest[n_body:], strict=True)}
     omega = np.array([x, y, z], dtype=object)
     total = sum(_torque(part, time, omega, q, given) for part in _list_summands(torque))
     products = y * z, z * x, x * y
@@ -257,7 +257,7 @@ def _rates(
     x, y, z = omega
     if body.inertia is not None:
         matrix = [list(row) for row in body.inertia]
-        for (i, j), value in zip(_ELEMENTS, given.get("inertia", ()), strict=False):
+        for (i, j), value in zip(INERTIA_ELEMENTS, given.get("inertia", ()), strict=False):
             matrix[i][j] = matrix[j][i] = value
         return rates_of_inertia(matrix, omega, torque)
     products = y * z, z * x, x * y

@@ -49,6 +49,8 @@ from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, boolean, number, number_list
 from pyharness.model.waves import with_merged_waves
 
+_OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
+
 
 def solve(
     scene: Scene,
@@ -201,7 +203,8 @@ def solve(
             found = with_events_reversed(found)
     found = in_reverse(found) if turned else found
     if names is not None:
-        slopes = sensitivities_at(given, found, names, tolerance, effort)
+        states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
+        slopes = sensitivities_at(given, found, names, tolerance, effort, states)
         found = replace(found, sensitivities=slopes)
     return found
 
@@ -210,6 +213,17 @@ def _more_rows(
     scene: Scene, method: str, effort: float, attitude: bool, times: Array, tolerance: float
 ) -> Trajectory:
     return solve(scene, times, method, tolerance, effort=effort, attitude=attitude)
+
+
+def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene) -> Array:
+    """Return the unknowns at the times, (n, m), of a scene with another number."""
+    found = solve(scene, times, "taylor", _OF_DIFFERENCES, effort=effort, attitude=attitude)
+    if len(found.time) < len(times):
+        raise InputError(
+            f"sensitivities: the motion of a changed scene ends before t = {times[-1]:g} s; "
+            "allowed: earlier times"
+        )
+    return found.y.T
 
 
 def finest(method: str, scene: Scene, time: float) -> float:

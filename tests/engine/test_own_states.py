@@ -469,3 +469,52 @@ def test_steps_are_as_short_as_a_fast_state_needs(start: float) -> None:
             exact = start + math.sin(40.0 * stepper.time)
             allowed = 3.0 * tolerance * stepper.steps + 1e-13
             assert abs(stepper.states["x"] - exact) <= allowed
+        assert stepper.steps < 150
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0**-300, 2.0**200])
+def test_events_of_a_state_of_any_size(size: float) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, -2.0 * states["x"] / size], {"x": size * omega[2]}
+
+    scene = Scene("sized", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"x": 0.0})
+    found = solve(scene, 10.0, events=lambda t, omega, states: states["x"] - 0.5 * size)
+    frequency = math.sqrt(0.5)
+    first = math.asin(0.5 * frequency) / frequency
+    second = math.pi / frequency - first
+    period = 2.0 * math.pi / frequency
+    assert found.t_events is not None
+    assert found.t_events[0] == pytest.approx([first, second, first + period], rel=1e-12)
+
+
+def test_ready_events_see_omega_and_attitude_alone() -> None:
+    scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
+    ready = [events.tilt(1, (1, 0, 0), 1.0), events.extremum(2)]
+    found = solve(scene, 6.0, attitude=True, events=ready, dense_output=True)
+    assert found.t_events is not None
+    assert found.sol is not None
+    assert found.y_events is not None
+    assert len(found.t_events[0]) > 0
+    assert len(found.t_events[1]) > 0
+    for state in found.y_events[0]:
+        axis = turned_to_space(state[None, 3:7], np.array([[1.0, 0.0, 0.0]]))[0]
+        assert math.acos(axis[0]) == pytest.approx(1.0, abs=1e-10)
+    for time in found.t_events[1]:
+        assert abs(found.sol.derivative(time)[1]) < 1e-11
+
+
+def test_rows_at_time_0_have_the_start() -> None:
+    scene = Scene("wheel", (0.3, -0.2, 1.0), MOMENTS, torque=wheel, states={"wheel": 1.5})
+    assert solve(scene, 0.0, attitude=True).states["wheel"].tolist() == [1.5]
+    found = solve(scene, [-1.0, 0.0, 1.0], attitude=True)
+    assert found.states["wheel"][1] == 1.5
+
+
+def test_a_constant_torque_keeps_the_states() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.2, 0.0, 0.0], {"x": 1.0}
+
+    scene = Scene("constant", (0.0, 0.0, 0.0), MOMENTS, torque=law, states={"x": 0.0})
+    found = solve(scene, 3.0)
+    assert found.states["x"] == pytest.approx([3.0])
+    assert found.omega[0] == pytest.approx([0.3, 0.0, 0.0])

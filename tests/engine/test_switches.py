@@ -255,12 +255,6 @@ def test_event_whose_record_differs_is_called_with_numbers() -> None:
     assert found.t_events[0] == pytest.approx([0.5])
 
 
-def test_derivatives_of_a_torque_with_switches_are_refused() -> None:
-    scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
-    with pytest.raises(InputError, match="switches"):
-        solve(scene, [1.0], sensitivities=["omega0"])
-
-
 def test_an_equation_of_the_user_has_switches_and_real_powers() -> None:
     """The ball bounces between two constant forces, with the period 4 sqrt(2)."""
     given: Any = {"method": Taylor, "rtol": 1e-10, "atol": 1e-12}

@@ -1,0 +1,125 @@
+"""Sensitivities through switches, and with states of one's own, against closed forms."""
+
+import math
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from pyharness import InputError, Scene, solve, solve_many
+
+MOMENTS = (2.0, 3.0, 4.0)
+
+
+def brake(t: Any, omega: Any, *, strong: float = 0.2, weak: float = 0.02) -> Any:
+    """Return a torque that jumps where omega3 is 0.3 rad/s."""
+    return [0.0, 0.0, -np.where(omega[2] > 0.3, strong, weak)]
+
+
+@pytest.mark.parametrize("reverse", [1, -1])
+def test_derivatives_through_a_jump_are_those_of_the_closed_form(reverse: int) -> None:
+    scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
+    names = ["omega0", "torque.strong", "torque.weak", "moments"]
+    times = np.array([5.0, 12.0, 20.0])[::reverse]
+    found = solve(scene, times, sensitivities=names)
+    assert found.sensitivities is not None
+    crossing = 0.5 * 4.0 / 0.2
+    late = times > crossing
+    # Later omega3 is 0.3 - weak (t - 2/strong)/I3, where the 2 is I3 (omega3(0) - 0.3).
+    expected = {
+        "omega0": np.where(late, 0.02 / 0.2, 1.0),
+        "torque.strong": np.where(late, -0.02 * 0.5 / 0.2**2, -times / 4.0),
+        "torque.weak": np.where(late, -(times - crossing) / 4.0, 0.0),
+        "moments": np.where(late, 0.02 * times / 16.0, 0.2 * times / 16.0),
+    }
+    for name, values in expected.items():
+        own = found.sensitivities[name][:, 2, -1]
+        assert np.abs(own - values).max() <= 1e-10 * max(1.0, np.abs(values).max()), name
+
+
+def test_derivatives_of_a_saturated_law_are_those_of_forty_digits() -> None:
+    def law(t: Any, omega: Any, *, gain: float = 2.0) -> Any:
+        return [0.0, 0.0, np.clip(-gain * omega[2], -0.5, 0.5)]
+
+    scene = Scene("clip", (0.0, 0.0, 1.0), MOMENTS, torque=law)
+    found = solve(scene, 9.0, sensitivities=["torque.gain"])
+    with mpmath.workdps(40):
+
+        def omega(gain: Any) -> Any:
+            # Saturated until omega3 is 0.5/gain; then it decays.
+            leaves = (1 - mpmath.mpf("0.5") / gain) * 8
+            return mpmath.mpf("0.5") / gain * mpmath.exp(-gain / 4 * (9 - leaves))
+
+        expected = float(mpmath.diff(omega, mpmath.mpf(2)))
+    assert found.sensitivities is not None
+    assert found.sensitivities["torque.gain"][0, 2, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_derivatives_of_own_states() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, -2.0 * states["turned"]], {"turned": omega[2]}
+
+    scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"turned": 0.0})
+    times = np.array([1.0, 4.0])
+    found = solve(scene, times, sensitivities=["omega0", "moments"], attitude=True)
+    assert found.sensitivities is not None
+    slopes = found.sensitivities["omega0"]
+    assert slopes.shape == (2, 8, 3)
+    frequency = math.sqrt(0.5)
+    assert slopes[:, 7, 2] == pytest.approx(np.sin(frequency * times) / frequency, rel=1e-9)
+    # The frequency is sqrt(2/I3).
+    turned = np.cos(frequency * times) * times / frequency - np.sin(frequency * times) / 0.5
+    assert found.sensitivities["moments"][:, 7, 2] == pytest.approx(
+        turned * -frequency / 8.0, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("name", ["omega0", "attitude", "moments", "inertia", "torque.gain"])
+def test_differences_are_the_derivatives_where_no_switch_changes(name: str) -> None:
+    def law(t: Any, omega: Any, q: Any, *, gain: float = 0.3) -> Any:
+        return -gain * omega - 0.4 * q[1:]
+
+    def switched(t: Any, omega: Any, q: Any, *, gain: float = 0.3) -> Any:
+        return -gain * omega - 0.4 * q[1:] + np.where(t > 100.0, 1.0, 0.0)
+
+    inertia = [[3.0, 0.2, 0.1], [0.2, 2.0, -0.1], [0.1, -0.1, 1.5]]
+    body: dict[str, Any] = {"inertia": inertia} if name == "inertia" else {"moments": MOMENTS}
+    found = [
+        solve(
+            Scene("alike", (0.5, -0.3, 0.8), torque=torque, **body), [1.0, 6.0],
+            attitude=True, sensitivities=[name],
+        ).sensitivities
+        for torque in (law, switched)
+    ]  # fmt: skip
+    assert found[0] is not None
+    assert found[1] is not None
+    scale = np.abs(found[0][name]).max()
+    assert np.abs(found[0][name] - found[1][name]).max() <= 1e-9 * scale
+
+
+def test_what_has_no_influence_has_a_derivative_of_zero() -> None:
+    def law(t: Any, omega: Any, *, unused: float = 0.3) -> Any:
+        return [0.0, 0.0, np.where(t > 50.0, unused, 0.1)]
+
+    scene = Scene("unused", (0.5, -0.3, 0.8), MOMENTS, torque=law)
+    found = solve(scene, 3.0, sensitivities=["torque.unused"])
+    assert found.sensitivities is not None
+    assert np.abs(found.sensitivities["torque.unused"]).max() < 1e-9
+
+
+def test_a_switch_that_is_only_touched_is_refused() -> None:
+    def law(t: Any, omega: Any, *, push: float = 0.5) -> Any:
+        # omega3 has its maximum 1 at t = 2 s.
+        return [0.0, 0.0, np.where(omega[2] > 1.0, 4.0, push * (2.0 - t))]
+
+    scene = Scene("touch", (0.0, 0.0, 0.75), MOMENTS, torque=law)
+    with pytest.raises(InputError, match=r"does not depend smoothly on torque\.push"):
+        solve(scene, 5.0, sensitivities=["torque.push"])
+
+
+def test_bodies_have_them_too() -> None:
+    scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
+    found = solve_many(scene, 20.0, omega0=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega0"])
+    assert found.sensitivities is not None
+    assert found.sensitivities["omega0"][:, 2, 2] == pytest.approx([0.1, 0.1], rel=1e-9)

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.model.arrays import buffer_of
+from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
 from pyharness.model.distribution import check_package
-from pyharness.model.errors import InputError
-from pyharness.model.trajectory import Array, BatchResult
+from pyharness.model.errors import InputError, unknown
+from pyharness.model.torque_law import FRAMES
+from pyharness.model.trajectory import Array, BatchResult, turned_to_space
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -72,6 +73,59 @@ class Ensemble(BatchResult):
     def growth(self) -> Array | None:
         """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 1]
+
+    def angular_momentum(
+        self, frame: str = "body", *, moments: Any = None, inertia: Any = None
+    ) -> Array:
+        """Return the angular momentum of each body, from what `solve_many` was given.
+
+        Parameters
+        ----------
+        frame : {"body", "space"}
+            The axes of the components.
+        moments : array, shape (n, 3) or (3,)
+            Principal moments, kg m2.
+        inertia : array, shape (n, 3, 3) or (3, 3)
+            Inertia matrices (kg m2) instead of moments.
+
+        Returns
+        -------
+        ndarray, shape (n, 3) or (n, m, 3)
+            The angular momenta, kg m2/s, in the shape of `omega`.
+
+        Raises
+        ------
+        InputError
+            Unless one of `moments` and `inertia` is given, with one row or n; if the frame is
+            unknown, or "space" is requested without attitudes.
+        """
+        if frame not in FRAMES:
+            raise unknown("frame", str(frame), FRAMES)
+        given = only_one({"moments": moments, "inertia": inertia})
+        if given is None:
+            raise InputError("neither moments nor inertia is given; give one of them")
+        if given == "inertia":
+            matrices = rows_of(given, inertia, 3, 3)
+        else:
+            matrices = rows_of(given, moments, 3)[:, :, None] * np.eye(3)
+        n = len(self.omega)
+        check_rows(given, matrices, n)
+        momentum: Array = np.einsum("bij,b...j->b...i", spread(matrices, n), self.omega)
+        if frame == "body":
+            return momentum
+        if self.attitude is None:
+            raise InputError("the bodies have no attitudes; give attitude0 to solve_many")
+        turned = turned_to_space(self.attitude.reshape(-1, 4), momentum.reshape(-1, 3))
+        return turned.reshape(momentum.shape)
+
+    def energy(self, *, moments: Any = None, inertia: Any = None) -> Array:
+        """Return the kinetic energy (J) of each body, shape (n,) or (n, m).
+
+        The arguments are those of `angular_momentum`.
+        """
+        momentum = self.angular_momentum(moments=moments, inertia=inertia)
+        energy: Array = 0.5 * (self.omega * momentum).sum(axis=-1)
+        return energy
 
     def with_times(self, times: Array) -> "Ensemble":
         """Return the result for n bodies and m times of one for n m bodies, without copies."""

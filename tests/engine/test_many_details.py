@@ -208,3 +208,27 @@ def test_scenes_have_rows_over_time() -> None:
         ["omega1", "omega2", "omega3", "ended"], "body",
     )  # fmt: skip
     assert final.attrs["units"]["omega3"] == "rad/s"
+
+
+@pytest.mark.parametrize("shape", [(3,), (4, 3), (3, 3), (4, 3, 3)])
+def test_energy_and_angular_momentum_are_those_of_trajectories(shape: tuple[int, ...]) -> None:
+    draw = np.random.default_rng(3)
+    body = draw.uniform(1.0, 2.0, shape)
+    if shape[-2:] == (3, 3):
+        body = body @ np.swapaxes(body, -1, -2) + np.eye(3)
+    starts, times = draw.normal(size=(4, 3)), [1.0, 2.5]
+    key = "inertia" if shape[-2:] == (3, 3) else "moments"
+    given: Any = {key: body}
+    scene = Scene("many", (0.0, 0.0, 1.0), moments=(1.0, 2.0, 2.5))
+    turned = (0.5, 0.5, -0.5, 0.5)
+    found = solve_many(scene, times=times, omega0=starts, attitude0=turned, **given)
+    last = solve_many(scene, 2.5, omega0=starts, attitude0=turned, **given)
+    for i in range(4):
+        own: Any = body if len(shape) == 1 or shape == (3, 3) else body[i]
+        of_one: Any = {key: own.tolist()}
+        one = solve(Scene("one", starts[i], attitude=turned, **of_one), times, attitude=True)
+        space = one.angular_momentum("space")
+        assert found.energy(**given)[i] == pytest.approx(one.energy(), rel=1e-11)
+        assert last.energy(**given)[i] == pytest.approx(one.energy()[-1], rel=1e-11)
+        assert found.angular_momentum("space", **given)[i] == pytest.approx(space, rel=1e-10)
+        assert last.angular_momentum("space", **given)[i] == pytest.approx(space[-1], rel=1e-10)

@@ -73,7 +73,8 @@ contains
   pure real(dp) function growth_of(matrix, sizes, transitions)
     !! Return the largest norm from the beginning of any block to any requested time.
     real(dp), intent(in) :: matrix(:, :) !! of the open block
-    real(dp), intent(in) :: sizes(:)     !! of the unknowns, to which perturbations are relative
+    !! Of the unknowns, to which perturbations are relative; 0 of one that does not count.
+    real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
     real(dp) :: unit(MOST_UNKNOWNS, MOST_UNKNOWNS), open_block(MOST_UNKNOWNS, MOST_UNKNOWNS)
     integer :: i, m
@@ -122,10 +123,10 @@ contains
     real(dp), intent(in) :: sizes(:)
     integer :: i, j
 
-    norm = real(1 - n, dp)
+    norm = real(1 - count(sizes(:n) > 0.0_dp), dp)
     do j = 1, n
       do i = 1, n
-        norm = norm + (a(i, j)*(sizes(j)/sizes(i)))**2
+        if (sizes(i) > 0.0_dp) norm = norm + (a(i, j)*(sizes(j)/sizes(i)))**2
       end do
     end do
     norm = min(LARGEST, sqrt(max(1.0_dp, norm)))

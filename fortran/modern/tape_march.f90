@@ -30,6 +30,12 @@ module tape_march
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
   ! Products of smaller omegas underflow, rad/s.
   real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
+  ! Least size of an own state, which is part of a product with the local tolerance.
+  real(dp), parameter :: LEAST_OWN = 2.0_dp**(-800)
+  ! An own state is at least this part of what the other unknowns might make of it in the first
+  ! steps: it may stay 0 by symmetry, but for rounding errors.
+  real(dp), parameter :: PART_OF_OTHERS = 1e-3_dp
+  integer, parameter :: FIRST_STEPS = 4
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
   ! Largest difference of a derivative and that of its series at the end of a step, times the step,
   ! over the local tolerance, and over the rounding errors at the beginning of the step.
@@ -87,6 +93,7 @@ contains
     ! The error, and a perturbation of each unknown, in blocks.
     real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, MOST_BLOCKS)
     real(dp) :: own_sizes(tape%n_unknowns)    ! of own states: the largest so far
+    real(dp) :: sizes(tape%n_unknowns)        ! of all unknowns
     real(dp) :: t(2), t_next(2)               ! time and its rounding error, s
     real(dp) :: t_end, rest, factor, local_tolerance, scale, power
     real(dp) :: break_time                    ! next breakpoint of a table, or t_end, s
@@ -149,7 +156,7 @@ contains
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
-      if (from_rest) scale = largest_terms(1, 3)
+      if (from_rest) scale = largest_terms(1, 3, 4)
       call weigh()
       factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
@@ -244,6 +251,7 @@ contains
       scale = max(scale, maxval(abs(y(:3))))
       do i = first_own, n
         own_sizes(i) = max(own_sizes(i), abs(y(i)))
+        if (found%steps <= FIRST_STEPS) own_sizes(i) = max(own_sizes(i), size_by_others(i))
       end do
       if (at_end) then
         call add_row(y, y_low, lanes(1, :n, 1), solution%n_rows + 1)
@@ -268,7 +276,12 @@ contains
       if (solution%status /= COMPLETE) exit
     end do
     call weigh()
-    found%growth = growth_of(transposed(n, lanes), 1.0_dp/weights, transitions)
+    where (weights > 0.0_dp)
+      sizes = 1.0_dp/weights
+    elsewhere
+      sizes = 0.0_dp
+    end where
+    found%growth = growth_of(transposed(n, lanes), sizes, transitions)
     found%noise = norm2(weights*sqrt(sum_of_noise))
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
@@ -350,18 +363,23 @@ contains
     real(dp) function fitting_lanes()
       !! Return the factor on the step with which the last terms of the perturbations are small.
       real(dp) :: first, size_of_last
-      integer :: i, block, lane
+      integer :: i, block, lane, number
 
       first = 0.0_dp
       size_of_last = 0.0_dp
       do block = 1, n_blocks
-        lane = merge(2, 1, block == 1) ! the error does not count
-        do i = 1, n
-          associate (v => s%blocks(lane:, :, FIRST_UNKNOWN - 1 + i, block))
-            first = max(first, weights(i)*maxval(abs(v(:, 1))))
-            size_of_last = max(size_of_last, weights(i)*maxval(abs(v(:, 1 + s%order))), &
-                               weights(i)*maxval(abs(v(:, s%order)))/factor)
-          end associate
+        do lane = merge(2, 1, block == 1), SIDE_BY_SIDE ! the error does not count
+          number = SIDE_BY_SIDE*(block - 1) + lane - 1
+          if (number > n) exit
+          if (.not. weights(number) > 0.0_dp) cycle
+          do i = 1, n
+            associate (v => s%blocks(lane, :, FIRST_UNKNOWN - 1 + i, block), &
+                       relative => weights(i)/weights(number))
+              first = max(first, relative*abs(v(1)))
+              size_of_last = max(size_of_last, relative*abs(v(1 + s%order)), &
+                                 relative*abs(v(s%order))/factor)
+            end associate
+          end do
         end do
       end do
       size_of_last = size_of_last*factor**s%order
@@ -371,16 +389,16 @@ contains
       end if
     end function fitting_lanes
 
-    real(dp) function largest_terms(first, last)
+    real(dp) function largest_terms(first, last, n_terms)
       !! Return the largest of the first terms of unknowns for a step that ends at the next
       !! breakpoint.
-      integer, intent(in) :: first, last
+      integer, intent(in) :: first, last, n_terms
       real(dp) :: part
       integer :: k
 
       part = min(1.0_dp, abs(to_stop/s%h))
       largest_terms = 0.0_dp
-      do k = 1, 4
+      do k = 1, n_terms
         largest_terms = max(largest_terms, part**k*maxval(abs(s%a(k, FIRST_UNKNOWN - 1 + first: &
                                                                   FIRST_UNKNOWN - 1 + last))))
       end do
@@ -397,10 +415,25 @@ contains
       weights(4:first_own - 1) = 2.0_dp
       do i = first_own, n
         own_size = own_sizes(i)
-        if (.not. own_size > 0.0_dp) own_size = largest_terms(i, i)
-        weights(i) = 1.0_dp/max(own_size, LEAST_SCALE)
+        if (.not. own_size > 0.0_dp) own_size = largest_terms(i, i, s%order)
+        weights(i) = 0.0_dp
+        if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
       end do
     end subroutine weigh
+
+    real(dp) function size_by_others(i)
+      !! Return the least size of own state i, from its perturbations by the other unknowns.
+      integer, intent(in) :: i
+      integer :: j
+
+      size_by_others = 0.0_dp
+      do j = 1, n
+        if (j == i .or. .not. weights(j) > 0.0_dp) cycle
+        size_by_others = max(size_by_others, abs(lanes(1 + mod(j, SIDE_BY_SIDE), i, &
+                                                       1 + j/SIDE_BY_SIDE))/weights(j))
+      end do
+      size_by_others = PART_OF_OTHERS*size_by_others
+    end function size_by_others
 
     real(dp) function to_end(factor)
       !! Return the factor with which the steps near the end, or before a breakpoint, are equal.
@@ -496,7 +529,7 @@ contains
       cancelled = max(maxval(size_of_terms(:3))/reached, 2.0_dp*sum(size_of_terms(4:first_own - 1)))
       do i = first_own, n
         cancelled = max(cancelled, size_of_terms(i) &
-                        /max(1.0_dp/weights(i), abs(y(i) + change(i)), LEAST_SCALE))
+                        /max(own_sizes(i), abs(y(i) + change(i)), LEAST_OWN))
       end do
       if (.not. cancelled <= max(MOST_CANCELLED, attempt%tolerance/epsilon(rounded))) then
         is_continued = .false.

@@ -524,7 +524,11 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
      because it may be zero. */
   double units[SIDE_BY_SIDE] = {0.0};
   const int count = n + 1 - number < SIDE_BY_SIDE ? n + 1 - number : SIDE_BY_SIDE;
-  for (int i = number ? 0 : 1; i < count; i++) units[i] = 1.0 / weights[number + i - 1];
+  for (int i = number ? 0 : 1; i < count; i++) {
+    /* The weight of an own state that stays 0 is 0. */
+    const double weight = weights[number + i - 1];
+    units[i] = weight > 0.0 ? 1.0 / weight : 0.0;
+  }
   const double first = largest(tape, 0, weights, units, count);
   double before = first, power = 1.0;
   int k = 0;

@@ -102,7 +102,7 @@ class Ensemble(BatchResult):
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
         given = only_one({"moments": moments, "inertia": inertia})
-        if given is None:
+        if not given:
             raise InputError("neither moments nor inertia is given; give one of them")
         if given == "inertia":
             matrices = rows_of(given, inertia, 3, 3)

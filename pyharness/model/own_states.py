@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.values import finite
 
+_LARGE = 1e120  # products of smaller states, and of their errors, are finite
 MOST_STATES = 8  # what the kernel has room for beside omega and attitude
 # Names of other columns of results, and of other values in expressions.
 _TAKEN = (
@@ -28,7 +29,10 @@ class OwnState(NamedTuple):
 def checked_states(value: object) -> tuple[OwnState, ...]:
     """Return the argument `states` of a scene, or raise InputError."""
     if isinstance(value, tuple) and all(isinstance(each, OwnState) for each in value):
-        return value
+        names = [each.name for each in value]
+        if len(set(names)) < len(names):
+            raise InputError(f"states: a name is given twice; allowed: other than {names}")
+        value = {name: pair for name, *pair in value}
     if not isinstance(value, Mapping):
         raise InputError(
             f"states is {kind_of(value)}; it must be a dict of names and values at time 0"
@@ -49,6 +53,11 @@ def _state(name: object, value: Any) -> OwnState:
     if len(pair) != 2:
         raise InputError(f"{where} has {len(pair)} numbers; allowed: a start, or a start and scale")
     start, scale = (finite(where, each) for each in pair)
+    if not all(size == 0.0 or 1.0 / _LARGE <= size <= _LARGE for size in (abs(start), abs(scale))):
+        raise InputError(
+            f"{where}: {start:g}, scale {scale:g}; allowed: 0, and sizes from 1e-120 to 1e120; use "
+            "another unit"
+        )
     if scale < 0.0:
         raise InputError(f"{where}: the scale is {scale:g}; allowed: a number from 0 on")
     return OwnState(name, start, scale)

@@ -145,7 +145,8 @@ def estimates(trajectory: Trajectory) -> list[str]:
     """Return at most one line, with a method's estimates."""
     told = []
     if trajectory.error is not None and trajectory.digits is not None:
-        told.append(f"estimated error {short(trajectory.error)} of the largest |omega|")
+        of = "of the largest |omega|" + (" or of a state" if trajectory.states else "")
+        told.append(f"estimated error {short(trajectory.error)} {of}")
         told.append(f"digits left {trajectory.digits:.1f}")
     if trajectory.growth is not None:
         told.append(f"error amplification {short(trajectory.growth)}")

@@ -214,6 +214,8 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     (0.5, -1.0, -1.5)
     """
     names = tuple(states)
+    if not all(isinstance(each, str) for each in names) or len(set(names)) < len(names):
+        raise InputError(f"states: {list(names)!r}; allowed: different names, as texts")
     if names:
         return _with_states(function, names)
     takes_attitude = _takes_attitude(function)

@@ -35,6 +35,8 @@ from pyharness.model.values import converted
 # time.
 MOST_OPERATIONS = 2000
 _MOST_POWER = 1000
+# Smaller factors, as of (x / 1e12)**30, would underflow.
+_LEAST_FACTOR = 2.0**-400
 _ALLOWED = (
     "+ - * / ** and NumPy's elementary functions, where, clip, minimum, maximum, sign, abs, floor, "
     "heaviside, interp"
@@ -134,6 +136,11 @@ def _of_symbols(
     return called
 
 
+def _is_moderate(factor: float) -> bool:
+    """Return whether a constant factor may be taken out of products without loss."""
+    return _LEAST_FACTOR <= abs(factor) <= 1.0 / _LEAST_FACTOR
+
+
 class Symbol:
     """A linear combination of slots of a tape, which records the operations on it."""
 
@@ -216,6 +223,8 @@ class Symbol:
         if not self._terms:
             return other._scaled(self._constant)
         (a, factor), (b, second) = self._slot(), other._slot()
+        if not _is_moderate(factor * second):
+            a, b, factor, second = self._own_slot(), other._own_slot(), 1.0, 1.0
         product = self.recorder.slot(Operation("product", (min(a, b), max(a, b))))
         return Symbol(self.recorder, 0.0, {product: factor * second})
 
@@ -237,6 +246,8 @@ class Symbol:
         else:
             one = Linear(1.0, ())
             a, factor = self.recorder.slot(Operation("linear", (), one)), self._constant
+        if self._terms and not _is_moderate(factor / divisor):
+            a, b, factor, divisor = self._own_slot(), other._own_slot(), 1.0, 1.0
         slot = self.recorder.slot(Operation("quotient", (a, b)))
         return Symbol(self.recorder, 0.0, {slot: factor / divisor})
 

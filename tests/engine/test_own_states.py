@@ -518,3 +518,38 @@ def test_a_constant_torque_keeps_the_states() -> None:
     found = solve(scene, 3.0)
     assert found.states["x"] == pytest.approx([3.0])
     assert found.omega[0] == pytest.approx([0.3, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("rates", "start", "spin", "end"),
+    [
+        (lambda x, w: 0.0, 1e-9, 1.0, 500.0),
+        (lambda x, w: 0.3, 0.0, 1000.0, 1.5),
+        (lambda x, w: w[0], 0.0, 0.1, 500.0),
+        (lambda x, w: w[0] - x, 0.0, 5.0, 50.0),
+        (lambda x, w: -x, 1e-100, 1.0, 10.0),
+    ],
+)
+def test_growth_is_not_that_of_the_size_of_a_state(
+    rates: Any, start: float, spin: float, end: float
+) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [-0.1 * omega[0], -0.1 * omega[1], 0.0], {"x": rates(states["x"], omega)}
+
+    scene = Scene("steady", (0.0, 0.0, spin), MOMENTS, torque=law, states={"x": start})
+    for tolerance in (1e-6, 1e-9, 1e-12):
+        found = solve(scene, end, tolerance=tolerance)
+        assert found.ended == "complete"
+        assert found.growth is not None
+        assert found.growth < 5000.0
+        assert found.error is not None
+        assert found.error < tolerance
+
+
+def test_states_of_other_scenes_are_checked_too() -> None:
+    scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
+    with pytest.raises(InputError, match="given twice"):
+        Scene("two", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states=scene.states * 2)
+    many = tuple(scene.states[0]._replace(name=f"x{k}") for k in range(10))
+    with pytest.raises(InputError, match="10 are given"):
+        Scene("many", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states=many)

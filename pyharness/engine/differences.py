@@ -26,8 +26,8 @@ from pyharness.model.scene import ImpossibleBodyWarning, Scene
 from pyharness.model.values import triple
 
 _FIRST = 0.02  # first difference, relative to the parameter
-_LEVELS, _RATIO = 9, 2.0
-_WORSE = 10.0  # growth of the error at which smaller differences are no longer tried
+_LEVELS, _RATIO = 13, 2.0
+_ENOUGH = 1e-11  # estimated error, relative, at which no smaller differences are tried
 # Largest estimated error, relative to the largest derivative by a parameter.
 _ALLOWED = 1e-7
 _SMALL = 1e-10  # or so large a change of the state, relative, by that of the parameter
@@ -70,7 +70,7 @@ def _slope(name: str, moved: Callable[[float], Scene], size: float, states: Stat
             error = max(np.abs(found[-1] - found[-2]).max(), np.abs(found[-1] - other).max())
             if error <= least:
                 best, least = found[-1], error
-        if row and np.abs(found[-1] - row[-1]).max() >= _WORSE * least:
+        if least <= _ENOUGH * np.abs(best).max(initial=0.0):
             break
         row = found
     if not least <= _ALLOWED * np.abs(best).max(initial=0.0) + _SMALL * largest / size:

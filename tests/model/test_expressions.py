@@ -192,3 +192,11 @@ def test_names_are_time_omega_and_the_attitude_with_the_scalar_first() -> None:
     assert isinstance(torque, StateTorque)
     found = torque.at(1.0, (2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
     assert found == (4321.0, 8765.0, 0.0)
+
+
+def test_powers_of_small_quotients_do_not_underflow() -> None:
+    for text in ("(w3/1e12)**30", "1/(w3/1e12)**30", "(1e-12*w3)**40*(1e-12*w3)"):
+        torque = parsed(["0", "0", text], {})
+        assert isinstance(torque, StateTorque)
+        found = torque.at(0.0, (0.0, 0.0, 1e12), (1.0, 0.0, 0.0, 0.0))
+        assert found[2] == pytest.approx(1.0, rel=1e-12)

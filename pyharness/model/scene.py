@@ -55,7 +55,7 @@ STATE_TORQUE = (
 )
 CHANGING = (
     "the scene's inertia changes with time, and this takes a constant one; allowed for a changing "
-    "inertia: solve, prepare, solve_many, and the verbs prove and run --method"
+    "inertia: solve, prepare, solve_many, Stepper, and the verbs prove and run --method"
 )
 OWN_STATES = (
     "the scene has states of its own, which this can't integrate; allowed: solve and the verb run "

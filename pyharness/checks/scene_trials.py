@@ -186,10 +186,7 @@ def _end(scene: Scene, time: float, method: str, tolerance: float) -> State:
 
 def _from(scene: Scene, state: State, time: float) -> Scene:
     omega, attitude = state
-    if attitude is None:
-        return restarted_at(scene, omega, time)
-    w, x, y, z = attitude.tolist()
-    return restarted_at(scene, omega, time, (w, x, y, z))
+    return restarted_at(scene, omega, time, None if attitude is None else attitude.tolist())
 
 
 def _permuted(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:

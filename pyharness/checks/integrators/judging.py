@@ -234,9 +234,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
         return []
     if not (np.isfinite(forth.omega[-1]).all() and np.isfinite(forth.attitude[-1]).all()):
         return []
-    x, y, z = (-forth.omega[-1]).tolist()
-    a, b, c, d = forth.attitude[-1].tolist()
-    scene = replace(problem.scene, omega=(x, y, z), attitude=(a, b, c, d))
+    scene = replace(problem.scene, omega=-forth.omega[-1], attitude=forth.attitude[-1])
     back = ask(problem.request(level, scene), len(problem.times))
     name = Name("integrator", "return", problem.name)
     if back.refusal or back.attitude is None:

@@ -22,6 +22,7 @@ from pyharness.checks.theory.amplification import (
 from pyharness.checks.theory.collocation_matrices import Exact, points, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING
 from pyharness.checks.theory.schemes import Numbers, runge_kutta_punched, spacing
+from pyharness.engine.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
@@ -100,8 +101,7 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
     """
 
     def stepped(omega: Array) -> Array:
-        x, y, z = omega.tolist()
-        run = _run(replace(scene, omega=(x, y, z), steps=1), listing)
+        run = _run(replace(scene, omega=omega.tolist(), steps=1), listing)
         return run[0] if len(run) else np.full(3, np.nan)
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
@@ -217,14 +217,10 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
     units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
-    a, omega = np.array(coefficients), np.array(scene.omega)
-
-    def along(direction: Array) -> Array:
-        """Return J at omega = `direction`."""
-        x, y, z = direction
-        return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
-
-    j, along_rate = along(omega), along(np.array(scene.right_hand_side()(0.0, scene.omega)))
+    # J at omega, and at the value of F.
+    j, along_rate = jacobians(
+        scene, np.array([scene.omega, scene.right_hand_side()(0.0, scene.omega)])
+    )
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
     derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
     return Probe(found, derived, amplified * ROUNDING * float(units.max()))

@@ -8,7 +8,6 @@ from importlib.util import find_spec
 from pyharness.checks.compare.candidates import (
     Candidate,
     Ready,
-    attitude_candidate,
     prepared_candidate,
     program_candidate,
 )
@@ -79,9 +78,12 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def _prepared(name: str, scene: Scene) -> Maker:
-    candidate = prepared_candidate if scene.attitude is None else attitude_candidate
-    # A closed form has no setting.
-    return lambda horizon, setting: candidate(name, setting or None).ready(scene, horizon)
+    def make(horizon: float, setting: float) -> Ready:
+        # A closed form has no setting.
+        attitude = scene.attitude is not None
+        return prepared_candidate(name, setting or None, attitude=attitude).ready(scene, horizon)
+
+    return make
 
 
 def _in_steps(candidate: Candidate, scene: Scene) -> Maker:

@@ -177,17 +177,14 @@ class Plant:
     kinds: tuple[str, ...]
 
 
-def _off(found: Any, size: float) -> Any:
-    """Return omega, or a result with it, each component enlarged by `size` times the largest."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, omega=_off(found.omega, size))
-    return found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+def _off(found: Array, size: float) -> Array:
+    """Return an array, each element enlarged by `size` times the largest."""
+    wrong: Array = found + size * np.abs(found).max(initial=0.0) * np.sign(found)
+    return wrong
 
 
-def _bit_off(found: Any, size: float) -> Any:
-    """Return an array, or a result with omega, with the largest element times 1 + `size`."""
-    if not isinstance(found, np.ndarray):
-        return replace(found, omega=_bit_off(found.omega, size))
+def _bit_off(found: Array, size: float) -> Array:
+    """Return an array with the largest element times 1 + `size`."""
     wrong = found.copy()
     wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
     return wrong
@@ -359,7 +356,7 @@ PLANTS = (
     Plant("half-step-in-both", "half a step in both languages, labelled as a whole one",
           instead(_PROGRAM, _shorter_both), 0.5, ("schemes", "stops")),
     Plant("ulp-in-fortran", "one unit in the last place of one result",
-          change_result(_COMPILED, _bit_off), 2.0**-52, ("cells",)),
+          change_result(_COMPILED, change_attribute("omega", _bit_off)), 2.0**-52, ("cells",)),
     Plant("velocity-in-fortran", "a sign in the velocity",
           change_result(_COMPILED, _VELOCITY), 2.0, ("decks", "schemes")),
     Plant("velocity-in-both", "a sign in the velocity, in both languages alike",
@@ -394,7 +391,8 @@ PLANTS = (
              lambda found, size: [_digit_altered(each, size) for each in found]),
           20.0, ("external",)),
     Plant("scipy", "another SciPy, whose results are wrong in the fourth digit",
-          in_method("dop853", changing(_off)), 1e-4, ("methods", "orders")),
+          in_method("dop853", changing(change_attribute("omega", _off))),
+          1e-4, ("methods", "orders")),
 )  # fmt: skip
 
 

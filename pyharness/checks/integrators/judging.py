@@ -271,7 +271,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
         checks.append(change.described(None, "no limit: the errors of the short motion are large"))
     else:
         checks.append(change.bounded(found.drift.change, limit, CHANGE))
-    for quantity, values in found.drift.named().items():
+    for quantity, values in found.drift.named.items():
         name = Name("integrator", quantity, problem.name, quantity="drift")
         largest = float(np.abs(values).max())
         power = growth_power(found.drift.times, values)

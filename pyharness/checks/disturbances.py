@@ -279,27 +279,17 @@ DOUBLING = Basis(
     "linear stability, with the change of the spin until the wobble doubles "
     "(`checks/disturbances.py`)",
 )
-"""Basis of the field `limit` of a `Divergence`."""
-
-
-@dataclass(frozen=True)
-class Divergence:
-    """The smallest step size (s) for which runs diverge, measured (`found`) and predicted.
-
-    A run diverges if it overflows or a component exceeds twice its true maximum; `found` is 0 if
-    the smallest step tried diverges. With the step `predicted`, linear stability lets the wobble
-    about axis 3 double. `limit` bounds the relative difference of the two.
-    """
-
-    found: float
-    predicted: float
-    limit: float
+"""Basis of the limit from `divergence`."""
 
 
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
-) -> Divergence:
-    """Return the divergent step sizes of a body that spins about stable axis 3 for `time` (s)."""
+) -> tuple[float, float, float]:
+    """Return two step sizes (s) of divergence, and a bound on their relative difference.
+
+    The body spins about stable axis 3 for `time` (s). The first step is that of
+    `smallest_divergent`. With the second, linear stability lets the wobble about axis 3 double.
+    """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
     spin = abs(scene.omega[2])
@@ -317,13 +307,13 @@ def divergence(
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
-    return Divergence(found, predicted, limit)
+    return found, predicted, limit
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step size (s) with which a run exceeds twice the largest true omega.
 
-    Return 0 if it is at most `smallest` (s), and infinity if no run does.
+    An overflow counts too. Return 0 if it is at most `smallest` (s), and infinity if no run does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

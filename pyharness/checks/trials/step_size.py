@@ -133,14 +133,14 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
         return name.described(found, _from(found, TIME))
-    seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
-    note = f"{_from(seen.found, _LONG)}, predicted from {seen.predicted:.4g} s"
+    matrix = amplification(scheme)
+    found, predicted, limit = divergence(scene, _LONG, matrix, runner, _SMALLEST_LONG)
+    note = f"{_from(found, _LONG)}, predicted from {predicted:.4g} s"
     # Linear theory excludes collocation points that move from step to step, unless the equations
     # are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
-        off = abs(seen.found / seen.predicted - 1.0)
-        return name.bounded(off, seen.limit, DOUBLING, note)
-    return name.described(seen.found, note)
+        return name.bounded(abs(found / predicted - 1.0), limit, DOUBLING, note)
+    return name.described(found, note)
 
 
 def _from(found: float, time: float) -> str:

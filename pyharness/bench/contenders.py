@@ -11,9 +11,9 @@ from pyharness.checks.compare.candidates import (
     prepared_candidate,
     program_candidate,
 )
+from pyharness.checks.stress import LISTINGS
 from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
@@ -57,16 +57,15 @@ def list_own_contenders() -> list[SceneContender]:
         both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
         both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
     ]
-    in_steps = {
-        name: (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
-    }
-    for name, program in PROGRAM_REGISTRY.items():
-        for listing in (Listing.original(name), Listing.corrected(name)):
-            candidate = program_candidate(listing, velocity=False)
-            in_steps[candidate.name] = candidate, program.order
+    in_steps = [
+        (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
+    ]
+    for listing in LISTINGS:
+        candidate = program_candidate(listing, velocity=False)
+        in_steps.append((candidate, PROGRAM_REGISTRY[listing.program].order))
     return found + [
-        SceneContender(name, "steps", partial(_in_steps, candidate), order=order)
-        for name, (candidate, order) in in_steps.items()
+        SceneContender(candidate.name, "steps", partial(_in_steps, candidate), order=order)
+        for candidate, order in in_steps
     ]
 
 

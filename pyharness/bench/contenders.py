@@ -8,13 +8,12 @@ from importlib.util import find_spec
 from pyharness.checks.compare.candidates import (
     Candidate,
     Ready,
-    attitude_candidate,
     prepared_candidate,
     program_candidate,
 )
+from pyharness.checks.stress import LISTINGS
 from pyharness.engine.registry import FIXED_STEP, GAUSS, METHODS
 from pyharness.model.errors import InputError
-from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
@@ -58,16 +57,15 @@ def list_own_contenders() -> list[SceneContender]:
         both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
         both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
     ]
-    in_steps = {
-        name: (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
-    }
-    for name, program in PROGRAM_REGISTRY.items():
-        for listing in (Listing.original(name), Listing.corrected(name)):
-            candidate = program_candidate(listing, velocity=False)
-            in_steps[candidate.name] = candidate, program.order
+    in_steps = [
+        (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
+    ]
+    for listing in LISTINGS:
+        candidate = program_candidate(listing, velocity=False)
+        in_steps.append((candidate, PROGRAM_REGISTRY[listing.program].order))
     return found + [
-        SceneContender(name, "steps", partial(_in_steps, candidate), order=order)
-        for name, (candidate, order) in in_steps.items()
+        SceneContender(candidate.name, "steps", partial(_in_steps, candidate), order=order)
+        for candidate, order in in_steps
     ]
 
 
@@ -79,9 +77,12 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def _prepared(name: str, scene: Scene) -> Maker:
-    candidate = prepared_candidate if scene.attitude is None else attitude_candidate
-    # A closed form has no setting.
-    return lambda horizon, setting: candidate(name, setting or None).ready(scene, horizon)
+    def make(horizon: float, setting: float) -> Ready:
+        # A closed form has no setting.
+        attitude = scene.attitude is not None
+        return prepared_candidate(name, setting or None, attitude=attitude).ready(scene, horizon)
+
+    return make
 
 
 def _in_steps(candidate: Candidate, scene: Scene) -> Maker:

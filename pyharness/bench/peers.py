@@ -164,7 +164,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     """
     import heyoka
 
-    unknowns = state_names(scene)
+    unknowns = "xyz" if scene.attitude is None else "xyzabcd"
     coefficients = list(map(float, exact_coefficients(scene)))
     x, y, z, *q = state = heyoka.make_vars(*unknowns)
     found: list[Any]
@@ -173,11 +173,9 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
         products, moments = (y * z, z * x, x * y), scene.moments or (1.0,) * 3
         terms = zip(coefficients, products, torque, moments, strict=True)
         found = [a * product + push / moment for a, product, push, moment in terms]
-        found += quaternion_rates((x, y, z), q) if q else ()
     elif not isinstance(scene.torque, StateTorque):
-        names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time}
-        names |= dict(zip(unknowns, state, strict=True))
-        found = [eval(rate, names) for rate in rates(scene, "t", unknowns, coefficients)]
+        names = {"sin": heyoka.sin, "cos": heyoka.cos, "t": heyoka.time, "x": x, "y": y, "z": z}
+        found = [eval(rate, names) for rate in rates(scene, "t", "xyz", coefficients)]
     elif scene.torque.tape is None:
         raise InputError(
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
@@ -185,7 +183,8 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
     else:
         # The inputs without attitude are not read.
         inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
-        found = evaluate(system_of(scene, bool(q)), inputs, heyoka_functions())
+        found = evaluate(system_of(scene, attitude=False), inputs, heyoka_functions())
+    found += quaternion_rates((x, y, z), q) if q else ()
     return [(x, heyoka.expression(rate)) for x, rate in zip(state, found, strict=True)]
 
 
@@ -250,12 +249,11 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand side of each unknown as Python source.
+    """Return the right-hand side of each component of omega as Python source.
 
-    `time` and `state` are names in the source. Three unknowns are omega; seven also have the
-    quaternion q, with q' = q (0, omega)/2. `coefficients` are A, B, C, by default the scene's.
+    `time` and `state` are names in the source. `coefficients` are A, B, C, by default the scene's.
     """
-    x, y, z, *attitude = state
+    x, y, z = state
     moments = scene.moments or (1.0, 1.0, 1.0)
     law = scene.body_torque
     found = []
@@ -274,20 +272,7 @@ def rates(
                     wave = f"{function}({frequency!r} * ({time}))"
                     terms.append(f"{amplitude[axis] / moments[axis]!r} * {wave}")
         found.append(" + ".join(terms) or "0.0")
-    if attitude:
-        a, b, c, d = attitude
-        found += [
-            f"-0.5 * ({b} * {x} + {c} * {y} + {d} * {z})",
-            f"0.5 * ({a} * {x} + {c} * {z} - {d} * {y})",
-            f"0.5 * ({a} * {y} + {d} * {x} - {b} * {z})",
-            f"0.5 * ({a} * {z} + {b} * {y} - {c} * {x})",
-        ]
     return found
-
-
-def state_names(scene: Scene) -> str:
-    """Return the names of omega and any quaternion in the source, a letter each."""
-    return "xyz" if scene.attitude is None else "xyzabcd"
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:

@@ -37,7 +37,8 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
-        if not chosen.thin or _is_thin(listing, case):
+        few = len(listing.defects) <= 1 or listing.label == "original"
+        if not chosen.thin or (case in (3, 7) and few and len(listing.readings) <= 1):
             is_listed = cell_name(listing, case) in listed
             check = partial(_agreement, listing, case_scene(case), is_listed, ())
             yield Attempt(of_cell("cells", listing, case), check)
@@ -82,11 +83,6 @@ def _agreement(
     return name.judged(bool(found) == is_listed, note, distance(compiled, twin), limit, basis)
 
 
-def _is_thin(listing: Listing, case: int) -> bool:
-    few = len(listing.defects) <= 1 or listing.label == "original"
-    return case in (3, 7) and few and len(listing.readings) <= 1
-
-
 _THIN_CASE = 3
 _VECTORS = Basis(
     "derived",
@@ -105,12 +101,13 @@ def words(chosen: Selection) -> Iterator[Attempt]:
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
-        if chosen.thin and (case != _THIN_CASE or not _has_all_or_none(listing)):
+        has_all_or_none = listing.label != "custom" and not listing.readings
+        if chosen.thin and (case != _THIN_CASE or not has_all_or_none):
             continue
         name = of_cell("words", listing, case)
-        if chosen.only or _is_few(listing):
+        if chosen.only or has_all_or_none or len(listing.defects) + len(listing.readings) <= 1:
             yield Attempt(name, partial(_in_word, listing, case, None))
-        if chosen.only or _has_all_or_none(listing):
+        if chosen.only or has_all_or_none:
             for word in in_word.compiled_words():
                 own = replace(name, subject=f"{word}/{listing.program}")
                 yield Attempt(own, partial(_in_word, listing, case, word))
@@ -131,11 +128,3 @@ def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check
         other = in_word.run_compiled(scene, listing, WORDS[word])
     found = differences(ours, other)
     return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
-
-
-def _has_all_or_none(listing: Listing) -> bool:
-    return listing.label != "custom" and not listing.readings
-
-
-def _is_few(listing: Listing) -> bool:
-    return len(listing.defects) + len(listing.readings) <= 1 or _has_all_or_none(listing)

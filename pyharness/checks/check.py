@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pyharness.checks.scenes.random_scenes import weekly_seed
 from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError, NotBuiltError, printable
 from pyharness.model.scene import Scene
@@ -250,18 +251,12 @@ def may_hold(id: str, only: Sequence[str]) -> bool:
     return selected(id, only) or any(each.startswith(id + "/") for each in only)
 
 
-def _this_week() -> str:
-    from pyharness.checks.scenes.random_scenes import weekly_seed
-
-    return weekly_seed()
-
-
 @dataclass(frozen=True)
 class Selection:
     """The checks that one run of `verify` makes."""
 
     only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
-    seed: str = field(default_factory=_this_week)  # of random draws; by default the week
+    seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
     draws: int = DRAWS  # number of random draws
     record: Path = RECORD  # folder of the golden record; by default tests/golden
     # problems with published results; None selects the problems of the package

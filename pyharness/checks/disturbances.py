@@ -22,6 +22,7 @@ from pyharness.checks.theory.amplification import (
 from pyharness.checks.theory.collocation_matrices import Exact, points, solver_roundings
 from pyharness.checks.theory.conditioning import ROUNDING
 from pyharness.checks.theory.schemes import Numbers, runge_kutta_punched, spacing
+from pyharness.engine.linearised import jacobians
 from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.listing import Listing
@@ -100,8 +101,7 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
     """
 
     def stepped(omega: Array) -> Array:
-        x, y, z = omega.tolist()
-        run = _run(replace(scene, omega=(x, y, z), steps=1), listing)
+        run = _run(replace(scene, omega=omega.tolist(), steps=1), listing)
         return run[0] if len(run) else np.full(3, np.nan)
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
@@ -217,14 +217,10 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
     units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
-    a, omega = np.array(coefficients), np.array(scene.omega)
-
-    def along(direction: Array) -> Array:
-        """Return J at omega = `direction`."""
-        x, y, z = direction
-        return np.asarray(a[:, None] * np.array([[0.0, z, y], [z, 0.0, x], [y, x, 0.0]]))
-
-    j, along_rate = along(omega), along(np.array(scene.right_hand_side()(0.0, scene.omega)))
+    # J at omega, and at the value of F.
+    j, along_rate = jacobians(
+        scene, np.array([scene.omega, scene.right_hand_side()(0.0, scene.omega)])
+    )
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
     derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
     return Probe(found, derived, amplified * ROUNDING * float(units.max()))
@@ -283,27 +279,17 @@ DOUBLING = Basis(
     "linear stability, with the change of the spin until the wobble doubles "
     "(`checks/disturbances.py`)",
 )
-"""Basis of the field `limit` of a `Divergence`."""
-
-
-@dataclass(frozen=True)
-class Divergence:
-    """The smallest step size (s) for which runs diverge, measured (`found`) and predicted.
-
-    A run diverges if it overflows or a component exceeds twice its true maximum; `found` is 0 if
-    the smallest step tried diverges. With the step `predicted`, linear stability lets the wobble
-    about axis 3 double. `limit` bounds the relative difference of the two.
-    """
-
-    found: float
-    predicted: float
-    limit: float
+"""Basis of the limit from `divergence`."""
 
 
 def divergence(
     scene: Scene, time: float, matrix: Amplification, runner: Runner, smallest: float
-) -> Divergence:
-    """Return the divergent step sizes of a body that spins about stable axis 3 for `time` (s)."""
+) -> tuple[float, float, float]:
+    """Return two step sizes (s) of divergence, and a bound on their relative difference.
+
+    The body spins about stable axis 3 for `time` (s). The first step is that of
+    `smallest_divergent`. With the second, linear stability lets the wobble about axis 3 double.
+    """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
     spin = abs(scene.omega[2])
@@ -321,13 +307,13 @@ def divergence(
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time
-    return Divergence(found, predicted, limit)
+    return found, predicted, limit
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
     """Return the smallest step size (s) with which a run exceeds twice the largest true omega.
 
-    Return 0 if it is at most `smallest` (s), and infinity if no run does.
+    An overflow counts too. Return 0 if it is at most `smallest` (s), and infinity if no run does.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 

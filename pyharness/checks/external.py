@@ -88,8 +88,7 @@ def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
 def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
     for axis, x in enumerate(triple or ()):
         if x:
-            first, second, third = np.array(triple) * (1.0 + part * (np.arange(3) == axis))
-            yield float(first), float(second), float(third)
+            yield (np.array(triple) * (1.0 + part * (np.arange(3) == axis))).tolist()
 
 
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:

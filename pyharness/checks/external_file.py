@@ -58,14 +58,10 @@ class Value:
 
 @dataclass(frozen=True)
 class Problem:
-    """A published problem: a scene, its source, and its results at several times."""
+    """A published problem: a scene, and its results at several times."""
 
     name: str  # the name of its file
-    # the problem as a sentence, its publication, the page there, the conditions of its results
-    title: str
-    source: str
-    where: str
-    conditions: str
+    title: str  # the problem as a sentence
     unit: str  # unit of the printed omega, one of `UNITS`
     scene: Scene  # its equations and initial state; the step size is not used
     values: tuple[Value, ...]  # the published results, one element for each time
@@ -120,20 +116,18 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
             "the name of the file is the name of its checks; allowed: letters, digits, '-', "
             "'_' and '.'"
         )
-    texts = {}
     for key in _TEXTS:
         text = data.get(key)
         if not isinstance(text, str) or not text.strip():
             raise InputError(f"{key} is missing; give it as text")
-        texts[key] = printable(" ".join(text.split()))
+    title = printable(" ".join(data["title"].split()))
     unit = data.get("unit", "rad/s")
     if not isinstance(unit, str) or unit not in UNITS:
         raise unknown("unit", str(unit), UNITS)
     for table in ("body", "initial"):
         if table not in data:
             raise InputError(f"[{table}] is missing")
-    found = scene_of({key: data[key] for key in _SCENE if key in data}, texts["title"])
-    scene = checked_scene(found)
+    scene = checked_scene(scene_of({key: data[key] for key in _SCENE if key in data}, title))
     first, second, third = (w * UNITS[unit] for w in scene.omega)
     entries = data.get("value")
     if not isinstance(entries, list) or not entries:
@@ -147,7 +141,7 @@ def _problem(data: dict[str, Any], name: str, given: str | None) -> Problem:
     told = tuple(values.values())
     attitude = (scene.attitude or IDENTITY) if any(value.pointing for value in told) else None
     scene = replace(scene, omega=(first, second, third), attitude=attitude)
-    return Problem(name, **texts, unit=unit, scene=scene, values=told, path=given)
+    return Problem(name, title, unit, scene, told, given)
 
 
 def _value(entry: object, sequence: object) -> Value:

@@ -65,26 +65,6 @@ _ROWS = 10  # rows of a program's run that are compared with the true solution
 FORMS = ("closed-form", "auto")
 
 
-def steps_of(name: str, run_steps: int, evaluations: int) -> float:
-    """Return how often omega is rounded: 0 if compensated; for SciPy's methods an estimate."""
-    if name in SCIPY_METHODS:
-        return evaluations / (1 if name == "lsoda" else 6)
-    return float(run_steps) if name in FIXED_STEP or name == "quick" else 0.0
-
-
-def fixed_step_sum(name: str, angle: float, steps: int) -> float:
-    """Return a bound on the sum of the relative truncation errors of all fixed steps.
-
-    `angle` (rad) is the product of the largest Euler coefficient, the largest omega and the step.
-    From 0.5 on, the bound is infinite.
-    """
-    if angle >= 0.5:
-        return math.inf
-    order = REGISTRY[name].order
-    own = sum(c * angle**k for k, c in enumerate(_series(name)) if k > order)
-    return steps * (angle ** (order + 1) / (1.0 - angle) + own)
-
-
 @cache
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
@@ -210,13 +190,13 @@ DERIVED = Policy(_derived, STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of uncompensated roundings of omega in a run."""
+    """Return the number of uncompensated roundings of omega in a run; an estimate for SciPy's."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
-    if method == "auto":
-        return float(answer.steps)
-    return steps_of(method, answer.steps, answer.evaluations or 0)
+    if method in SCIPY_METHODS:
+        return (answer.evaluations or 0) / (1 if method == "lsoda" else 6)
+    return float(answer.steps) if method in ("auto", "quick") else 0.0
 
 
 def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check]:
@@ -246,12 +226,21 @@ def scene_of(name: Name) -> Scene:
 
 
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
-    """Return a bound on the summed errors of steps, relative to the largest omega, or None."""
-    if tried.method in FIXED_STEP and truth.exact:
-        radians = speed(tried.scene, truth.flow.largest) * abs(truth.end)
-        steps = _steps(tried.scene, truth.end)
-        return fixed_step_sum(tried.method, radians / steps, steps)
-    return tried.tolerance
+    """Return a bound on the summed errors of steps, relative to the largest omega, or None.
+
+    In fixed steps without torque, it is infinite if `angle`, the product of the largest Euler
+    coefficient, the largest omega and the step, is 0.5 rad or more.
+    """
+    method = tried.method
+    if method not in FIXED_STEP or not truth.exact:
+        return tried.tolerance
+    steps = _steps(tried.scene, truth.end)
+    angle = speed(tried.scene, truth.flow.largest) * abs(truth.end) / steps
+    if angle >= 0.5:
+        return math.inf
+    order = REGISTRY[method].order
+    own = sum(c * angle**k for k, c in enumerate(_series(method)) if k > order)
+    return steps * (angle ** (order + 1) / (1.0 - angle) + own)
 
 
 def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:

@@ -4,7 +4,7 @@ They apply to every scene: errors against the reference, and transformations tha
 the motion.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 
@@ -92,15 +92,12 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     }
     if not any(_takes(method, scene) for method in FIXED_STEP):
         del made["step-size"]
-    own = named("", scene=scene, options=options)
-    return {
-        name: Trial(name, title, bound, partial(_make, attempts, scene, replace(own, suite=name)))
-        for name, (title, bound, attempts) in made.items()
-    }
 
+    def trial(name: str, title: str, bound: str, attempts: Attempting) -> Trial:
+        own = named(name, scene=scene, options=options)
+        return Trial(name, title, bound, lambda only: attempts(scene, own))
 
-def _make(attempts: Attempting, scene: Scene, name: Name, only: Sequence[str]) -> Attempts:
-    return attempts(scene, name)
+    return {name: trial(name, *told) for name, told in made.items()}
 
 
 def _last(scene: Scene) -> float:
@@ -186,10 +183,7 @@ def _end(scene: Scene, time: float, method: str, tolerance: float) -> State:
 
 def _from(scene: Scene, state: State, time: float) -> Scene:
     omega, attitude = state
-    if attitude is None:
-        return restarted_at(scene, omega, time)
-    w, x, y, z = attitude.tolist()
-    return restarted_at(scene, omega, time, (w, x, y, z))
+    return restarted_at(scene, omega, time, None if attitude is None else attitude.tolist())
 
 
 def _permuted(scene: Scene, method: str, tolerance: float) -> tuple[State, State, float]:

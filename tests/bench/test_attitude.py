@@ -15,7 +15,7 @@ from pyharness.bench.random_loads import random_load
 from pyharness.bench.scores import groups
 from pyharness.checks.compare.candidates import End
 from pyharness.cli.main import main
-from pyharness.model.attitude import IDENTITY
+from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.truth.reference import Reference, reference
@@ -53,11 +53,11 @@ def test_everyone_reaches_both(contender: SceneContender, truths: dict[str, Refe
 
 
 def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
-    """Return right-hand sides, as text or values, with a wrong sign in one attitude component."""
+    """Return right-hand sides with a wrong sign in one component of the attitude."""
 
-    def rates(*given: Any, **named: Any) -> Any:
-        found = list(right(*given, **named))
-        found[4] = f"-({found[4]})" if isinstance(found[4], str) else -found[4]
+    def rates(*given: Any) -> Any:
+        found = list(right(*given))
+        found[-3] = -found[-3]
         return found
 
     return rates
@@ -66,7 +66,7 @@ def _backward(right: Callable[..., Any]) -> Callable[..., Any]:
 @pytest.fixture
 def _wrong_sign(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = peers._problem
-    monkeypatch.setattr(peers, "rates", _backward(peers.rates))
+    monkeypatch.setattr(f"{peers.__name__}.quaternion_rates", _backward(quaternion_rates))
 
     def backward(scene: Scene) -> Any:
         slope, *rest = problem(scene)

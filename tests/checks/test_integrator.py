@@ -269,7 +269,7 @@ def test_an_explicit_method_of_order_1_may_drift() -> None:
     found = campaign.judged(euler, problems("1/26", 1, ["free"]))
     assert all(check.passed for check in found.checks)
     assert found.drift is not None
-    assert 1e-2 < found.drift.energy[-1] < 10.0
+    assert 1e-2 < found.drift.named["energy"][-1] < 10.0
 
 
 def test_a_missing_attitude_in_some_answers_is_invalid() -> None:

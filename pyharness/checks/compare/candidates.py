@@ -110,10 +110,6 @@ def prepared_candidate(
     return Candidate(name, ready, _no_rows)
 
 
-attitude_candidate = partial(prepared_candidate, attitude=True)
-"""Return a candidate like `prepared_candidate`'s that also computes the attitude."""
-
-
 def _no_rows(scene: Scene) -> Trajectory:
     raise InputError("a prepared solver returns the state at one time only; give one time")
 

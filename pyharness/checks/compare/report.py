@@ -1,6 +1,6 @@
 """The report of `compare`: tables, verdict and data."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
@@ -16,9 +16,6 @@ from pyharness.model.report import Column, Report, Table, digits, numbers, short
 from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import BINARY64
-
-if TYPE_CHECKING:
-    pass
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _PROGRAMS_LEGEND = (

@@ -15,7 +15,7 @@ from pyharness.engine.solve import solve
 from pyharness.model.attitude import product
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import checked_torque
-from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.torque_law import TorqueLaw, law_value
 from pyharness.model.trajectory import Array
 
 _TOLERANCE = 1e-11
@@ -74,24 +74,12 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
     return [y * c - z * b, z * a - x * c, x * b - y * a]
 
 
-def _law(scene: Scene, t: Any) -> list[Any]:
-    law = scene.law
-    found = []
-    for axis in range(3):
-        value = law.constant[axis] + law.rate[axis] * t
-        for waves, function in ((law.sines, np.sin), (law.cosines, np.cos)):
-            for amplitude, frequency in waves:
-                value = value + amplitude[axis] * function(frequency * t)
-        found.append(value)
-    return found
-
-
 def _with_gyroscopic(*factors: float) -> Callable[[Scene], Scene]:
     """Return a change of a scene that multiplies the gyroscopic term, -omega x (I omega)."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
-            each = zip(_law(scene, t), factors, _gyroscopic(scene, omega), strict=True)
+            each = zip(law_value(scene.law, t), factors, _gyroscopic(scene, omega), strict=True)
             return [n + (1.0 - factor) * part for n, factor, part in each]
 
         return replace(scene, torque=checked_torque(torque))
@@ -119,20 +107,17 @@ def _without(**part: Any) -> Callable[[Scene], Scene | None]:
 def _frozen(scene: Scene) -> TorqueLaw:
     law = scene.law
     values = np.array(law.constant) + sum(np.array(amplitude) for amplitude, _ in law.cosines)
-    return TorqueLaw(constant=tuple(np.broadcast_to(values, 3).tolist()))
+    return TorqueLaw(values)
 
 
 def _undivided(scene: Scene) -> Callable[[Any, Any], list[Any]]:
-    moments = _moments(scene)
-    return lambda t, omega: [m * n for m, n in zip(moments, _law(scene, t), strict=True)]
+    return lambda t, omega: [
+        m * n for m, n in zip(_moments(scene), law_value(scene.law, t), strict=True)
+    ]
 
 
 def _in_order(*order: int) -> Callable[[Scene], Scene]:
-    def changed(scene: Scene) -> Scene:
-        a, b, c = (_moments(scene)[axis] for axis in order)
-        return replace(scene, moments=(a, b, c))
-
-    return changed
+    return lambda scene: replace(scene, moments=np.take(_moments(scene), order).tolist())
 
 
 def in_space(attitude: Array, vectors: Array) -> Array:
@@ -158,36 +143,31 @@ def _with_space_rates(scene: Scene) -> Scene:
     """
 
     def torque(t: Any, omega: Any) -> list[Any]:
-        each = zip(_gyroscopic(scene, omega), _law(scene, t), strict=True)
+        each = zip(_gyroscopic(scene, omega), law_value(scene.law, t), strict=True)
         return [2.0 * term - n for term, n in each]
 
-    x, y, z = scene.omega
-    start = _conjugate(scene.attitude)
-    return replace(scene, torque=checked_torque(torque), omega=(-x, -y, -z), attitude=start)
+    start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
+    return replace(scene, torque=checked_torque(torque), omega=back, attitude=start)
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
     """Return the scene of a body with twice the omega, where q' = q (0, omega)."""
 
     def torque(t: Any, omega: Any) -> list[Any]:
-        each = zip(_law(scene, t), _gyroscopic(scene, omega), strict=True)
+        each = zip(law_value(scene.law, t), _gyroscopic(scene, omega), strict=True)
         return [2.0 * n + 0.5 * term for n, term in each]
 
-    x, y, z = scene.omega
-    return replace(scene, torque=checked_torque(torque), omega=(2.0 * x, 2.0 * y, 2.0 * z))
+    return replace(
+        scene, torque=checked_torque(torque), omega=np.multiply(2.0, scene.omega).tolist()
+    )
 
 
 def _with_fast_torque(scene: Scene) -> Scene:
     """Return a scene in which torques vary twice as fast."""
     law = scene.law
-    x, y, z = law.rate
-    fast = replace(
-        law,
-        rate=(2.0 * x, 2.0 * y, 2.0 * z),
-        sines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.sines),
-        cosines=tuple((amplitude, 2.0 * frequency) for amplitude, frequency in law.cosines),
-    )
-    return replace(scene, torque=fast)
+    rate = [2.0 * x for x in law.rate]
+    sines, cosines = ([(a, 2.0 * f) for a, f in waves] for waves in (law.sines, law.cosines))
+    return replace(scene, torque=TorqueLaw(law.constant, rate, sines, cosines, law.frame))
 
 
 def _of_thesis(half: State, scene: Scene) -> State:
@@ -228,7 +208,7 @@ FAULTS = (
           _with_torque(lambda scene: replace(scene.law, frame="space"))),
     Fault("torque-undivided", "the torque is not divided by the moments", _with_torque(_undivided)),
     Fault("torque-sign", "the torque has the opposite sign",
-          _with_torque(lambda scene: lambda t, omega: [-n for n in _law(scene, t)])),
+          _with_torque(lambda scene: lambda t, omega: -law_value(scene.law, t))),
     *(
         Fault(f"moments-{''.join(str(axis + 1) for axis in order)}",
               f"the moments are used in the order {', '.join(str(axis + 1) for axis in order)}",

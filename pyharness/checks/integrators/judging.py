@@ -234,9 +234,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
         return []
     if not (np.isfinite(forth.omega[-1]).all() and np.isfinite(forth.attitude[-1]).all()):
         return []
-    x, y, z = (-forth.omega[-1]).tolist()
-    a, b, c, d = forth.attitude[-1].tolist()
-    scene = replace(problem.scene, omega=(x, y, z), attitude=(a, b, c, d))
+    scene = replace(problem.scene, omega=-forth.omega[-1], attitude=forth.attitude[-1])
     back = ask(problem.request(level, scene), len(problem.times))
     name = Name("integrator", "return", problem.name)
     if back.refusal or back.attitude is None:
@@ -273,7 +271,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
         checks.append(change.described(None, "no limit: the errors of the short motion are large"))
     else:
         checks.append(change.bounded(found.drift.change, limit, CHANGE))
-    for quantity, values in found.drift.named().items():
+    for quantity, values in found.drift.named.items():
         name = Name("integrator", quantity, problem.name, quantity="drift")
         largest = float(np.abs(values).max())
         power = growth_power(found.drift.times, values)

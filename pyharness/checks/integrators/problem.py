@@ -268,18 +268,14 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts from time 0, shape (n,), and the largest `change` between neighbouring rows."""
+    """The drifts from time 0, shape (n,), and the largest `change` between neighbouring rows.
+
+    `named` has the drifts of "energy" and "momentum" and, with an attitude, of "direction".
+    """
 
     times: Array
-    energy: Array
-    momentum: Array
-    direction: Array | None
+    named: dict[str, Array]
     change: float
-
-    def named(self) -> dict[str, Array]:
-        """Return the drifts by name."""
-        found = {"energy": self.energy, "momentum": self.momentum}
-        return found if self.direction is None else {**found, "direction": self.direction}
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
@@ -309,15 +305,17 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
         vectors = np.array(scene.moments) * omega
         energy, momentum = (vectors * omega).sum(axis=1), np.linalg.norm(vectors, axis=1)
         changes = [np.abs(each[1:] / each[:-1] - 1.0) for each in (energy, momentum)]
-        direction = None
+        named = {
+            "energy": energy[1:] / energy[0] - 1.0,
+            "momentum": momentum[1:] / momentum[0] - 1.0,
+        }
         if motion.attitude is not None:
             there = in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
-            direction = _angle(there[1:], there[:1])
+            named["direction"] = _angle(there[1:], there[:1])
             changes.append(_angle(there[1:], there[:-1]))
         # The change from a row that is 0 or not finite is NaN, which is ignored.
         change = np.fmax.reduce(np.concatenate(changes), initial=0.0)
-        drifts = [each[1:] / each[0] - 1.0 for each in (energy, momentum)]
-    return Drift(times, drifts[0], drifts[1], direction, float(change))
+    return Drift(times, named, float(change))
 
 
 def _angle(first: Array, second: Array) -> Array:

@@ -149,7 +149,7 @@ def _conserves_momentum(results: Sequence[Judged]) -> bool:
     free = [each for each in results if each.problem.scene.torque.is_zero]
     for judged in free:
         problem, motion = judged.problem, judged.finest
-        drift = np.abs(drift_of(problem.scene, problem.times, motion).momentum).max()
+        drift = np.abs(drift_of(problem.scene, problem.times, motion).named["momentum"]).max()
         if not drift <= _CONSERVED * motion.rounding * problem.most_steps:
             return False
     return bool(free)

@@ -89,7 +89,7 @@ def _drifts(found: Verdict) -> Section:
         return []
     rows = [
         [_MEANINGS[name], float(np.abs(values).max()), growth_power(found.drift.times, values)]
-        for name, values in found.drift.named().items()
+        for name, values in found.drift.named.items()
     ]
     last = found.drift.times[-1]
     return [f"without torque, up to {last:g} s; L: angular momentum", Table(_DRIFTS, rows)]
@@ -133,7 +133,7 @@ def integrator_picture(found: Verdict) -> Picture:
         if axes.lines:
             axes.legend(fontsize=7)
     if found.drift is not None:
-        drawn = zip(found.drift.named().items(), _STYLES.values(), strict=False)
+        drawn = zip(found.drift.named.items(), _STYLES.values(), strict=False)
         for (name, values), style in drawn:
             shown = _inside(np.abs(values))
             panels[2].semilogy(found.drift.times, shown, label=_MEANINGS[name], **style)

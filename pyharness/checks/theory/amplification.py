@@ -210,24 +210,6 @@ class Regions:
     regions: tuple[Region, ...]  # in the order in which they are drawn
 
 
-def matrices() -> dict[str, Amplification]:
-    """Return the distinct amplification matrices, by the names of programs and `rk4`.
-
-    The Runge-Kutta program has two more, each with a single defect.
-    """
-    return {
-        "two-term and four-term, original and corrected": amplification(
-            Listing.corrected("two-term")
-        ),
-        "runge-kutta corrected, rk4": amplification(Listing.corrected("runge-kutta")),
-        "runge-kutta original": amplification(Listing.original("runge-kutta")),
-        "runge-kutta, stage-base alone": amplification(subset("runge-kutta", keep=["stage-base"])),
-        "runge-kutta, base-not-restored alone": amplification(
-            subset("runge-kutta", keep=["base-not-restored"])
-        ),
-    }
-
-
 def regions() -> Regions:
     """Return the stability regions of all programs, original and corrected.
 
@@ -237,8 +219,17 @@ def regions() -> Regions:
     real, imaginary = np.linspace(*_REAL), np.linspace(*_IMAGINARY)
     distances = np.geomspace(*_DISTANCES)
     plane = real[None, :] + 1j * imaginary[:, None]
+    # The listings with distinct matrices.
+    listings = {
+        "two-term and four-term, original and corrected": Listing.corrected("two-term"),
+        "runge-kutta corrected, rk4": Listing.corrected("runge-kutta"),
+        "runge-kutta original": Listing.original("runge-kutta"),
+        "runge-kutta, stage-base alone": subset("runge-kutta", keep=["stage-base"]),
+        "runge-kutta, base-not-restored alone": subset("runge-kutta", keep=["base-not-restored"]),
+    }
     found = []
-    for name, matrix in matrices().items():
+    for name, listing in listings.items():
+        matrix = amplification(listing)
         growth = matrix.radius(1j * distances) - 1.0
         growth = np.where(np.abs(growth) < _HIDDEN, 0.0, growth)
         found.append(Region(name, matrix.moving().radius(plane), growth))

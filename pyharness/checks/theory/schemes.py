@@ -26,7 +26,7 @@ TERMS = 24
 class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
-    def __init__(self, scene: Scene, step: float, sizes: bool = False) -> None:
+    def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
         """Store the equations and a step (s); with `sizes`, magnitudes replace all terms."""
         self._step = step
         size = np.abs if sizes else np.positive
@@ -43,15 +43,11 @@ class Numbers:
         return self._step * x
 
 
-class Series:
+class Series(Numbers):
     """Euler's equations for power series in the step size.
 
     Omega has the shape (TERMS, ..., 3), the first axis for the powers.
     """
-
-    def __init__(self, scene: Scene) -> None:
-        self._coefficients = np.array(scene.euler_coefficients)
-        self._torque = np.array(scene.normalized_torque(0.0))
 
     def rate(self, omega: Array) -> Array:
         """Return the power series of the right-hand sides, by Cauchy products."""
@@ -75,8 +71,7 @@ class Series:
         return result
 
 
-Arithmetic = Numbers | Series
-Scheme = Callable[[Arithmetic, Array], Array]
+Scheme = Callable[[Numbers, Array], Array]
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,7 @@ def collocation(program: str) -> Scheme:
     parts = PARTS[program]
     weights = inverse(collocation_matrix(parts)).sum(axis=0).astype(float)
 
-    def scheme(on: Arithmetic, omega: Array) -> Array:
+    def scheme(on: Numbers, omega: Array) -> Array:
         slope = on.times_step(on.rate(omega))
         result = omega
         for part, weight in zip(parts, weights, strict=True):
@@ -118,7 +113,7 @@ def collocation_singular(program: str) -> Scheme:
     """
     parts = PARTS[program]
 
-    def scheme(on: Arithmetic, omega: Array) -> Array:
+    def scheme(on: Numbers, omega: Array) -> Array:
         rates = []
         constant_rate = on.rate(omega)
         for part in parts:
@@ -137,7 +132,7 @@ def collocation_singular(program: str) -> Scheme:
     return scheme
 
 
-def runge_kutta_4(on: Arithmetic, omega: Array, punched: bool = False) -> Array:
+def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
     If `punched`, it is the first step of the original program: the third stage starts from the
@@ -155,13 +150,13 @@ def runge_kutta_4(on: Arithmetic, omega: Array, punched: bool = False) -> Array:
 runge_kutta_punched = partial(runge_kutta_4, punched=True)
 
 
-def improved_euler(on: Arithmetic, omega: Array) -> Array:
+def improved_euler(on: Numbers, omega: Array) -> Array:
     """Return omega after a step of the improved Euler method (eq. 29)."""
     first = on.times_step(on.rate(omega))
     return np.asarray(omega + 0.5 * (first + on.times_step(on.rate(omega + first))))
 
 
-def taylor_3(on: Arithmetic, omega: Array) -> Array:
+def taylor_3(on: Numbers, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30)."""
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
@@ -176,7 +171,7 @@ def gauss(stages: int) -> Scheme:
     integrals = np.array([[node ** (k + 1) / (k + 1) for k in range(stages)] for node in nodes])
     matrix = integrals @ np.linalg.inv(powers)
 
-    def scheme(on: Arithmetic, omega: Array) -> Array:
+    def scheme(on: Numbers, omega: Array) -> Array:
         def moved(row: Array, slopes: list[Array]) -> Array:
             return np.asarray(omega + sum(a * k for a, k in zip(row, slopes, strict=True)))
 

@@ -11,14 +11,13 @@ from functools import cache
 import numpy as np
 
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below, solver_roundings
-from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning
+from pyharness.checks.theory.conditioning import ROUNDING, Conditioning, conditioning, sampled
 from pyharness.checks.theory.schemes import SCHEMES, TERMS, collocation_singular, local_error
 from pyharness.engine.linearised import jacobians, propagators
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-_NODES_PER_RADIAN = 12.0
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
 # Rounding errors of many steps with independent directions add up like the square root of the
 # number of steps. The mean error of a step is taken as a third of the largest.
@@ -70,24 +69,20 @@ class Forecast:
 def path(scene: Scene, time: float) -> Path:
     """Return the solution to `time` (s), with its state-transition matrices.
 
-    Raise InputError if the solution grows without bound before.
+    Raise InputError if the solution grows without bound before, or is too fast.
     """
     from pyharness.engine.solve import solve
 
     flow = conditioning(scene, time)
-    count = _FEWEST_NODES
-    while True:
-        times = np.linspace(0.0, time, count + 1)
+
+    def sample(times: Array) -> tuple[float, tuple[Array, Array]]:
         omega = np.vstack([scene.omega, solve(scene, times[1:].tolist(), "taylor", 1e-13).omega])
         speeds = np.abs(jacobians(scene, omega)).sum(axis=2).max(axis=1)
-        wanted = math.ceil(float(speeds.max()) * time * _NODES_PER_RADIAN)
-        if count >= min(wanted, _MOST_NODES):
-            break
-        count = min(wanted, _MOST_NODES)
-    turned = float(np.trapezoid(speeds, times))
-    return Path(
-        scene, times, omega, propagators(scene, times, omega), flow, turned, float(speeds.max())
-    )
+        return float(speeds.max()), (omega, speeds)
+
+    times, (omega, speeds) = sampled(sample, time, _FEWEST_NODES, _MOST_NODES)
+    turned, fastest = float(np.trapezoid(speeds, times)), float(speeds.max())
+    return Path(scene, times, omega, propagators(scene, times, omega), flow, turned, fastest)
 
 
 class Forecaster:

@@ -129,16 +129,12 @@ def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
     return finest_and_middling(name, scene, time)
 
 
-def end(scene: Scene, time: float, name: str, tolerance: float) -> Array:
-    """Return omega at `time` (s); NaN if a prepared solver ends before it."""
-    return run_method(name, scene, time, tolerance).omega
-
-
 def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     try:
-        plain = end(scene, time, method, tolerance)
-        other = symmetry.back(end(symmetry.turn(scene), time / symmetry.faster, method, tolerance))
+        plain = run_method(method, scene, time, tolerance).omega
+        turned, earlier = symmetry.turn(scene), time / symmetry.faster
+        other = symmetry.back(run_method(method, turned, earlier, tolerance).omega)
     except InputError as refusal:
         return name.judged(False, f"{REFUSED}{refusal}")
     if method in symmetry.bitwise:
@@ -153,13 +149,13 @@ def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name
 
 def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
-    there = end(scene, time, method, tolerance)
+    there = run_method(method, scene, time, tolerance).omega
     start = restarted_at(scene, there, time)
     # Backward, a method of SciPy may meet only a coarser tolerance.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
-    again = end(start, -time, method, coarser)
+    again = run_method(method, start, -time, coarser).omega
     flow, back = _flow(scene.name, 0.0, time), _flow(scene.name, time, -time)
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
     if method in FIXED_STEP:
@@ -178,12 +174,13 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
     flow = _flow(scene.name, 0.0, time)
     limit = flow.limit(tolerance)
     for begin, stop in pairwise([0.0, *cuts, time]):
-        omega = end(restarted_at(scene, omega, begin), stop - begin, method, tolerance)
+        start = restarted_at(scene, omega, begin)
+        omega = run_method(method, start, stop - begin, tolerance).omega
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
         # The rest of the trajectory amplifies the error of each piece.
         limit += piece.limit(tolerance) * rest
-    whole = end(scene, time, method, tolerance)
+    whole = run_method(method, scene, time, tolerance).omega
     difference = float(np.abs(omega - whole).max()) / flow.largest
     return name.bounded(difference, limit, FLOW, f"{len(cuts)} cuts")
 

@@ -224,8 +224,8 @@ def orbit_of(motion: str) -> Orbit:
 def starts(scene: Scene, body: Orbit) -> list[Scene]:
     """Return scenes that start along one motion, because errors depend on the initial phase."""
     times = [0.37 * k / body.frequency for k in range(STARTS)]
-    rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times]).tolist()
-    return [replace(scene, omega=(row[0], row[1], row[2])) for row in rows]
+    rows = brouwer.floats([torque_free(scene, t, rounded=True) for t in times])
+    return [replace(scene, omega=row) for row in rows]
 
 
 def _prepared(name: Name) -> Check:

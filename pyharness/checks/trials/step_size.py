@@ -8,22 +8,19 @@ from functools import cache, partial
 import numpy as np
 
 from pyharness.checks.check import Attempt, Check, Name
-from pyharness.checks.compare.candidates import unstopped
+from pyharness.checks.compare.candidates import method_candidate, unstopped
 from pyharness.checks.disturbances import DOUBLING, Runner, divergence, smallest_divergent
+from pyharness.checks.hold import run_method
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.theory.amplification import amplification
 from pyharness.checks.theory.collocation_matrices import PARTS, singular_below
 from pyharness.checks.theory.schemes import SCHEMES
 from pyharness.checks.theory.step_errors import FORECAST, Forecaster, Path, path
-from pyharness.engine.fixed_step import fixed_step
-from pyharness.engine.problem import normalized
-from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
-from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Array
 from pyharness.thesis.linear_solver import SINGULAR
 from pyharness.truth.reference import reference
 
@@ -120,30 +117,15 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
         singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
         note = f"IER = 129 in {singular} of {run.steps} steps" if singular else ""
     else:
-        omega = _end(scene, name)
+        omega = run_method(name, scene, TIME, None).omega
     return float(np.abs(omega - _truth(case)).max()) / largest, note
-
-
-def _end(scene: Scene, name: str) -> Array:
-    if name in FIXED_STEP:
-        rows = fixed_step(name)(scene, [TIME], 1.0).omega
-        return rows[-1] if len(rows) else np.full(3, math.nan)
-    stages = int(name.partition("-")[2])
-    rows, _, _, status, _ = extension().gauss_solution(
-        *normalized(scene), scene.omega, [TIME], stages, scene.step_size
-    )
-    return np.asarray(rows[:, 0]) if status == COMPLETE else np.full(3, math.nan)
-
-
-def _rows(name: str, scene: Scene) -> Trajectory:
-    return fixed_step(name)(scene, scene.times(), 1.0)
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Return the check, against linear stability if it applies, of the smallest divergent step."""
     scene, method = case_scene(case), name.subject
     if listing is None:
-        runner: Runner = partial(_rows, method)
+        runner: Runner = method_candidate(method, 1.0).rows
         scheme = Listing.corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
     else:
         runner = unstopped(listing).rows
@@ -151,14 +133,14 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
         return name.described(found, _from(found, TIME))
-    seen = divergence(scene, _LONG, amplification(scheme), runner, _SMALLEST_LONG)
-    note = f"{_from(seen.found, _LONG)}, predicted from {seen.predicted:.4g} s"
+    matrix = amplification(scheme)
+    found, predicted, limit = divergence(scene, _LONG, matrix, runner, _SMALLEST_LONG)
+    note = f"{_from(found, _LONG)}, predicted from {predicted:.4g} s"
     # Linear theory excludes collocation points that move from step to step, unless the equations
     # are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
-        off = abs(seen.found / seen.predicted - 1.0)
-        return name.bounded(off, seen.limit, DOUBLING, note)
-    return name.described(seen.found, note)
+        return name.bounded(abs(found / predicted - 1.0), limit, DOUBLING, note)
+    return name.described(found, note)
 
 
 def _from(found: float, time: float) -> str:

@@ -52,14 +52,6 @@ class Reduction:
         return np.nan if self.dtype == "f8" else -1
 
 
-def _end(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.omega
-
-
-def _status(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.status
-
-
 def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
     samples = given["samples"]
     rows = batch.rows(samples)
@@ -73,14 +65,6 @@ def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
         largest = np.fmax(largest, np.abs(truth).max(axis=1))
         worst = np.maximum(worst, np.abs(rows[:, i] - truth).max(axis=1))
     return np.asarray(worst / largest)
-
-
-def _stop_step(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return np.where(batch.status == Statuses.STOPPED, batch.n_rows, 0)
-
-
-def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.stop_variable
 
 
 def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
@@ -120,10 +104,6 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     return np.asarray(changes.sum(axis=1))
 
 
-def _flip_time(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return flip_times(batch.bodies, batch.omega0)
-
-
 def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
     start = batch.omega0
     size = np.linalg.norm(start, axis=1, keepdims=True)
@@ -143,11 +123,6 @@ def _angles(ours: Array, theirs: Array) -> Array:
     # The arc cosine of the scalar product would lose half of the digits of a small angle.
     across, along = (np.linalg.norm(each, axis=-1) for each in (ours - theirs, ours + theirs))
     return np.asarray(2.0 * np.arctan2(across, along))
-
-
-def _end_attitude(batch: Batch, _: Mapping[str, Any]) -> Found:
-    """Return the attitudes at the end, shape (n, 4)."""
-    return _in_space(batch)
 
 
 def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -190,6 +165,7 @@ def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _in_space(batch: Batch) -> Found:
+    """Return the attitudes at the end, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 
@@ -219,9 +195,13 @@ _OF_AXES: dict[str, Any] = {"only": "method", "needs": ("moments", "attitude")}
 _STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
-        "angular velocity at the end", _end, "rad/s", labels=("1", "2", "3"), dimension="component"
+        "angular velocity at the end",
+        lambda batch, _: batch.omega,
+        "rad/s",
+        labels=("1", "2", "3"),
+        dimension="component",
     ),
-    "status": Reduction("how it ended", _status, dtype="i1", flags=_STATUSES),
+    "status": Reduction("how it ended", lambda batch, _: batch.status, dtype="i1", flags=_STATUSES),
     "error": Reduction(
         "largest error of a component against a method, over the largest component",
         _error,
@@ -229,13 +209,13 @@ REDUCTIONS = {
     ),
     "stop-step": Reduction(
         "step at which the stop test ended it; 0: it did not",
-        _stop_step,
+        lambda batch, _: np.where(batch.status == Statuses.STOPPED, batch.n_rows, 0),
         dtype="i4",
         only="program",
     ),
     "stop-variable": Reduction(
         "variable that ended it",
-        _stop_variable,
+        lambda batch, _: batch.stop_variable,
         dtype="i1",
         only="program",
         flags={0: "none", **dict(enumerate(STOP_VARIABLES, 1))},
@@ -266,7 +246,7 @@ REDUCTIONS = {
     ),
     "attitude": Reduction(
         "attitude at the end, a quaternion from the body to space, scalar first",
-        _end_attitude,
+        lambda batch, _: _in_space(batch),
         labels=("0", "1", "2", "3"),
         dimension="quaternion",
         only="method",
@@ -309,7 +289,7 @@ REDUCTIONS = {
     ),
     "flip-time": Reduction(
         "time between changes of sign of the component about the middle axis",
-        _flip_time,
+        lambda batch, _: flip_times(batch.bodies, batch.omega0),
         "s",
         needs=("moments", "no torque"),
     ),

@@ -4,7 +4,6 @@ The parameter `samples` is the number of times at which states are read; `of` na
 by the rank of its moment.
 """
 
-import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -82,11 +81,6 @@ def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
         then, before = (weight * rows**2).sum(axis=2), (weight * start**2).sum(axis=2)
         found.append(np.abs(then - before).max(axis=1) / before[:, 0])
     return np.stack(found, axis=1)
-
-
-def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
-    room, _, name = given["function"].partition(":")
-    return np.asarray(getattr(importlib.import_module(room), name)(batch))
 
 
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -233,7 +227,7 @@ REDUCTIONS = {
     ),
     "claim": Reduction(
         "whether a claim holds; 2: it says nothing of the scene; 3: it holds in part",
-        _claim,
+        lambda batch, given: np.asarray(given["function"](batch)),
         dtype="i1",
         parameters={"id": ""},
         flags={0: "fails", 1: "holds", 2: "silent", 3: "in part"},

@@ -32,7 +32,9 @@ class Part(NamedTuple):
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
     """Return the file that the table `name` of `package.toml` describes, with `values` in it."""
-    return Part(*(text.format(**values) for text in _descriptions()[name].values()), content)
+    texts = (text.format(**values) for text in _descriptions()[name].values())
+    path, title, description, media_type = texts
+    return Part(path, title, description, media_type, content)
 
 
 @cache

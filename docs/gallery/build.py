@@ -9,12 +9,13 @@ With names, such as ``python -m docs.gallery.build free-body``, only these pages
 
 import re
 import sys
+import textwrap
 from functools import cache
 from pathlib import Path
 
 from docs.gallery.execution import PICTURE, executed, picture_file, picture_of, shown_output
 from pyharness.edition import documents
-from pyharness.edition.made_pages import paragraphs, table
+from pyharness.edition.made_pages import table
 from pyharness.edition.markdown import slug
 from pyharness.views.pictures import saved
 
@@ -75,8 +76,9 @@ def gallery_page() -> str:
         rows.append(
             [f"[![{_alternative(found[0])}]({found[1]})]({link})", f"[{question(text)}]({link})"]
         )
-    parts = ["# Gallery: questions about rotating bodies\n", paragraphs(_HEAD.strip())]
-    return "\n".join([*parts, table("picture | question", rows)])
+    head = textwrap.fill(" ".join(_HEAD.split()), 120, break_on_hyphens=False)
+    table_of_all = table("picture | question", rows)
+    return f"# Gallery: questions about rotating bodies\n\n{head}\n\n{table_of_all}"
 
 
 def _alternative(picture: str) -> str:

@@ -3,25 +3,21 @@
 Its text is in the template `about-the-text.md.in`.
 """
 
+from collections import Counter
 from collections.abc import Iterable
+from itertools import combinations
 from pathlib import Path
 
 from docs.article.build import rendered, wrapped
 from pyharness.edition.made_pages import table
 from pyharness.history.ablation import entries
-from pyharness.history.origins import (
-    disagreements,
-    origins,
-    shared_statements,
-    statement_count,
-    unexplained_defects,
-)
+from pyharness.history.origins import disagreements, origins, unexplained_defects
 from pyharness.history.second_reading import second_reading_report
 from pyharness.history.tei import CERTAINTY, KINDS
-from pyharness.history.timeline import CHANGES, Revision, gaps, revisions, timeline
+from pyharness.history.timeline import CHANGES, Revision, revisions, timeline
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import deck
+from pyharness.thesis.cards import deck, tight
 from pyharness.thesis.collation import rows
 
 HERE = Path(__file__).parent
@@ -65,7 +61,9 @@ def text_page() -> str:
         "disagreements": _disagreements_table(),
         "unexplained": _items(f"`{name}`: {why}" for name, why in unexplained_defects().items()),
         "events": _events_table(),
-        "gaps": table("question | what we know", [[each.question, each.answer] for each in gaps()]),
+        "gaps": table("question | what we know", [
+            [each["question"], each["answer"]] for each in facts("timeline")["gap"]
+        ]),
         "revision": _revision(revisions()[0]),
         "earlier": str(len(revisions()) - 1),
         "works": _items(
@@ -83,12 +81,25 @@ def _counted(head: str, field: str, meanings: dict[str, str]) -> str:
     )
 
 
+def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
+    """Return the number of statements that each pair shares, with uniform or scanned names."""
+    found = {program: Counter(statements(program, scanned_names)) for program in PROGRAMS}
+    return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
+
+
+def statements(program: str, scanned_names: bool = False) -> list[str]:
+    """Return the text of each card of a program, without comments, labels and blanks."""
+    cards = (card for card in deck(program).cards.values() if not card.is_comment)
+    texts = (card.text_with_scanned_names if scanned_names else card.text for card in cards)
+    return [tight(text[6:]) for text in texts]
+
+
 def _shared_table() -> str:
     in_scan = shared_statements(scanned_names=True)
     counts = [
         [
             f"{one} and {other}", str(count), str(count - in_scan[one, other]),
-            f"{statement_count(one)} and {statement_count(other)}",
+            f"{len(statements(one))} and {len(statements(other))}",
         ]
         for (one, other), count in shared_statements().items()
     ]  # fmt: skip

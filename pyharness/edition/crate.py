@@ -1,6 +1,9 @@
 """The RO-Crate 1.1 description of the data package."""
 
+import tomllib
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from pyharness.edition.citation import (
@@ -11,11 +14,6 @@ from pyharness.edition.citation import (
     thesis_record,
 )
 from pyharness.history.identifiers import content_identifier, data_identifier, text_digest
-
-PACKAGE_MARK = "data-package.json"
-"""The file that marks a folder as a data package, and lists its files."""
-CRATE = "ro-crate-metadata.json"
-MANIFEST = "manifest-sha256.txt"
 
 
 class Part(NamedTuple):
@@ -32,17 +30,22 @@ class Part(NamedTuple):
     content: bytes = b""
 
 
-KEPT = (
-    Part(
-        CRATE, "Description of the package, in the format RO-Crate 1.1", "", "application/ld+json"
-    ),
-    Part(
-        PACKAGE_MARK, "Software Heritage identifiers of the files of the package", "",
-        "application/json",
-    ),
-    Part(MANIFEST, "SHA-256 checksums of the files of the package", "", "text/plain"),
-)  # fmt: skip
+def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
+    """Return the file that the table `name` of `package.toml` describes, with `values` in it."""
+    texts = (text.format(**values) for text in _descriptions()[name].values())
+    path, title, description, media_type = texts
+    return Part(path, title, description, media_type, content)
+
+
+@cache
+def _descriptions() -> dict[str, dict[str, str]]:
+    return tomllib.loads(Path(__file__).with_name("package.toml").read_text(encoding="utf-8"))
+
+
+KEPT = tuple(map(described, ("crate", "mark", "manifest")))
 """The files of the package that describe its other files."""
+CRATE, PACKAGE_MARK, MANIFEST = (each.path for each in KEPT)
+"""Their paths. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
@@ -50,27 +53,27 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
 
     Entities are items of one list, and refer to each other by identifier.
     """
-    described, thesis = codemeta(), thesis_record()
+    software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
     people = [
         *({"@id": f"#author-{number}", **each}
-          for number, each in enumerate(described["author"], 1)),
+          for number, each in enumerate(software["author"], 1)),
         *({"@id": f"#thesis-author-{number}", **each, "name": f"{each['givenName']} "
            f"{each['familyName']}"}
           for number, each in enumerate(thesis["author"], 1)),
     ]  # fmt: skip
-    licence = described["license"]
+    licence = software["license"]
     root = {
         "@id": "./",
         "@type": "Dataset",
         "name": data_name(),
         "description": data_description(),
-        "version": described["version"],
+        "version": software["version"],
         "datePublished": release_date(),
         "license": {"@id": licence},
         "author": _references(people, "#author-"),
         "publisher": _references(people, "#author-"),
-        "keywords": described["keywords"],
+        "keywords": software["keywords"],
         "citation": {"@id": "#thesis"},
         "isBasedOn": {"@id": "#thesis"},
         "identifier": [{"@id": "#text"}, {"@id": "#data"}],

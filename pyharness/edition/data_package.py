@@ -8,7 +8,15 @@ from collections.abc import Iterator
 from hashlib import sha256
 
 from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
-from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK, Part, crate_record
+from pyharness.edition.crate import (
+    CRATE,
+    KEPT,
+    MANIFEST,
+    PACKAGE_MARK,
+    Part,
+    crate_record,
+    described,
+)
 from pyharness.edition.machine_bundle import machine_parts
 from pyharness.edition.made_pages import table
 from pyharness.edition.package_runs import run_parts
@@ -32,7 +40,6 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck
 from pyharness.views.render import csv_text, json_text, render
 
-_CSV, _JSON, _TEXT = "text/csv", "application/json", "text/plain"
 _COLUMNS = "card kind text scan entries port twin swhid"
 
 
@@ -64,63 +71,26 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 def _list_files(progress: Progress) -> Iterator[Part]:
     progress(0, 5, "cards")
     for program in PROGRAMS:
-        yield Part(
-            f"cards/{program}.csv", f"Cards of the {program} program",
-            "A row for each card. card: its number. kind: comment, executable or specification. "
-            "text: columns 1 to 72. scan: its line in the scan without blanks, empty if the scan "
-            "lacks the card. entries: the entries of the apparatus that name the card. port, twin: "
-            "the corresponding lines in our Fortran and Python versions. swhid: the line of the "
-            "card in the data of the edition, as a Software Heritage identifier.",
-            _CSV, _cards(program),
-        )  # fmt: skip
-    yield Part(
-        "edition.xml", "The edition in TEI P5",
-        "All cards with the characters of the scan beside ours, and the critical apparatus.",
-        "application/tei+xml", tei_document(),
-    )  # fmt: skip
-    yield Part(
-        "apparatus.json", "The critical apparatus",
-        "The defects, doubtful readings, conjectures and other entries, each with its cards and "
-        "its evidence; the output of `pyharness defects --format json`.",
-        _JSON, render(apparatus_report(entries()), "json").encode(),
-    )  # fmt: skip
+        yield described("cards", _cards(program), program=program)
+    yield described("tei", tei_document())
+    yield described("apparatus", render(apparatus_report(entries()), "json").encode())
     rows = [[path, content_identifier(each)] for path, each in source_files().items()]
-    yield Part(
-        "sources.csv", "Software Heritage identifiers of the sources",
-        "A row for each file of the edition's data and of the Fortran port, with its path in the "
-        "source repository.",
-        _CSV, csv_text(numbers("path swhid", rows)).encode(),
-    )  # fmt: skip
+    yield described("sources", csv_text(numbers("path swhid", rows)).encode())
     progress(1, 5, "claims")
-    yield Part(
-        "claims.json", "The claims of the thesis, and our verdicts",
-        "Verdicts for the programs as printed and as corrected, with the numbers behind them and "
-        "the assumptions; the output of `pyharness claims --format json`.",
-        _JSON, render(claims_report(judgements()), "json").encode(),
-    )  # fmt: skip
+    yield described("claims", render(claims_report(judgements()), "json").encode())
     progress(2, 5, "figures")
     for each in findings():
-        yield Part(
-            f"figures/{each.plan.stem}.csv", f"{each.plan.title}, {each.plan.set} programs",
-            f"{each.plan.caption.removesuffix('.')}. time and recorded_time in s, omega in rad/s. "
-            "recorded_time is the variable TIME of the program.",
-            _CSV, csv_text(curve_numbers(each)).encode(),
-        )  # fmt: skip
+        content = csv_text(curve_numbers(each)).encode()
+        caption = each.plan.caption.removesuffix(".")
+        yield described("figure", content, plan=each.plan, caption=caption)
     progress(3, 5, "runs")
     yield from run_parts()
     progress(4, 5, "pages")
     yield from machine_parts()
-    yield Part(
-        "citation.bib", "Citation of the edition and of the thesis", "BibTeX.",
-        "application/x-bibtex", bibtex().encode(),
-    )  # fmt: skip
-    for path, title, media_type in (
-        ("CITATION.cff", "Citation of the software, in the Citation File Format", "text/yaml"),
-        ("codemeta.json", "Description of the software, in the format CodeMeta", "text/json"),
-        ("LICENSE", "The licence of the edition", _TEXT),
-    ):
-        content = shipped(path).read_bytes()
-        yield Part(path, title, f"The file {path} of the source repository.", media_type, content)
+    yield described("citation", bibtex().encode())
+    for name in ("cff", "codemeta", "licence"):
+        part = described(name)
+        yield part._replace(content=shipped(part.path).read_bytes())
 
 
 def _cards(program: str) -> bytes:
@@ -139,16 +109,13 @@ def _cards(program: str) -> bytes:
 
 
 def _readme(parts: list[Part]) -> Part:
-    described = codemeta()
+    software = codemeta()
     lines = [
         f"# {data_name()}", "", data_description(), "",
-        f"Version {described['version']}, text {text_digest()}. Licence: {described['license']}. "
+        f"Version {software['version']}, text {text_digest()}. Licence: {software['license']}. "
         "`citation.bib` has the citation.", "",
         table("file | content", [[each.path, each.title] for each in (*parts, *KEPT)]),
         f"`{CRATE}` describes the columns of each table.", "",
         f"Check the files with: `sha256sum -c {MANIFEST}`", "",
     ]  # fmt: skip
-    return Part(
-        "README.md", "What the package contains", "A list of all files.", "text/markdown",
-        "\n".join(lines).encode(),
-    )  # fmt: skip
+    return described("readme", "\n".join(lines).encode())

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from pyharness.history.ablation import entries
 from pyharness.model.facts import facts
-from pyharness.thesis.cards import Card, Place, deck, numbers, parallels, switch_at, tight
+from pyharness.thesis.cards import Card, Place, deck, numbers, switch_at, tight
 from pyharness.thesis.collation import witness_lines
 from pyharness.thesis.decks import corrected_cards, corrections
 
@@ -56,18 +56,6 @@ class Note(NamedTuple):
         return str(self.entry["kind"])
 
 
-class PortLine(NamedTuple):
-    """A line of the Fortran port, and the defect or reading on which it depends.
-
-    `switch` is None if it depends on none; `active` is whether it is executed with the switch on
-    or off.
-    """
-
-    place: Place
-    switch: str | None
-    active: bool
-
-
 class Corrected(NamedTuple):
     """The corrected form of a card.
 
@@ -84,24 +72,20 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is in brackets if the scan lacks it; `scan` has the scan's blanks, or is None. `notes`
-    begin with the most important kind; `begins` has the notes whose range begins here, with this
-    range alone. `absent` is the reason why the port lacks the statement, `otherwise` why it
-    differs. `parallels` are equal cards of other programs.
+    `card` is in brackets if the scan lacks it; `scan` has the scan's blanks, or is None. `port` has
+    each line of the Fortran port, with the defect or reading on which it depends, if any, and
+    whether it is executed with this switch on. `notes` begin with the most important kind; `begins`
+    has the notes whose range begins here, with this range alone.
     """
 
     number: int
     card: list[Run]
     scan: list[Run] | None
     corrected: Corrected
-    port: list[PortLine]
-    twin: list[Place]
+    port: list[tuple[Place, str | None, bool]]
     notes: list[Note]
     begins: list[Note]
     kinds: list[str]  # kinds of the notes by precedence; the first determines the colour
-    absent: str | None
-    otherwise: str | None
-    parallels: list[Card]
 
 
 class Sheet(NamedTuple):
@@ -168,10 +152,9 @@ def card_views(program: str) -> list[CardView]:
                     )),
                 ),
                 [
-                    PortLine(place, *(switch_at(place) or (None, True)))
+                    (place, *(switch_at(place) or (None, True)))
                     for place in found.port.get(card.number, ())
                 ],
-                found.twin.get(card.number, []),
                 about,
                 [
                     each._replace(cards=cards_range)
@@ -180,9 +163,6 @@ def card_views(program: str) -> list[CardView]:
                     if numbers(cards_range)[0] == card.number
                 ],
                 list(dict.fromkeys(each.kind for each in about)),
-                found.absent.get(card.number),
-                found.otherwise.get(card.number),
-                parallels(card),
             )
         )  # fmt: skip
     return views

@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from pyharness.edition.crate import Part
+from pyharness.edition.crate import Part, described
 from pyharness.edition.made_pages import table
 from pyharness.history import printed_page
 from pyharness.history.listing_output import listings_of, our_page
@@ -25,7 +25,6 @@ from pyharness.views.render import csv_text
 _MACHINE = ("cdc48", "cdc48-rounded")
 _COLUMNS = "program case listing word steps card_steps page"
 _SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
-_TEXT = "text/plain"
 
 
 def machine_parts() -> Iterator[Part]:
@@ -48,28 +47,13 @@ def machine_parts() -> Iterator[Part]:
             rows.append([program, case, title, word, *steps, name])
     for name, text in texts.items():
         program, case, listing, word = next(row[:4] for row in rows if row[-1] == name)
-        yield Part(
-            f"machine/{name}",
-            f"Page that the {program} program prints in Case {case}, {listing}, arithmetic {word}",
-            "Computed by our programs; for the listing original in the arithmetics cdc48 and "
-            "cdc48-rounded it is a prediction for an emulated CDC CYBER computer.",
-            _TEXT, text.encode(),
-        )  # fmt: skip
-    yield Part(
-        f"machine/{printed_page.PAGES}", "The pages, by program, case, listing and arithmetic",
-        "A row for each run. listing: original, corrected, or original with another reading of a "
-        "doubtful card. steps: the steps according to the text of the thesis; card_steps: those on "
-        "the cards. page: the file of the page, which several runs may share.",
-        "text/csv", csv_text(numbers(_COLUMNS, rows)).encode(),
-    )  # fmt: skip
+        ran = {"program": program, "case": case, "listing": listing, "word": word}
+        yield described("page", text.encode(), name=name, **ran)
+    content = csv_text(numbers(_COLUMNS, rows)).encode()
+    yield described("pages", content, name=printed_page.PAGES)
     jobs = [*_jobs(texts)]
     yield from jobs
-    yield Part(
-        "machine/judge.py", "Script that compares a printed page with the pages",
-        "Needs Python's standard library alone. It is the module of the software with which the "
-        "command pyharness verify --listing-output compares pages.",
-        "text/x-python", Path(printed_page.__file__).read_bytes(),
-    )  # fmt: skip
+    yield described("judge", Path(printed_page.__file__).read_bytes())
     readme = facts("machine")["readme"].format(
         jobs=table(
             "job | content",
@@ -78,11 +62,7 @@ def machine_parts() -> Iterator[Part]:
         pages=table("page | rows | printed by", [*_shared(texts, rows)]).rstrip(),
         outcomes=outcomes_table(),
     )
-    yield Part(
-        "machine/README.md", "How to run the jobs, and what each outcome would teach",
-        "A guide for readers with an emulated CDC CYBER computer.",
-        "text/markdown", readme.encode(),
-    )  # fmt: skip
+    yield described("guide", readme.encode())
 
 
 def outcomes_table() -> str:
@@ -103,12 +83,10 @@ def _jobs(texts: dict[str, str]) -> Iterator[Part]:
         for system in SYSTEMS:
             for rounds in (False, True) if first != second else (False,):
                 text = deck_text(Listing.original(program), dialect="ftn")
-                option = ", with the option ROUND" if rounds else ""
-                yield Part(
-                    f"machine/jobs/{program}-{system}{'-rounded' if rounds else ''}.job",
-                    f"The {program} program as printed, for {_SYSTEMS[system]}{option}",
-                    "A batch job for the compiler FTN; user name and password are to be filled in.",
-                    _TEXT, job_text(text, system, rounds).encode(),
+                suffix, option = ("-rounded", ", with the option ROUND") if rounds else ("", "")
+                yield described(
+                    "job", job_text(text, system, rounds).encode(), program=program, system=system,
+                    system_name=_SYSTEMS[system], suffix=suffix, option=option,
                 )  # fmt: skip
 
 

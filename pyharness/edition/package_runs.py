@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.edition.crate import Part
+from pyharness.edition.crate import Part, described
 from pyharness.history.ablation import case_truth
 from pyharness.model.facts import facts_folder
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
@@ -24,36 +24,15 @@ FAULTS_CASE = 5
 
 _ENDS = "case program listing steps ended stop_step stop_variable"
 _ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"
-_CSV = "text/csv"
-_LISTING = (
-    "listing: original, corrected, or the name of a fault that is kept alone in the corrected "
-    "program."
-)
 
 
 def run_parts() -> Iterator[Part]:
     """Yield the files on the runs: cases, ends and results."""
-    yield Part(
-        "cases.toml", "The cases of Table 1 of the thesis",
-        "Moments of inertia in kg m2, torque in N m, initial omega in rad/s, and the numbers that "
-        "all programs share; data of the edition.",
-        "application/toml", (facts_folder() / "cases.toml").read_bytes(),
-    )  # fmt: skip
-    yield Part(
-        "runs/runs.csv", "How the runs of the programs end",
-        f"A row for each run. {_LISTING} steps: the completed steps. ended: complete, stopped or "
-        "overflow. stop_step, stop_variable: where the stop test of the Runge-Kutta program ended "
-        "the run.",
-        _CSV, csv_text(numbers(_ENDS, [*_ends()])).encode(),
-    )  # fmt: skip
+    yield described("cases", (facts_folder() / "cases.toml").read_bytes())
+    yield described("ends", csv_text(numbers(_ENDS, [*_ends()])).encode())
     for case in case_numbers():
-        yield Part(
-            f"runs/case-{case}.csv", f"Results of the programs at every step, Case {case}",
-            f"A row for each step, first of the reference solution. {_LISTING} time in s, omega in "
-            "rad/s, velocity (translational) in m/s. Results of single faults are given for Case "
-            f"{FAULTS_CASE} alone.",
-            _CSV, csv_text(numbers(_ROWS, [*_rows(case)])).encode(),
-        )  # fmt: skip
+        content = csv_text(numbers(_ROWS, [*_rows(case)])).encode()
+        yield described("results", content, case=case, faults_case=FAULTS_CASE)
 
 
 @cache

@@ -30,35 +30,11 @@ from pyharness.model.facts import facts, shipped
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.schema import SCHEMAS
+from pyharness.thesis.cards import deck, parallels
 from pyharness.views.render import json_text
 
-# The menu: title and path of each section's pages. A section's entry links its first page.
-MENU = {
-    "Story": (("Story", "index.html"),),
-    "Programs": (
-        ("Overview", "listing/index.html"),
-        ("Two-term", "listing/two-term.html"),
-        ("Four-term", "listing/four-term.html"),
-        ("Runge-Kutta", "listing/runge-kutta.html"),
-        ("Comparison", "listing/collation.html"),
-        ("Apparatus", "apparatus.html"),
-    ),
-    "Laboratory": (("The programs", "laboratory.html"), ("A body that tumbles", "body.html")),
-    "Thesis and claims": (
-        ("Thesis", "thesis.html"),
-        ("Claims", "claims.html"),
-        ("Figures", "figures.html"),
-    ),
-    "About": (
-        ("About", "about.html"),
-        ("Documents", "docs/index.html"),
-        ("Article", "docs/article/article.html"),
-        ("About the text", "docs/explanation/about-the-text.html"),
-        ("Methods", "docs/explanation/methods.html"),
-        ("API", "api.html"),
-        ("Search", "search.html"),
-    ),
-}
+# The pages of each section, path by title.
+MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="utf-8"))
 
 
 class Found(NamedTuple):
@@ -171,7 +147,8 @@ def _listing() -> Iterator[Page]:
         path = f"listing/{program}.html"
         context = {
             "program": program, "programs": decks.TITLES, "sheets": pages, "cards": views,
-            "kinds": decks.kinds_of(views), "notes": decks.notes(program),
+            "kinds": decks.kinds_of(views), "notes": decks.notes(program), "deck": deck(program),
+            "parallels": parallels,
         }  # fmt: skip
         found = [
             Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
@@ -190,7 +167,7 @@ def _listing() -> Iterator[Page]:
 def _documents(docs: Path) -> Iterator[Page]:
     with_notebooks = documents.with_notebooks(docs)
     notebooks = {documents.page_of(f.relative_to(docs).as_posix()): f.stem for f in with_notebooks}
-    listed_pages = {path for section in MENU.values() for _, path in section}
+    listed_pages = {path for section in MENU.values() for path in section.values()}
     for path, each in documents.documents(docs):
         found = [
             Found(f"{path}#{part.anchor}", part.title, "document", part.text) for part in each.parts
@@ -202,7 +179,7 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
-    section = next(name for name, of in MENU.items() if here in [path for _, path in of])
+    section = next(name for name, of in MENU.items() if here in of.values())
     # The relative path from the page to the site's root, so that the site works under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(

@@ -13,6 +13,7 @@ import numpy as np
 
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.decks import TITLES
+from pyharness.history.ablation import case_truth
 from pyharness.history.claims.stories import power_of_ten
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
@@ -20,7 +21,6 @@ from pyharness.model.listing import PROGRAMS, Listing, switches
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import run_program
-from pyharness.truth.reference import Reference, reference
 
 # The letters of the first scene, which hides the names of the programs at first.
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
@@ -79,7 +79,7 @@ def context() -> dict[str, Any]:
     velocity_curve = _curve(velocity_chart, "runge-kutta", range(len(velocity)), velocity)
     endless = _run(2, "runge-kutta", may_stop=False)
     scene = case_scene(2)
-    limit = limit_solution("runge-kutta", scene, scene.times(), _truth(2))
+    limit, *_ = limit_solution("runge-kutta", scene, scene.times(), case_truth(2))
     half_speed = _chart_of_case("half-speed", 2, {"runge-kutta": endless}, (-1.6, 2.2))
     curve = _curve(half_speed, "limit", scene.times(), limit[:, 0])
     by_letter = {name: _run(2, name) for name in LETTERS.values()}
@@ -110,7 +110,7 @@ def context() -> dict[str, Any]:
         "collocation_error": _first_error(2, "two-term"),
         "stop_error": _first_error(2, "runge-kutta"),
         "corrected_error": _first_error(2, "runge-kutta", "corrected"),
-        "from_solution": _distance(endless, _truth(2).omega),
+        "from_solution": _distance(endless, case_truth(2).omega),
         "from_limit": _distance(endless, limit),
         "alone": _run(2, "runge-kutta", without=("lipschitz-tests-velocity",)),
         "right": _run(2, "runge-kutta", without=tuple(facts("account")["mechanism"]["alone"])),
@@ -122,12 +122,6 @@ def context() -> dict[str, Any]:
         "case_7": ratios[7],
         "data": data(),
     }
-
-
-@cache
-def _truth(case: int) -> Reference:
-    scene = case_scene(case)
-    return reference(scene, scene.times())
 
 
 @cache
@@ -149,12 +143,12 @@ def _distance(run: Trajectory, goal: Array) -> float:
 
 
 def _first_error(case: int, program: str, listing: str = "original") -> float:
-    return _distance(_run(case, program, listing), _truth(case).omega)
+    return _distance(_run(case, program, listing), case_truth(case).omega)
 
 
 def _largest_error(case: int, program: str, listing: str) -> float:
     run = _run(case, program, listing)
-    return float(np.abs(run.omega - _truth(case).omega[: run.steps]).max())
+    return float(np.abs(run.omega - case_truth(case).omega[: run.steps]).max())
 
 
 def _ratios(case: int) -> dict[str, float]:
@@ -166,7 +160,7 @@ def _ratios(case: int) -> dict[str, float]:
 
 def _span(case: int) -> Range:
     """Return a range for a case's true omega1 (rad/s), with a margin."""
-    values = [case_scene(case).omega[0], *_truth(case).omega[:, 0]]
+    values = [case_scene(case).omega[0], *case_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
     return low - margin, high + margin
@@ -181,7 +175,7 @@ def _chart_of_case(
     x = list(range(len(times))) if in_steps else times
     axis = "step" if in_steps else "time, s"
     found = _chart(name, (axis, "ω₁, rad/s"), (0.0, float(x[-1])), y)
-    curves = [_curve(found, "solution", x, [scene.omega[0], *_truth(case).omega[:, 0]])]
+    curves = [_curve(found, "solution", x, [scene.omega[0], *case_truth(case).omega[:, 0]])]
     for program, run in runs.items():
         omega = [scene.omega[0], *run.omega[:, 0]]
         curves.append(_curve(found, program, x[: len(omega)], omega))

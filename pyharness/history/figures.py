@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.history.ablation import case_truth
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
@@ -19,7 +20,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import run_program
-from pyharness.truth.reference import Reference, reference
+from pyharness.truth.reference import Reference
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,17 +130,14 @@ def plans() -> list[FigurePlan]:
 
 def findings() -> Iterator[FigureFinding]:
     """Yield the data of the figures in the order of `plans`, without drawing."""
-    truths: dict[int, Reference] = {}
     for plan in plans():
         scene = case_scene(plan.case)
-        if plan.case not in truths:
-            truths[plan.case] = reference(scene, scene.times())
-        truth = truths[plan.case]
+        truth = case_truth(plan.case)
         listings = map(SETS[plan.set], plan.programs)
         curves = tuple(Curve(listing, run_program(scene, listing)) for listing in listings)
         limit = None
         if plan.limit_of:
-            omega = limit_solution(plan.limit_of, scene, scene.times(), truth)
+            omega, *_ = limit_solution(plan.limit_of, scene, scene.times(), truth)
             limit = f"limit of {plan.limit_of}", omega
         yield FigureFinding(plan, scene, truth, curves, limit)
 

@@ -86,7 +86,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
-    wanted, tends_to, blow_up = _limit_solution(program, scene, times, truth, effort)
+    wanted, tends_to, blow_up = limit_solution(program, scene, times, truth, effort)
     found = []
     for parts in (2**k for k in range(halvings + 1)):
         finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
@@ -112,14 +112,11 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
-) -> Array:
-    """Return the limit of an original program's omega (rad/s), shape (times, 3), or NaN."""
-    return _limit_solution(program, scene, times, truth, effort)[0]
-
-
-def _limit_solution(
-    program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float
 ) -> tuple[Array, str, float | None]:
+    """Return the limit of an original program's omega (rad/s), shape (times, 3), or NaN.
+
+    Also return what the program tends to, and the time (s) at which the limit is unbounded or None.
+    """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
     if program == "runge-kutta":

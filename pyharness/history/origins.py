@@ -5,12 +5,10 @@ The table `data/disagreements.toml` separates the sources' statements from our i
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 from pyharness.history.tei import CERTAINTY
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS
 from pyharness.thesis.cards import deck, tight
 from pyharness.thesis.collation import names_a_card, rows
 
@@ -61,17 +59,6 @@ def origins() -> dict[str, str]:
 def unexplained_defects() -> dict[str, str]:
     """Return the reasons why no disagreement explains some defects, by identifier."""
     return dict(facts("disagreements")["unexplained"])
-
-
-def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements that each pair shares, with uniform or scanned names."""
-    found = {program: Counter(_statements(program, scanned_names)) for program in PROGRAMS}
-    return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
-
-
-def statement_count(program: str) -> int:
-    """Return the number of a program's cards, without comments."""
-    return len(_statements(program))
 
 
 def mistakes() -> list[str]:
@@ -125,9 +112,3 @@ def _of_steps(found: list[Disagreement]) -> Iterator[str]:
         differs = row.thesis == "differs" or row.decks in ("differ", "names", "order")
         if differs and (name in named) == (name in required):
             yield f"{name}: must be in a disagreement or as required, and not in both"
-
-
-def _statements(program: str, scanned_names: bool = False) -> list[str]:
-    cards = (card for card in deck(program).cards.values() if not card.is_comment)
-    texts = (card.text_with_scanned_names if scanned_names else card.text for card in cards)
-    return [tight(text[6:]) for text in texts]

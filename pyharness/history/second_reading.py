@@ -32,26 +32,6 @@ class ReadCard(NamedTuple):
     second: str
 
 
-class Recapture(NamedTuple):
-    """The estimated number of misreadings in the sample, from two readings.
-
-    `unit` is ``places`` (characters) or ``cards``; `lower` and `upper` are a 95 % interval.
-    """
-
-    unit: str
-    first: int
-    second: int
-    both: int
-    estimate: float
-    lower: int
-    upper: int
-
-    @property
-    def uncorrected(self) -> int:
-        """Return the upper limit of the number of misreadings left in our text."""
-        return self.upper - self.first
-
-
 def chapman(first: int, second: int, both: int) -> float:
     """Return Chapman's estimate, which corrects Lincoln and Petersen's for small samples."""
     return (first + 1) * (second + 1) / (both + 1) - 1
@@ -114,8 +94,8 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
     return found
 
 
-def recaptures() -> list[Recapture]:
-    """Return the estimates with places and with whole cards as units.
+def recaptures() -> Table:
+    """Return the estimates with places (characters) and with whole cards as units.
 
     A machine repeats its misreading of a letter, which makes places dependent, but not cards.
     """
@@ -124,11 +104,12 @@ def recaptures() -> list[Recapture]:
         for found, reading in zip(places, (each.first, each.second), strict=True):
             found |= {(each.card.name, place) for place in misread_places(each.scan, reading)}
     cards = tuple({name for name, _ in found} for found in places)
-    result = []
+    rows = []
     for unit, (one, other) in (("places", places), ("cards", cards)):
         counts = len(one), len(other), len(one & other)
-        result.append(Recapture(unit, *counts, chapman(*counts), *recapture_interval(*counts)))
-    return result
+        lower, upper = recapture_interval(*counts)
+        rows.append([unit, *counts, chapman(*counts), lower, upper, upper - len(one)])
+    return Table(_COLUMNS, rows)
 
 
 def disagreeing() -> list[ReadCard]:
@@ -138,10 +119,9 @@ def disagreeing() -> list[ReadCard]:
 
 def second_reading_report() -> Report:
     """Return the report on the two readings of the sample, with the estimated misreadings."""
-    found, cards, differing = recaptures(), [*read_cards()], disagreeing()
+    table, cards, differing = recaptures(), [*read_cards()], disagreeing()
     frame = len(witness_lines())
     seed = facts("cards/second-reading")["seed"]
-    table = Table(_COLUMNS, [[*each, each.uncorrected] for each in found])
     legend = (
         "first, second, both: number of misreadings of the scan in the sample that our text, the "
         "second reading, and both correct. estimate: Chapman's estimate of all misreadings in the "
@@ -162,9 +142,7 @@ def second_reading_report() -> Report:
         ],
         record=lambda: {
             "sample": {"seed": seed, "size": len(cards), "cards": frame},
-            "recaptures": [
-                {**each._asdict(), "uncorrected": each.uncorrected} for each in found
-            ],
+            "recaptures": [dict(zip(table.in_full()[0], row, strict=True)) for row in table.rows],
             "disagreeing": [each._asdict() | {"card": each.card.name} for each in differing],
         },
         data=table,

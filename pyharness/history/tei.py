@@ -12,6 +12,7 @@ its `lem`, and the lines of cards, `fw` and `surplus`.
 """
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
 
@@ -26,8 +27,7 @@ SCHEMA = "https://www.tei-c.org/Vault/P5/4.12.0/xml/tei/custom/schema/relaxng/te
 TITLE = "A Digital Computer Approach to the Unsymmetric Rigid Body Problem"
 AUTHOR = "Richard Jacobs"
 _XML = "{http://www.w3.org/XML/1998/namespace}"
-_EDITORS = "editors"  # the XML identifier of the edition's editors
-_RESPONSIBLE = f"#{_EDITORS}"
+_RESPONSIBLE = "#editors"
 _HEAD = (
     '<?xml version="1.0" encoding="utf-8"?>\n'
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
@@ -58,7 +58,7 @@ def tei_document() -> bytes:
     """Return the cards and the apparatus as a TEI document, in UTF-8."""
     root = xml.Element("TEI", xmlns="http://www.tei-c.org/ns/1.0")
     root.set(_XML + "lang", "en")
-    _write_header(_add(root, "teiHeader"))
+    root.append(_header())
     text = _add(root, "text")
     body = _add(text, "body")
     blocks = [block for program in PROGRAMS for block in _deck(body, program)]
@@ -82,90 +82,42 @@ def _add(
     return element
 
 
-def _write_header(header: xml.Element) -> None:
-    edition, scan = facts("edition"), facts("cards/scan")
-    file = _add(header, "fileDesc")
-    titles = _add(file, "titleStmt")
-    _add(titles, "title", f"{TITLE}: the three programs of the appendix, with an apparatus")
-    _add(titles, "author", AUTHOR)
-    responsible = _add(titles, "respStmt", id=_EDITORS)
-    for name in edition["editors"]:
-        _add(responsible, "name", name)
-    _add(responsible, "resp", edition["responsibility"])
-    version = pyharness.__version__
-    _add(_add(file, "editionStmt"), "edition", f"pyharness {version}", n=version)
-    publication = _add(file, "publicationStmt")
-    _add(publication, "publisher", edition["publisher"])
+def _header() -> xml.Element:
+    """Return the header: a template, with the values and lists that the data have."""
+    edition, scan, version = facts("edition"), facts("cards/scan"), pyharness.__version__
     released = edition["released"].get(version, "") or "no date"
-    when = {"when": released} if released[:1].isdigit() else {}
-    _add(publication, "date", released, **when)
-    available, rights = _add(publication, "availability"), edition["rights"]
-    licence = f"The edition: {rights['licence']}"
-    _add(available, "licence", licence, target=rights["licence_address"])
-    _add(available, "p", rights["edition"])
-    said = _add(available, "p", f"{rights['status']} {rights['where']}: ")
-    _add(said, "quote", rights["says"], source="#S.text")
-    source = _add(file, "sourceDesc")
-    printed = _add(source, "bibl", id="report")
-    _add(printed, "author", AUTHOR)
-    _add(printed, "title", TITLE)
-    _add(printed, "publisher", "AFWAL")
-    _add(printed, "date", "March 1982", when="1982-03")
-    _add(printed, "biblScope", "appendix", unit="section")
-    _write_witnesses(_add(source, "listWit"), scan["witness"], edition["witness"])
-    _write_encoding(_add(header, "encodingDesc"), scan)
-    described = _add(header, "revisionDesc")
-    for revision in revisions():
-        change = _add(
-            described, "change", f"{revision.what} ", when=revision.date, who=_RESPONSIBLE,
-            target=" ".join(_changed(revision)),
-        )  # fmt: skip
-        if revision.digest:
-            _add(change, "idno", revision.digest, type="text-digest")
-
-
-def _write_witnesses(found: xml.Element, given: list[dict[str, str]], scan: dict[str, str]) -> None:
-    for each in given:
-        witness = _add(found, "witness", each["what"], each["siglum"])
-        described = _add(witness, "bibl")
-        _add(described, "title", scan["title"])
-        _add(described, "idno", each["sha256"], type="SHA-256")
-        _add(described, "note", scan["medium"], type="medium")
-        for part in ("text", "appendix"):
-            _add(described, "biblScope", scan[part], f"{each['siglum']}.{part}", unit="part")
-        _add(described, "note", scan["state"], type="state")
-
-
-def _write_encoding(encoding: xml.Element, scan: dict[str, Any]) -> None:
-    declared = _add(encoding, "editorialDecl")
-    principles = scan["principles"]
-    for paragraph in (
-        f"Kept: {principles['kept']}.",
-        "A line of the listing is the number of a card, a dash, and its text: the num and the seg "
-        "of an ab. The columns of seg are those of the card.",
-        "The attribute wit names the witness of a variant, which is the scan alone. The attribute "
-        "source of an entry names the part of the scan from which the entry is known. The grounds "
-        "on which an entry is decided are categories in its attribute ana, and no witnesses.",
-    ):
-        _add(declared, "p", paragraph)
-    correction = _add(declared, "correction", method="markup")
-    _add(correction, "p", f"Emended: {principles['emended']}.")
-    _add(correction, "p", f"Conjectured: {principles['conjectured']}.")
-    normalization = _add(declared, "normalization", method="markup")
-    _add(normalization, "p", f"Normalized: {principles['normalized']}.")
-    _add(encoding, "variantEncoding", method="parallel-segmentation", location="internal")
-    classes = _add(encoding, "classDecl")
+    values = {
+        "title": TITLE, "author": AUTHOR, "version": version, "edition": edition, "scan": scan,
+        "released": released, "when": released if released[:1].isdigit() else "",
+    }  # fmt: skip
+    header = xml.fromstring(Path(__file__).with_name("tei-header.xml").read_text(encoding="utf-8"))
+    for element in header.iter():
+        element.text = element.text and element.text.format(**values)
+        attributes = {name: text.format(**values) for name, text in element.items()}
+        element.attrib = {name: text for name, text in attributes.items() if text}
+    lists = {element.tag: element for element in header.iter()}
+    for place, name in enumerate(edition["editors"]):
+        lists["respStmt"].insert(place, xml.Element("name"))
+        lists["respStmt"][place].text = name
     grounds = {each["siglum"]: each["what"] for each in scan["ground"]}
     for name, described, categories in (
         ("kind", "kinds of entries", KINDS),
         ("certainty", "how sure an entry is, and its value of cert", CERTAINTY),
         ("ground", "grounds of an entry, no witnesses of the text", grounds),
     ):
-        taxonomy = _add(classes, "taxonomy", id=name)
+        taxonomy = _add(lists["classDecl"], "taxonomy", id=name)
         _add(taxonomy, "desc", described)
         for each, what in categories.items():
             category = _add(taxonomy, "category", id=_class_of(name, each))
             _add(category, "catDesc", f"{each}: {what}")
+    for revision in revisions():
+        change = _add(
+            lists["revisionDesc"], "change", f"{revision.what} ", when=revision.date,
+            who=_RESPONSIBLE, target=" ".join(_changed(revision)),
+        )  # fmt: skip
+        if revision.digest:
+            _add(change, "idno", revision.digest, type="text-digest")
+    return header
 
 
 def _class_of(taxonomy: str, name: str) -> str:

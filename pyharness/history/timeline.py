@@ -4,16 +4,13 @@ They are in `data/timeline.toml` and `data/revisions.toml`.
 """
 
 from collections.abc import Mapping
+from datetime import date
 from typing import NamedTuple
 
 from pyharness.model.facts import facts
 
 CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "removed entries"}
 """The fields of a revision that name apparatus entries, with their headings."""
-_MONTHS = (
-    *("January", "February", "March", "April", "May", "June"),
-    *("July", "August", "September", "October", "November", "December"),
-)
 
 
 class Event(NamedTuple):
@@ -47,13 +44,6 @@ class Event(NamedTuple):
         return f"{first if year in self.last else _in_words(self.first)} to {_in_words(self.last)}"
 
 
-class Gap(NamedTuple):
-    """A question about the history of the thesis, and what its text lacks for an answer."""
-
-    question: str
-    answer: str
-
-
 def timeline() -> tuple[Event, ...]:
     """Return the events in the history of the thesis, in the order of the data."""
     return tuple(
@@ -66,14 +56,8 @@ def timeline() -> tuple[Event, ...]:
     )
 
 
-def gaps() -> tuple[Gap, ...]:
-    """Return the questions that the text of the thesis does not answer."""
-    return tuple(Gap(**row) for row in facts("timeline")["gap"])
-
-
 def _in_words(month: str) -> str:
-    year, number = month.split("-")
-    return f"{_MONTHS[int(number) - 1]} {year}"
+    return f"{date.fromisoformat(f'{month}-01'):%B %Y}"
 
 
 class Revision(NamedTuple):

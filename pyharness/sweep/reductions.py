@@ -4,7 +4,6 @@ The parameter `samples` is the number of times at which states are read; `of` na
 by the rank of its moment.
 """
 
-import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -52,14 +51,6 @@ class Reduction:
         return np.nan if self.dtype == "f8" else -1
 
 
-def _end(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.omega
-
-
-def _status(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.status
-
-
 def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
     samples = given["samples"]
     rows = batch.rows(samples)
@@ -73,14 +64,6 @@ def _error(batch: Batch, given: Mapping[str, Any]) -> Found:
         largest = np.fmax(largest, np.abs(truth).max(axis=1))
         worst = np.maximum(worst, np.abs(rows[:, i] - truth).max(axis=1))
     return np.asarray(worst / largest)
-
-
-def _stop_step(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return np.where(batch.status == Statuses.STOPPED, batch.n_rows, 0)
-
-
-def _stop_variable(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return batch.stop_variable
 
 
 def _overflow_time(batch: Batch, _: Mapping[str, Any]) -> Found:
@@ -100,11 +83,6 @@ def _drift(batch: Batch, given: Mapping[str, Any]) -> Found:
     return np.stack(found, axis=1)
 
 
-def _claim(batch: Batch, given: Mapping[str, Any]) -> Found:
-    room, _, name = given["function"].partition(":")
-    return np.asarray(getattr(importlib.import_module(room), name)(batch))
-
-
 def _largest_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
     start, rows = _unit(batch.omega0)[:, None, :], _unit(batch.rows(given["samples"]))
     return np.asarray(_angles(rows, start).max(axis=1))
@@ -118,10 +96,6 @@ def _flips(batch: Batch, given: Mapping[str, Any]) -> Found:
     below = component < 0.0
     changes = (below[:, 1:] != below[:, :-1]) & np.isfinite(component[:, 1:])
     return np.asarray(changes.sum(axis=1))
-
-
-def _flip_time(batch: Batch, _: Mapping[str, Any]) -> Found:
-    return flip_times(batch.bodies, batch.omega0)
 
 
 def _growth(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -143,11 +117,6 @@ def _angles(ours: Array, theirs: Array) -> Array:
     # The arc cosine of the scalar product would lose half of the digits of a small angle.
     across, along = (np.linalg.norm(each, axis=-1) for each in (ours - theirs, ours + theirs))
     return np.asarray(2.0 * np.arctan2(across, along))
-
-
-def _end_attitude(batch: Batch, _: Mapping[str, Any]) -> Found:
-    """Return the attitudes at the end, shape (n, 4)."""
-    return _in_space(batch)
 
 
 def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
@@ -190,6 +159,7 @@ def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _in_space(batch: Batch) -> Found:
+    """Return the attitudes at the end, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 
@@ -219,9 +189,13 @@ _OF_AXES: dict[str, Any] = {"only": "method", "needs": ("moments", "attitude")}
 _STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
-        "angular velocity at the end", _end, "rad/s", labels=("1", "2", "3"), dimension="component"
+        "angular velocity at the end",
+        lambda batch, _: batch.omega,
+        "rad/s",
+        labels=("1", "2", "3"),
+        dimension="component",
     ),
-    "status": Reduction("how it ended", _status, dtype="i1", flags=_STATUSES),
+    "status": Reduction("how it ended", lambda batch, _: batch.status, dtype="i1", flags=_STATUSES),
     "error": Reduction(
         "largest error of a component against a method, over the largest component",
         _error,
@@ -229,13 +203,13 @@ REDUCTIONS = {
     ),
     "stop-step": Reduction(
         "step at which the stop test ended it; 0: it did not",
-        _stop_step,
+        lambda batch, _: np.where(batch.status == Statuses.STOPPED, batch.n_rows, 0),
         dtype="i4",
         only="program",
     ),
     "stop-variable": Reduction(
         "variable that ended it",
-        _stop_variable,
+        lambda batch, _: batch.stop_variable,
         dtype="i1",
         only="program",
         flags={0: "none", **dict(enumerate(STOP_VARIABLES, 1))},
@@ -253,7 +227,7 @@ REDUCTIONS = {
     ),
     "claim": Reduction(
         "whether a claim holds; 2: it says nothing of the scene; 3: it holds in part",
-        _claim,
+        lambda batch, given: np.asarray(given["function"](batch)),
         dtype="i1",
         parameters={"id": ""},
         flags={0: "fails", 1: "holds", 2: "silent", 3: "in part"},
@@ -266,7 +240,7 @@ REDUCTIONS = {
     ),
     "attitude": Reduction(
         "attitude at the end, a quaternion from the body to space, scalar first",
-        _end_attitude,
+        lambda batch, _: _in_space(batch),
         labels=("0", "1", "2", "3"),
         dimension="quaternion",
         only="method",
@@ -309,7 +283,7 @@ REDUCTIONS = {
     ),
     "flip-time": Reduction(
         "time between changes of sign of the component about the middle axis",
-        _flip_time,
+        lambda batch, _: flip_times(batch.bodies, batch.omega0),
         "s",
         needs=("moments", "no torque"),
     ),

@@ -5,13 +5,14 @@ a block of the grid, solved and stored at once, and numbered from 0.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.checks.compare.batch import Solver
+from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.model.scene import Scene
 from pyharness.sweep.axes import Axis
 
@@ -23,14 +24,13 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For the reduction `claim`, `function` checks the claim; it is named as in
-    ``package.module:name``.
+    For the reduction `claim`, `function` checks the claim of each scene in a batch.
     """
 
     name: str
     reduction: str
     parameters: tuple[tuple[str, Any], ...] = ()
-    function: str = ""
+    function: Callable[[Batch], NDArray[Any]] | None = None
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ import hashlib
 import itertools
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyharness.checks.compare.batch import Solver
+from numpy.typing import NDArray
+
+from pyharness.checks.compare.batch import Batch, Solver
 from pyharness.engine.registry import METHODS, REGISTRY, requested_tolerance
 from pyharness.engine.scene_reader import scene_of, scene_of_file
 from pyharness.engine.solver import PREPARED
@@ -30,6 +32,7 @@ from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
 from pyharness.sweep.state_torques import check_state_axis, check_state_solver
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
+Claim = Callable[[Batch], NDArray[Any]]
 _KEYS = ("schema", "name", "scene", "axis", "solve", "reductions", "chunk")
 _OF_METHODS = ("method", "tolerance", "t_end")
 _OF_PROGRAMS = ("listing", "reading", "lipschitz", "may_stop")
@@ -42,12 +45,12 @@ _LONGEST_NAME = 240  # bytes; most file systems take 255
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
-def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = None) -> Sweep:
+def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
     """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
     The path of a scene file is relative to the sweep file. `claims` maps each claim to the function
-    that checks it, as in ``package.module:name``. For a `Batch` of n scenes it returns 1 where the
-    claim holds, 0 where it fails, 2 where it does not apply, 3 where it holds in part.
+    that checks it. For a `Batch` of n scenes it returns 1 where the claim holds, 0 where it fails,
+    2 where it does not apply, 3 where it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -59,7 +62,7 @@ def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, str] | None = 
         raise InputError(f"{where}: {error}") from None
 
 
-def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, str]) -> Sweep:
+def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Claim]) -> Sweep:
     check_written_schema(data, "sweep file")
     check_keys(data, _KEYS, "top level")
     name = data.get("name", path.stem)
@@ -151,10 +154,10 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     )
 
 
-def _reduction(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
+def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
     """Return the reduction of an entry, a name or a table; raise InputError if it is invalid.
 
-    `claims` maps each claim to the function that checks it, as in ``package.module:name``.
+    `claims` maps each claim to the function that checks it.
     """
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:
@@ -182,7 +185,7 @@ def _reduction(entry: object, claims: Mapping[str, str]) -> ReductionSpec:
         check_name("method", given["against"], METHODS, f"{where} against")
         if not 0.0 < number(f"{where} tolerance", given["tolerance"]) <= 1.0:
             raise InputError(f"{where} tolerance {given['tolerance']:g}; allowed: above 0, to 1")
-    function, title = "", name
+    function, title = None, name
     if "id" in given:
         if not isinstance(given["id"], str) or given["id"] not in claims:
             raise unknown("claim", given["id"], claims or ["none"], f"{where} id")

@@ -76,10 +76,8 @@ def formats_of(program: str) -> dict[str, Any]:
 
     Further keys name their cards, and mark characters as certain or conjecture.
     """
-    formats: dict[str, dict[str, Any]] = {
-        each["name"]: each for each in facts("printer")["program"]
-    }
-    return formats[program]
+    programs: list[dict[str, Any]] = facts("printer")["program"]
+    return next(each for each in programs if each["name"] == program)
 
 
 def _torque_cards(scene: Scene) -> tuple[float, float, float]:

@@ -134,18 +134,18 @@ def test_side_by_side_of_three_cards() -> None:
     found = view_of("runge-kutta", 860)
     assert found.corrected.text == "      U1(I)=UU1+.5*DT*KF(I)"
     assert found.corrected.defects == ["stage-base"]
-    assert [(each.place.text, each.switch, each.active) for each in found.port] == [
+    assert [(place.text, switch, active) for place, switch, active in found.port] == [
         ("U1(I) = U1(J) + 0.5_wp*DT*KF(I)", "stage-base", True),
         ("U1(I) = UU1 + 0.5_wp*DT*KF(I)", "stage-base", False),
     ]
     deleted = view_of("two-term", 1660)
     assert deleted.corrected.text is None
-    assert [(each.switch, each.active) for each in deleted.port] == [("dt-accumulates", True)]
+    assert [(switch, active) for _, switch, active in deleted.port] == [("dt-accumulates", True)]
     before = view_of("runge-kutta", 1530)
     assert not before.corrected.changes
     assert before.corrected.inserted[0] == (1531, "      U1(1)=U1(I)")
     # A statement after a branch, at the depth of the branch, does not depend on it.
-    assert [each.switch for each in view_of("runge-kutta", 930).port] == [None]
+    assert [switch for _, switch, _ in view_of("runge-kutta", 930).port] == [None]
 
 
 def test_the_corrected_statement_is_that_of_the_port() -> None:
@@ -155,9 +155,9 @@ def test_the_corrected_statement_is_that_of_the_port() -> None:
     compared = 0
     for program in PROGRAMS:
         for view in decks.card_views(program):
-            for line in view.port:
-                if line.switch and not line.active and line.switch in view.corrected.defects:
-                    port = plain(line.place.text)
+            for place, switch, active in view.port:
+                if switch and not active and switch in view.corrected.defects:
+                    port = plain(place.text)
                     wanted = tight(view.corrected.text or "")
                     if "change_u" in port:  # FL2 to ZL2 and P1 to P6 are arrays; J is 3
                         port = re.sub(r"change_u\(\d\)", wanted.partition("=")[0], port)

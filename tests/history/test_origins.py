@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from docs.text.page import text_page
+from docs.text.page import shared_statements, statements, text_page
 from pyharness import run_program
 from pyharness.history import origins
 from pyharness.history.origins import disagreements, mistakes, unexplained_defects
@@ -83,13 +83,13 @@ def test_a_mistake_is_found(
 
 
 def test_decks_share_statements() -> None:
-    found = origins.shared_statements()
+    found = shared_statements()
     two, *with_third = (found[pair] for pair in combinations(PROGRAMS, 2))
     assert two > 2 * max(with_third)
     for (one, other), count in found.items():
-        assert count < min(origins.statement_count(one), origins.statement_count(other))
+        assert count < min(len(statements(one)), len(statements(other)))
     # Seven statements are the same because we call the torques N in both decks.
-    in_scan = origins.shared_statements(scanned_names=True)
+    in_scan = shared_statements(scanned_names=True)
     assert [found[pair] - in_scan[pair] for pair in found] == [7, 1, 0]
     rows = re.findall(r"^\| ([\w-]+) and ([\w-]+) \| (\d+) \| (\d+) \|", text_page(), re.M)
     assert rows == [(*pair, str(n), str(n - in_scan[pair])) for pair, n in found.items()]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pyharness.history.timeline import Event, gaps, timeline
+from pyharness.history.timeline import Event, timeline
 from pyharness.model.facts import facts
 
 ROOT = Path(__file__).parents[2]
@@ -47,7 +47,7 @@ def test_every_quotation_is_in_the_thesis_and_no_later_date_or_missing_part() ->
     for missing in ("1473", "DTIC", "AFWAL-TR", "Vita", "VITA", "Approved by"):
         assert missing not in text
     assert "his help in the base computing system" in words
-    assert len(gaps()) == 7
+    assert len(facts("timeline")["gap"]) == 7
 
 
 def test_dates_in_words() -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from pathlib import Path
 
 from pyharness.cli import options as shared
 from pyharness.engine.scene_reader import read_scene
@@ -14,29 +15,7 @@ from pyharness.model.scene_report import heading
 
 FORMATS = ("table", "json")
 _ACTIONS = ("new", "check", "schema")
-_NEW = """\
-#:schema scene.schema.json
-# A scene: a rigid body, its initial state, a torque, and a number of steps.
-# `pyharness scene schema --out scene.schema.json` writes the schema for your editor,
-# `pyharness scene check FILE` checks this file, and docs/reference/scene-files.md has every key.
-name = "brick"
-
-[body]
-moments = [40.0, 30.0, 20.0]        # kg m2; or: coefficients, or: inertia, a 3 x 3 matrix
-
-[initial]
-omega = [0.0, 1.0, 1.0]             # rad/s, about the axes of the body
-attitude = [1.0, 0.0, 0.0, 0.0]     # quaternion from body to space, scalar first; may be left out
-
-[torque]                            # N m, about the axes of the body; may be left out
-constant = [1.0, 0.0, 0.0]
-sines = [{ amplitude = [0.0, 0.5, 0.0], frequency = 2.0 }]    # frequency in rad/s
-# expression = ["-0.1*w1", "-0.1*w2", "2*sin(3*t)*q0"]        # in place of constant and sines
-
-[run]
-step_size = 0.01                    # s
-steps = 100
-"""
+_NEW = Path(__file__).with_name("brick.toml")
 OPTIONS = {
     "action ACTION": "What to do: new (write a sample scene file), check (check a file) or "
     "schema (print the JSON Schema of scene files, for an editor).",
@@ -74,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     elif action == "schema":
         shared.emit((facts_folder() / "scene.schema.json").read_bytes(), options.out)
     elif (case := shared.chosen_case(options)) is None:
-        shared.emit(_NEW, options.out)
+        shared.emit(_NEW.read_bytes(), options.out)
     else:
         shared.emit(scene_text(case_scene(case), [f"Case {case} of Table 1"]), options.out)
     return 0

@@ -1,11 +1,9 @@
 """Verdicts on claims from many initial omegas at once, by the functions in `rules`.
 
 A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none. For each claim in `JUDGED`,
-`__getattr__` makes a function of this module, which the sweep calls.
+steps. Each start is used in all cases in which the thesis gives none.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from typing import Any
@@ -34,7 +32,7 @@ _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected t
 
 
 class Starts:
-    """A `rules.Bench` of the runs from n starts, used in the cases without omega(0) in the thesis.
+    """A bench of `rules`: runs from n starts, used in the cases without omega(0) in the thesis.
 
     The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
@@ -43,7 +41,7 @@ class Starts:
     def __init__(self, one: Laboratory, omega0: Array) -> None:
         """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
         self._one, self._omega0 = one, omega0
-        # As the methods of the same names of `rules.Bench`.
+        # As the methods of the same names of `Laboratory`.
         self.scene = one.scene
         self.solution = cache(self._integrated)
         self.error = cache(partial(rules.largest_error, self))
@@ -100,14 +98,6 @@ class Starts:
 
 JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules))
 """The claims with a rule for many starts."""
-FUNCTIONS = {name: f"{__name__}:{name}" for name in JUDGED}
-"""The import path of each claim's function, for a sweep."""
-
-
-def __getattr__(name: str) -> Callable[[Batch], NDArray[np.int8]]:
-    if name not in JUDGED:
-        raise AttributeError(name)
-    return partial(codes, name)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
@@ -123,6 +113,10 @@ def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     if one is None:
         return np.full(len(batch.omega0), SILENT, np.int8)
     return judged(entry, _bench(one, batch), len(batch.omega0))
+
+
+FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
+"""The function of each claim, for a sweep."""
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:

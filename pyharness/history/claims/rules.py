@@ -1,7 +1,8 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
-A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. Its arrays have
-the shape (steps, 3) or (n, steps, 3); the values of a `Grade` have the shape () or (n,). The `rule`
+A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. `parts` divides
+the step size; rows are at the steps of the case. Arrays have the shape (steps, 3) or (n, steps, 3);
+the values of a `Grade` have the shape () or (n,). The `rule`
 of the claim in `data/claims.toml` describes the grades. An error is the largest of any component of
 omega over the steps that the program ran, against the reference solution. The range of a component
 is its largest minus its smallest value.
@@ -9,14 +10,19 @@ is its largest minus its smallest value.
 
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.listing import PROGRAMS
-from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
+
+if TYPE_CHECKING:
+    from pyharness.history.claims.laboratory import Laboratory
+    from pyharness.history.claims.over_starts import Starts
+
+Bench: TypeAlias = "Laboratory | Starts"
 
 COLLOCATION = ("two-term", "four-term")
 Flags = NDArray[np.bool_]
@@ -37,29 +43,6 @@ class Grade(NamedTuple):
     numbers: Mapping[str, Any]
     whole: Any
     part: Any = False
-
-
-class Bench(Protocol):
-    """The source of runs and reference solutions for a claim's test.
-
-    `parts` divides the step size; rows are at the steps of the case. Without `may_stop` the stop
-    test is skipped.
-    """
-
-    def scene(self, case: int, parts: int = 1) -> Scene:
-        """Return the scene of a case; the runs may have other initial omegas."""
-
-    def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return the runs of a program on a case from every start."""
-
-    def solution(self, case: int) -> Array:
-        """Return the reference omega (rad/s) of a case at its steps, shape (..., steps, 3)."""
-
-    def error(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Any:
-        """Return the largest error of any omega component (rad/s) in a case, for each start."""
-
-    def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the collocation model; NaN from an overflow on."""
 
 
 def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:

@@ -278,7 +278,7 @@ contains
     call weigh()
     where (weights > 0.0_dp)
       sizes = 1.0_dp/weights
-    elsewhere
+    else where
       sizes = 0.0_dp
     end where
     found%growth = growth_of(transposed(n, lanes), sizes, transitions)
@@ -406,8 +406,8 @@ contains
     end function largest_terms
 
     subroutine weigh()
-      !! Make errors of omega relative to the scale, those of the quaternion angles, and those of own
-      !! states relative to their sizes, or to the sizes that they are about to reach.
+      !! Make errors of omega relative to the scale, those of the quaternion angles, and those of
+      !! own states relative to their sizes, or to the sizes that they are about to reach.
       real(dp) :: own_size
       integer :: i
 

@@ -20,7 +20,7 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   integer(4), intent(in) :: n_attitudes         ! n_times, or 0 without attitude
   real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
   integer(4), intent(in) :: n_own               ! own states
-  ! Least sizes to which their errors are relative. f2py has no arrays of size 0: the last is unused.
+  ! Least sizes to which their errors are relative; the last is unused, as f2py takes no size 0.
   real(8), intent(in), target :: own_sizes(n_own + 1)
   integer(4), intent(in) :: n_own_times         ! n_times, or 0 without own states
   real(8), intent(inout), target :: own(n_own + 1, n_own_times + 1) ! as attitudes; last row unused

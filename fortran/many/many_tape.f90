@@ -46,9 +46,14 @@ contains
     bodies%status = c_loc(status)
     bodies%estimates = c_null_ptr
     if (size(many%estimates) > 0) bodies%estimates = c_loc(many%estimates)
-    bodies%n_parameters = size(many%parameters, 1)
-    bodies%n_sets = merge(size(many%parameters, 2), 0, bodies%n_parameters > 0)
-    bodies%parameters = c_loc(many%parameters)
+    bodies%n_parameters = 0
+    bodies%n_sets = 0
+    bodies%parameters = c_null_ptr
+    if (associated(many%parameters)) then
+      bodies%n_parameters = size(many%parameters, 1)
+      if (bodies%n_parameters > 0) bodies%n_sets = size(many%parameters, 2)
+      bodies%parameters = c_loc(many%parameters)
+    end if
     call tape_bodies(bodies)
     raised = bodies%interrupted
   end subroutine solve_tape_bodies

@@ -111,7 +111,9 @@ def test_schema_of_the_record_has_one_form_of_torque() -> None:
 
 def test_expressions_in_the_documents_are_read() -> None:
     reference = (ROOT / "docs/reference/scene-files.md").read_text()
-    (table,) = re.findall(r"```\n(\[torque\].*?)```", reference, re.DOTALL)
+    table, with_states = re.findall(r"```\n(\[torque\].*?)```", reference, re.DOTALL)
+    own = scene_of(BODY | tomllib.loads(with_states), "reference")
+    assert own.states[0].start == 1.5
     scene = scene_of(BODY | tomllib.loads(table), "reference")
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.constants == (("k", 0.1),)

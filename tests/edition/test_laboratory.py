@@ -428,8 +428,8 @@ def test_limits_are_those_that_python_computes() -> None:
     kinds = set()
     for (number, program), (found, truth) in zip(cells, ask(body, cells), strict=True):
         scene = case_scene(number)
-        truth = reference(scene, scene.times())
-        expected, *_ = limit_solution(program, scene, scene.times(), truth)
+        exact = reference(scene, scene.times())
+        expected, *_ = limit_solution(program, scene, scene.times(), exact)
         kinds.add(found["kind"])
         if found["kind"] == "nothing":
             assert np.isnan(expected).all()

@@ -13,7 +13,6 @@ from pyharness.model.scene_file import case_scene
 from pyharness.thesis import decks as punched
 from pyharness.thesis.cards import deck
 from pyharness.thesis.decks import compiler, deck_text, run_deck
-from tests.thesis.model_decks import model_cards
 
 
 def _cards(text: str) -> dict[int, str]:
@@ -138,18 +137,12 @@ def test_without_a_compiler_verify_says_so(
 
 
 def test_model_of_four_terms_is_the_deck_but_for_its_points() -> None:
-    printed, made = deck("four-term").cards, model_cards(4)
+    printed, made = deck("four-term").cards, punched.model_cards(4)
     assert set(printed) == set(made)
     points = {720: "T1=DT*1./5.", 730: "T2=DT*2./5.", 740: "T3=DT*3./5.", 750: "T4=DT*4./5."}
     sizes = (110, 120, 150, 190)
     for number, text in made.items():
         assert text.strip() == points.get(number, printed[number].text.strip()) or number in sizes
-
-
-@pytest.mark.parametrize("terms", [3, 5])
-def test_models_are_derived_from_the_four_term_deck(terms: int) -> None:
-    text = deck_text(Listing.original("four-term"), terms=terms)
-    assert _cards(text) == {n: each.rstrip() for n, each in model_cards(terms).items()}
 
 
 @pytest.mark.skipif(compiler() is None, reason="no gfortran")

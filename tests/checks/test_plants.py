@@ -10,7 +10,8 @@ from pyharness.checks.check import Selection
 from pyharness.checks.compare.agreement import differences
 from pyharness.checks.compare.orders import measured_order
 from pyharness.checks.kinds import verify
-from pyharness.checks.plants.plants import PLANTS, TWIN_FAULTS, Plant, twin
+from pyharness.checks.plants.faults import TWIN_FAULTS, twin
+from pyharness.checks.plants.plants import PLANTS, Plant
 from pyharness.engine.prepared import prepare
 from pyharness.engine.solve import solve
 from pyharness.model.listing import PROGRAMS, Listing

@@ -14,7 +14,8 @@ from pyharness.checks.integrators.judging import Verdict, judge_problem
 from pyharness.checks.integrators.problem import Problem
 from pyharness.checks.integrators.protocol import Ask, Motion, asking_of
 from pyharness.checks.integrators.recognition import SAYS, recognised
-from pyharness.checks.plants.outcome import Outcome, change_at, control
+from pyharness.checks.plants.faults import change_at
+from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.port_process import PATIENCE, PortError, PortProcess
 from pyharness.model.attitude import product
 from pyharness.model.scene import Scene

@@ -1,6 +1,6 @@
-"""Changes of requests and answers, and outcomes of self-tests, which must detect each fault."""
+"""Outcomes of self-tests, in which `verify` must detect each planted fault."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,19 +32,6 @@ class Outcome:
 def control(failed: int, note: str) -> Outcome:
     """Return the outcome of the control, without a fault."""
     return Outcome(CONTROL, "no fault: nothing may fail", failed == 0, failed, note)
-
-
-def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    """Return a change in place of the value at `path`, as in ``scene.run``, unless it is empty."""
-    *outer, last = path.split(".")
-
-    def changed(record: dict[str, Any]) -> None:
-        for name in outer:
-            record = record.get(name) or {}
-        if record.get(last):
-            record[last] = change(record[last])
-
-    return changed
 
 
 def self_test_report(

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.plants.outcome import Outcome, change_at, control
+from pyharness.checks.plants.faults import change_at
+from pyharness.checks.plants.outcome import Outcome, control
 from pyharness.checks.port import Cell, compared
 from pyharness.checks.port_process import PortError, PortProcess
 from pyharness.checks.port_protocol import VARIABLES, read_number

@@ -1,0 +1,164 @@
+"""Faults of a chosen size: which function is faulty, and how its result changes.
+
+A fault is planted in the running process, and removed when its context ends. A Python twin with a
+fault is made from a copy of the sources with one replacement.
+"""
+
+import importlib
+import itertools
+import pkgutil
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+from pyharness import thesis
+from pyharness.engine.registry import METHODS
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+from pyharness.model.trajectory import Trajectory
+from pyharness.thesis.programs import PROGRAM_REGISTRY, Program
+
+Fault = Callable[[float], AbstractContextManager[Any]]
+"""A function from the size of a fault to a context in which the fault is present.
+
+A fault of size 0 changes no result.
+"""
+
+Change = Callable[[Any, float], Any]
+"""A function from a right result and the size of a fault to the wrong result."""
+
+Faulty = Callable[..., Any]
+"""A function that replaces a right function.
+
+Its arguments are the size of the fault, the right function, and the arguments of a call.
+"""
+
+
+def instead(target: str, faulty: Faulty) -> Fault:
+    """Return a fault that replaces the function with the dotted name `target` by `faulty`."""
+
+    def planted(size: float) -> AbstractContextManager[Any]:
+        right = pkgutil.resolve_name(target)
+        # A lambda, unlike a partial function, can replace a method of a class.
+        return patch(target, lambda *rest, **named: faulty(size, right, *rest, **named))
+
+    return planted
+
+
+def in_method(name: str, faulty: Faulty) -> Fault:
+    """Return a fault that replaces the function `solve` of the method `name`."""
+    known = METHODS[name]
+    return lambda size: patch.dict(
+        METHODS, {name: replace(known, solve=partial(faulty, size, known.solve))}
+    )
+
+
+def changing(change: Change) -> Faulty:
+    """Return a faulty function that applies `change` to the result of the right function."""
+    return lambda size, right, *rest, **named: change(right(*rest, **named), size)
+
+
+def change_result(target: str, change: Change) -> Fault:
+    """Return a fault that changes the result of the function with the dotted name `target`."""
+    return instead(target, changing(change))
+
+
+def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
+    """Return a change in place of the value at `path`, as in ``scene.run``, unless it is empty."""
+    *outer, last = path.split(".")
+
+    def changed(record: dict[str, Any]) -> None:
+        for name in outer:
+            record = record.get(name) or {}
+        if record.get(last):
+            record[last] = change(record[last])
+
+    return changed
+
+
+def change_attribute(name: str, change: Change) -> Change:
+    """Return a change of the attribute `name` of a result; it has no effect on None."""
+
+    def changed(found: Any, size: float) -> Any:
+        value = getattr(found, name)
+        return found if value is None else replace(found, **{name: change(value, size)})
+
+    return changed
+
+
+class TwinFault(NamedTuple):
+    """A fault in a twin, the Python port of a program: a row of `data/plants.toml`."""
+
+    file: str
+    right: str
+    wrong: str
+    size: float
+    programs: str
+    shows: str
+
+
+TWIN_FAULTS = {name: TwinFault(*row) for name, *row in facts("plants")["twin"]}
+"""The faults of the twins, by name."""
+
+_COUNT = itertools.count()
+
+
+@dataclass(frozen=True)
+class PlantedTwin(Program):
+    """A program with a faulty twin, which also replaces the Fortran program if `both`."""
+
+    module: ModuleType
+    both: bool = True
+
+    def _computed(
+        self, scene: Scene, listing: Listing, implementation: str, *options: Any
+    ) -> Trajectory:
+        if self.both or implementation == "python":
+            lipschitz, may_stop, _ = options
+            found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
+            return found
+        return super()._computed(scene, listing, implementation, *options)
+
+
+def twin(program: str, name: str, both: bool = True) -> Fault:
+    """Return a fault in a program's twin; its context yields the program."""
+    fault = TWIN_FAULTS[name]
+
+    @contextmanager
+    def planted(size: float) -> Iterator[PlantedTwin]:
+        wrong = fault.wrong.replace("SIZE", repr(size)) if size else fault.right
+        with tempfile.TemporaryDirectory() as folder:
+            module = _altered(program, fault.file, fault.right, wrong, Path(folder))
+            known = PROGRAM_REGISTRY[program]
+            faulty = PlantedTwin(known.name, known.order, known.source, module, both)
+            with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
+                yield faulty
+
+    return planted
+
+
+def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> ModuleType:
+    """Return a program's twin from a copy of the sources with `right` in `file` replaced."""
+    package = f"planted_{next(_COUNT)}"
+    target = folder / package
+    ignore = shutil.ignore_patterns("__pycache__")
+    assert thesis.__file__ is not None
+    shutil.copytree(Path(thesis.__file__).parent, target, ignore=ignore)
+    for path in target.glob("*.py"):
+        text = path.read_text().replace("pyharness.thesis", package)
+        if path.name == file:
+            assert text.count(right) == 1, f"{right!r} stands {text.count(right)} times in {file}"
+            text = text.replace(right, wrong)
+        path.write_text(text)
+    with patch.object(sys, "path", [str(folder), *sys.path]):
+        importlib.invalidate_caches()
+        return importlib.import_module(f"{package}.{program.replace('-', '_')}")

@@ -346,19 +346,24 @@ contains
 
     subroutine perturb()
       !! Expand the perturbations.
-      type(tape_arrays_t) :: arrays
       integer :: block, block_is_short
 
-      last_terms(1) = perturb_tape(s%arrays, 0, s%h, s%order, factor, weights, &
-                                   VARIATION_TOLERANCE, is_short)
-      do block = 2, n_blocks
-        arrays = s%arrays
-        arrays%v = c_loc(s%blocks(1, 0, 1, block))
-        last_terms(block) = perturb_tape(arrays, SIDE_BY_SIDE*(block - 1), s%h, s%order, factor, &
-                                         weights, VARIATION_TOLERANCE, block_is_short)
+      is_short = 0
+      do block = 1, n_blocks
+        last_terms(block) = perturb_tape(arrays_of_block(block), SIDE_BY_SIDE*(block - 1), s%h, &
+                                         s%order, factor, weights, VARIATION_TOLERANCE, &
+                                         block_is_short)
         is_short = max(is_short, block_is_short)
       end do
     end subroutine perturb
+
+    type(tape_arrays_t) function arrays_of_block(block)
+      !! Return what tape_terms.c reads of the tape, with a block of perturbations.
+      integer, intent(in) :: block
+
+      arrays_of_block = s%arrays
+      arrays_of_block%v = c_loc(s%blocks(1, 0, 1, block))
+    end function arrays_of_block
 
     real(dp) function fitting_lanes()
       !! Return the factor on the step with which the last terms of the perturbations are small.
@@ -633,14 +638,11 @@ contains
 
     subroutine take_step()
       !! Advance the unknowns, the error and the perturbations to the end of the step.
-      type(tape_arrays_t) :: arrays
       integer :: block, i
 
-      call sum_perturbations(s%arrays, last_terms(1), factor, lanes)
-      do block = 2, n_blocks
-        arrays = s%arrays
-        arrays%v = c_loc(s%blocks(1, 0, 1, block))
-        call sum_perturbations(arrays, last_terms(block), factor, lanes(1, 1, block))
+      do block = 1, n_blocks
+        call sum_perturbations(arrays_of_block(block), last_terms(block), factor, &
+                               lanes(1, 1, block))
       end do
       lanes(1, :n, 1) = lanes(1, :n, 1) - left
       do i = 1, n

@@ -3,7 +3,7 @@
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -35,7 +35,8 @@ _Columns = tuple[Array, Array, Array | None]
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude and the derivative of omega. `terminal` and `direction`
+    `function` takes time, omega, attitude, behind which own states may follow, and the derivative
+    of omega. `terminal` and `direction`
     are as in `crosses`; `counts_touches` says whether roots without a sign change are events.
     """
 
@@ -170,8 +171,6 @@ def _checked(given: Any, name: str, attitude: bool, own: Sequence[str]) -> Event
     n_attitude = 4 if attitude else 0
     if isinstance(given, Event):
         event, needs_attitude = given, given.needs_attitude
-        if own:
-            event = replace(event, function=_without_own(given.function, n_attitude))
     elif callable(given):
         count = _arguments(given, name, len(own) > 0)
         needs_attitude = count == 3
@@ -199,10 +198,6 @@ def _with_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], 
 
 def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any], Any]:
     return lambda t, omega, attitude, rates: given(t, omega)
-
-
-def _without_own(function: Callable[..., Any], n_attitude: int) -> Callable[..., Any]:
-    return lambda t, omega, rest, rates: function(t, omega, rest[:n_attitude], rates)
 
 
 def _with_own(

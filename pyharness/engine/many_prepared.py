@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pyharness.engine.solver import Solver
 
 # The methods that the kernel for many bodies has.
+_NO_PARAMETERS = np.empty((0, 0))
 _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
 
 
@@ -143,9 +144,6 @@ def solve_side_by_side(
         return list(range(piece.start, piece.stop))
     times = times_within(solver.scene, times)
     return solve_lanes(packed, _NO_PARAMETERS, starts, times, turns, found, piece, given_up)
-
-
-_NO_PARAMETERS = np.empty((0, 0))
 
 
 def solve_lanes(

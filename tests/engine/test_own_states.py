@@ -20,6 +20,7 @@ from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import turned_to_space
+from pyharness.model.trajectory_file import archive_of
 from pyharness.torques import damping, recorded
 
 MOMENTS = (2.0, 3.0, 4.0)
@@ -553,3 +554,48 @@ def test_states_of_other_scenes_are_checked_too() -> None:
     many = tuple(scene.states[0]._replace(name=f"x{k}") for k in range(10))
     with pytest.raises(InputError, match="10 are given"):
         Scene("many", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states=many)
+
+
+def test_the_first_step_from_0_is_as_short_as_a_very_fast_state_needs() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": 4e6 * np.cos(4e6 * t)}
+
+    stepper = Stepper(
+        Scene("fast", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"x": 0.0}), 1e-12
+    )
+    stepper.step()
+    assert abs(stepper.states["x"] - math.sin(4e6 * stepper.time)) < 1e-11
+
+
+def test_the_size_of_a_state_is_the_largest_so_far() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": -2.0 * states["x"]}
+
+    stepper = Stepper(
+        Scene("decay", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"x": 1.0}), 1e-6
+    )
+    lengths = []
+    while stepper.time < 20.0:
+        before = stepper.time
+        stepper.step()
+        lengths.append(stepper.time - before)
+    assert lengths[-1] > 1.5 * lengths[0]
+
+
+def test_terms_that_cancel_shorten_the_step() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": 21.0 * (1.0 - t) ** 20}
+
+    scene = Scene("cancels", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"x": 0.0})
+    found = solve(scene, [1.0, 2.0], tolerance=1e-13)
+    assert found.states["x"] == pytest.approx([1.0, 2.0], rel=4e-13)
+
+
+def test_a_file_without_its_states_is_refused(tmp_path: Any) -> None:
+    scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
+    solve(scene, [1.0, 2.0]).save(tmp_path / "whole.npz")
+    with np.load(tmp_path / "whole.npz") as archive:
+        arrays = {name: archive[name] for name in archive if name not in ("own", "sha256")}
+    (tmp_path / "part.npz").write_bytes(archive_of(arrays))
+    with pytest.raises(InputError, match="missing or damaged"):
+        load(tmp_path / "part.npz")

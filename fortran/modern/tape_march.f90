@@ -32,10 +32,6 @@ module tape_march
   real(dp), parameter :: LEAST_SCALE = 2.0_dp**(-500)
   ! Least size of an own state, which is part of a product with the local tolerance.
   real(dp), parameter :: LEAST_OWN = 2.0_dp**(-800)
-  ! An own state is at least this part of what the other unknowns might make of it in the first
-  ! steps: it may stay 0 by symmetry, but for rounding errors.
-  real(dp), parameter :: PART_OF_OTHERS = 1e-3_dp
-  integer, parameter :: FIRST_STEPS = 4
   integer, parameter :: ROWS_BETWEEN_LOOKS = 2**17
   ! Largest difference of a derivative and that of its series at the end of a step, times the step,
   ! over the local tolerance, and over the rounding errors at the beginning of the step.
@@ -251,7 +247,6 @@ contains
       scale = max(scale, maxval(abs(y(:3))))
       do i = first_own, n
         own_sizes(i) = max(own_sizes(i), abs(y(i)))
-        if (found%steps <= FIRST_STEPS) own_sizes(i) = max(own_sizes(i), size_by_others(i))
       end do
       if (at_end) then
         call add_row(y, y_low, lanes(1, :n, 1), solution%n_rows + 1)
@@ -425,20 +420,6 @@ contains
         if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
       end do
     end subroutine weigh
-
-    real(dp) function size_by_others(i)
-      !! Return the least size of own state i, from its perturbations by the other unknowns.
-      integer, intent(in) :: i
-      integer :: j
-
-      size_by_others = 0.0_dp
-      do j = 1, n
-        if (j == i .or. .not. weights(j) > 0.0_dp) cycle
-        size_by_others = max(size_by_others, abs(lanes(1 + mod(j, SIDE_BY_SIDE), i, &
-                                                       1 + j/SIDE_BY_SIDE))/weights(j))
-      end do
-      size_by_others = PART_OF_OTHERS*size_by_others
-    end function size_by_others
 
     real(dp) function to_end(factor)
       !! Return the factor with which the steps near the end, or before a breakpoint, are equal.

@@ -542,7 +542,7 @@ def test_growth_is_not_that_of_the_size_of_a_state(
         found = solve(scene, end, tolerance=tolerance)
         assert found.ended == "complete"
         assert found.growth is not None
-        assert found.growth < 5000.0
+        assert found.growth < 20.0
         assert found.error is not None
         assert found.error < tolerance
 

@@ -39,6 +39,7 @@ from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, kind_of, known
+from pyharness.model.keywords import with_hints
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
@@ -47,6 +48,7 @@ from pyharness.model.values import Number, Numbers, boolean, finite
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
+@with_hints
 def solve_many(
     scene: Scene | Sequence[Scene],
     t_end: Any = None,

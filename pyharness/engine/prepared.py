@@ -14,6 +14,7 @@ from pyharness.engine.solver import PREPARED, Solver
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import known
+from pyharness.model.keywords import with_hints
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array
@@ -39,6 +40,7 @@ def prepare(
     effort: float = ...,
     attitude: Literal[True],
 ) -> Solver[tuple[Array, Array]]: ...
+@with_hints
 def prepare(
     scene: Scene,
     method: str = "auto",

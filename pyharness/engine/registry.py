@@ -16,7 +16,7 @@ from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, tolerance_of
+from pyharness.model.values import Number, boolean, tolerance_of
 
 # Smallest and default tolerances of Gauss collocation with 1 to 8 stages. For smaller tolerances
 # the low orders would need too many steps.
@@ -227,6 +227,18 @@ def requested_tolerance(method: str, tolerance: Number | None) -> float:
     """Return the tolerance, or the method's default; raise InputError if it is no number."""
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
+
+
+def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool:
+    """Return whether the attitude is computed: as requested, or else if the scene has or needs one.
+
+    Raise InputError if it is requested, and the method can't propagate it.
+    """
+    if requested is None:
+        return scene.has_attitude and REGISTRY[method].attitude
+    if boolean("attitude", requested):
+        check_attitude(method)
+    return bool(requested)
 
 
 def check_attitude(method: str) -> None:

@@ -20,8 +20,8 @@ from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
     Method,
-    check_attitude,
     check_torque,
+    computes_attitude,
     requested_tolerance,
 )
 from pyharness.engine.rescaled import (
@@ -41,6 +41,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, known
+from pyharness.model.keywords import with_hints
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque, is_opaque
@@ -52,6 +53,7 @@ from pyharness.model.waves import with_merged_waves
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
 
 
+@with_hints
 def solve(
     scene: Scene,
     times: Number | Numbers,
@@ -59,7 +61,7 @@ def solve(
     tolerance: Number | None = None,
     *,
     effort: float = 1.0,
-    attitude: bool = False,
+    attitude: bool | None = None,
     dense_output: bool = False,
     events: object = None,
     sensitivities: Iterable[str] | None = None,
@@ -80,10 +82,9 @@ def solve(
         take none.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
-    attitude : bool
-        Whether the attitude is computed, from the scene's or (1, 0, 0, 0); the tolerance also
-        applies to its angle (rad). Torques that depend on the attitude, or are about the axes of
-        space, require it.
+    attitude : bool, optional
+        Whether the attitude is computed, from the scene's or (1, 0, 0, 0); by default, if the scene
+        has one or its torque needs one. The tolerance also applies to its angle (rad).
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
         to within the tolerance. By Taylor series, and for an opaque torque, `sol` has the steps
@@ -128,10 +129,10 @@ def solve(
            [6. , 6. , 6. ]])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True)
-    attitude = boolean("attitude", attitude)
     dense_output = boolean("dense_output", dense_output)
     method = known("method", method, METHODS)
     asked = method
+    attitude = computes_attitude(scene, method, attitude)
     if method == "auto" and is_opaque(scene.torque):
         method = "dop853"
     chosen = METHODS[method]
@@ -152,8 +153,6 @@ def solve(
         )
     functions = None if events is None else event_functions(events, attitude, scene.states)
     names = None if sensitivities is None else checked_names(scene, sensitivities, asked, attitude)
-    if attitude:
-        check_attitude(method)
     given = scene
     start = (scene.attitude or IDENTITY) if attitude else None
     if start is not scene.attitude:

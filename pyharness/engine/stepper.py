@@ -45,8 +45,7 @@ class Stepper:
         in the attitude's angle (rad), and in an own state relative to its largest absolute value so
         far. Default is 1e-9.
     attitude : bool, optional
-        Whether the attitude is computed, from the scene's or (1, 0, 0, 0). Torques that depend on
-        the attitude, or are about the axes of space, require it.
+        Whether the attitude is computed, as in `pyharness.solve`.
 
     Attributes
     ----------
@@ -94,9 +93,10 @@ class Stepper:
     )  # fmt: skip
 
     def __init__(
-        self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool = False
+        self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool | None = None
     ) -> None:
-        attitude = boolean("attitude", attitude)
+        wants = checked_scene(scene, *[True] * 5).has_attitude
+        attitude = wants if attitude is None else boolean("attitude", attitude)
         self._time = 0.0
         self._steps = 0
         self._tolerance = tolerance_of(tolerance, _FINEST)

@@ -370,7 +370,8 @@ class Conversions:
         Parameters
         ----------
         path : str or path
-            The path of the file, usually with the suffix ``.npz``. An existing file is replaced.
+            The path of the file; a new one without an ending gets ``.npz``. An existing file is
+            replaced.
 
         Raises
         ------

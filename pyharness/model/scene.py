@@ -5,13 +5,14 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
+from pyharness.model.keywords import with_hints
 from pyharness.model.own_states import OwnState, checked_states
 from pyharness.model.state_torque import StateTorque, checked_torque
 from pyharness.model.torque_law import TorqueLaw
@@ -40,7 +41,7 @@ _LONGEST_NAME = 60
 # Modules whose stack frames are between the user's call and the creation of the scene.
 _BETWEEN = (
     *("copy", "dataclasses", "pyharness.engine.scene_reader"),
-    *("pyharness.model.scene_file", __name__),
+    *("pyharness.model.keywords", "pyharness.model.scene_file", __name__),
 )
 # Ratio of the largest moment to an excess that rounding may cause.
 _ROUNDED = 2**50
@@ -86,15 +87,15 @@ class ImpossibleBodyWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Scene:
-    """A problem to solve: a body, its torque, its initial conditions, and the steps of a program.
+    """A problem to solve: a body, its torque and its initial conditions.
 
     Exactly one of `moments`, `coefficients` and `inertia` is required. Three numbers may be a list,
     a tuple or an array; the fields are tuples of floats.
 
     Parameters
     ----------
-    name : str
-        A title, shortened to one line of 60 printable characters.
+    name : str, optional
+        A title, "body" by default; shortened to one line of 60 printable characters.
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, or ChangingMoments, optional
@@ -106,14 +107,6 @@ class Scene:
         The torque; zero by default. Three numbers are constant. A function returns the components
         about the body axes. It is recorded with symbols; one that can't be is passed as
         ``opaque(function)``.
-    step_size : float
-        The step size of programs and methods with a fixed step (s).
-    steps : int
-        The number of steps of a program.
-    masses, forces : three numbers
-        The masses (kg) and forces (N) in the programs' velocity equations, by default as printed.
-    case : int, optional
-        The number of the case in Table 1 of the thesis.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional
@@ -125,6 +118,15 @@ class Scene:
         torque is then a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)`` that
         returns the torque and a dict of the states' rates. Errors of a state are relative to its
         largest absolute value so far, or to the second number of a pair if that is larger.
+    step_size : float
+        The step size (s) of the programs of 1982, as the other arguments below, and of methods with
+        a fixed step.
+    steps : int
+        The number of steps.
+    masses, forces : three numbers
+        The masses (kg) and forces (N) in the velocity equations, by default as printed.
+    case : int, optional
+        The number of the case in Table 1 of the thesis.
 
     Raises
     ------
@@ -139,20 +141,21 @@ class Scene:
     (0.5, -0.5, 0.0)
     """
 
-    name: str
-    omega: Triple
+    name: str = "body"
+    omega: Triple | None = None
     moments: Triple | None = None
     coefficients: Triple | None = None
     torque: TorqueLaw | StateTorque = field(default_factory=TorqueLaw)
+    attitude: Quaternion | None = None
+    inertia: Matrix | None = None
+    changing: ChangingMoments | ChangingInertia | None = None
+    states: tuple[OwnState, ...] = ()
+    _: KW_ONLY
     step_size: float = 0.01
     steps: int = 100
     masses: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["masses"]))
     forces: Triple = field(default_factory=lambda: tuple(facts("cases")["deck"]["forces"]))
     case: int | None = None
-    attitude: Quaternion | None = None
-    inertia: Matrix | None = None
-    changing: ChangingMoments | ChangingInertia | None = None
-    states: tuple[OwnState, ...] = ()
     # Norm of the attitude before normalisation.
     attitude_length: float = field(default=1.0, init=False, compare=False, repr=False)
 
@@ -160,20 +163,21 @@ class Scene:
 
         def __init__(
             self,
-            name: str,
-            omega: Numbers,
+            name: str = "body",
+            omega: Numbers = ...,
             moments: Numbers | ChangingMoments | None = None,
             coefficients: Numbers | None = None,
             torque: TorqueLaw | StateTorque | Numbers | Callable[..., Any] = ...,
+            attitude: Numbers | Rotation | None = None,
+            inertia: Iterable[Numbers] | ChangingInertia | None = None,
+            changing: ChangingMoments | None = None,
+            states: Mapping[str, Number | Sequence[Number]] | tuple[OwnState, ...] = (),
+            *,
             step_size: Number = 0.01,
             steps: SupportsIndex = 100,
             masses: Numbers = ...,
             forces: Numbers = ...,
             case: SupportsIndex | None = None,
-            attitude: Numbers | Rotation | None = None,
-            inertia: Iterable[Numbers] | ChangingInertia | None = None,
-            changing: ChangingMoments | None = None,
-            states: Mapping[str, Number | Sequence[Number]] | tuple[OwnState, ...] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -195,6 +199,8 @@ class Scene:
             from pyharness.model.inertia import checked_inertia
 
             self._set("inertia", checked_inertia("[body] inertia", self.inertia))
+        if self.omega is None:
+            raise InputError("[initial] omega is missing; give three numbers, in rad/s")
         self._set("omega", three("[initial] omega", self.omega))
         if self.attitude is not None:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
@@ -232,10 +238,10 @@ class Scene:
 
     def __repr__(self) -> str:
         """Return the fields as the arguments of a call."""
-        names = [each.name for each in fields(self) if each.repr]
-        absent = {x for x in ("changing", "states") if not getattr(self, x)}
-        shown = [x for x in names if x not in absent]
-        return f"Scene({', '.join(f'{x}={getattr(self, x)!r}' for x in shown)})"
+        shown = {each.name: getattr(self, each.name) for each in fields(self) if each.repr}
+        plain = Scene(omega=self.omega, moments=(1.0, 1.0, 1.0))
+        given = {x: v for x, v in shown.items() if x == "omega" or v != getattr(plain, x, None)}
+        return f"Scene({', '.join(f'{x}={value!r}' for x, value in given.items())})"
 
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
@@ -256,6 +262,11 @@ class Scene:
         if self.changing.is_constant and getattr(self, self.changing.place) is None:
             self._set(self.changing.place, self.changing.at(0.0))
             self._set("changing", None)
+
+    @property
+    def has_attitude(self) -> bool:
+        """Whether the attitude is computed by default: the scene has it, or the torque needs it."""
+        return self.attitude is not None or self.torque.needs_attitude
 
     @property
     def euler_coefficients(self) -> Triple:
@@ -349,6 +360,10 @@ class Scene:
             return [m1 + a * y * z, m2 + b * x * z, m3 + c * x * y]
 
         return rates
+
+
+# A wrapper, because the decorator of a data class writes the method.
+Scene.__init__ = with_hints(Scene.__init__)  # type: ignore[method-assign]
 
 
 def breaks_triangle(moments: Iterable[Any]) -> bool:

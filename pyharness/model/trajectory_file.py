@@ -66,10 +66,12 @@ _OPERANDS = {each.name: 1 for each in fields(Functions) if each.name not in ("nu
 
 
 def checked_path(path: object) -> str:
-    """Return the path of a trajectory file as text, or raise InputError."""
+    """Return the path as text, a new one without an ending with .npz; or raise InputError."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"trajectory file: {kind_of(path)}; allowed: a path, as text or a Path")
-    return os.fsdecode(path)
+    name = os.fsdecode(path)
+    stem, ending = os.path.splitext(os.path.basename(name))
+    return name if not stem or ending or os.path.exists(name) else f"{name}.npz"
 
 
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:

@@ -57,12 +57,19 @@ def test_estimate_tells_the_error() -> None:
     assert sorted(ratios)[-2] < 1.0
 
 
-def test_who_does_not_ask_gets_none() -> None:
+def test_attitude_is_computed_by_default_if_the_scene_has_one() -> None:
     scene = replace(case_scene(5), attitude=TURNED)
     bare = solve(case_scene(5), [1.0], "taylor")
-    found = solve(scene, [1.0], "taylor")
+    assert bare.attitude is None
+    found = solve(scene, [1.0], "taylor", attitude=False)
     assert found.attitude is None
     assert found.omega.tolist() == bare.omega.tolist()
+    assert solve(scene, [1.0], "gauss-4").attitude is None
+    asked, found = solve(scene, [1.0], attitude=True), solve(scene, [1.0])
+    assert found.attitude.tolist() == asked.attitude.tolist()
+    assert Stepper(scene).attitude.tolist() == list(scene.attitude)
+    turning = replace(case_scene(5), torque=lambda t, w, q: -q[1:])
+    assert solve(turning, 1.0).attitude is not None
     assert "attitude" in plan(case_scene(5)).skipped
     assert "attitude" not in plan(scene).skipped
 

@@ -220,7 +220,9 @@ def _sensitive(source: Random) -> Scene:
         law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
     axes, steps = source.sample(range(3), 3), source.randint(10, 60)
     step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
-    return Scene("", _pick(omega, axes), _pick(body, axes), None, law, step_size, steps)
+    return Scene(
+        "", _pick(omega, axes), _pick(body, axes), None, law, step_size=step_size, steps=steps
+    )
 
 
 def _long(source: Random) -> Scene:
@@ -244,7 +246,9 @@ def _extreme(source: Random) -> Scene:
     law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
     moments = [abs(x) or 1.0 for x in sizes]
     torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
-    return Scene("", omega, moments, None, torque, 10.0 ** source.uniform(-100.0, 2.0), 20)
+    return Scene(
+        "", omega, moments, None, torque, step_size=10.0 ** source.uniform(-100.0, 2.0), steps=20
+    )
 
 
 def _unsorted_body(source: Random) -> Triple:
@@ -321,7 +325,7 @@ def _scene(
     )
     law = laws[source.randrange(4) if torque else 0]()
     step_size, steps = 10.0 ** source.uniform(-3.0, -1.3), source.randint(10, 60)
-    return Scene("plain", omega, moments, coefficients, law, step_size, steps)
+    return Scene("plain", omega, moments, coefficients, law, step_size=step_size, steps=steps)
 
 
 def _largest(scene: Scene) -> float:

@@ -33,15 +33,16 @@ OPTIONS = {
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates. "
     f"Fortran has only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method instead: auto, taylor, closed-form, dop853 or "
-    "another of docs/reference/methods.md.",
+    "--method M": "Solve the scene by this method instead: auto (default with --scene), taylor, "
+    "closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
-    f"{', '.join(FORMS)} (3-1-3, 3-2-1: Euler angles about these axes).",
+    f"{', '.join(FORMS)} (3-1-3, 3-2-1: Euler angles about these axes). A scene with an attitude "
+    "has quaternions by default.",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
-    "needs --method and --attitude.",
+    "needs --method and an attitude.",
     "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "
     "component (default: the method's own, 1e-12 for auto).",
     "--strict": "Exit with status 1 if amplified rounding errors may exceed the tolerance, or if "
@@ -60,6 +61,8 @@ def run(options: argparse.Namespace) -> int:
     With --strict, return 1 if amplified rounding errors exceed the tolerance, or if the integration
     may have stepped over a short change of the torque.
     """
+    if options.scene is not None and options.program is None and options.method is None:
+        options.method = "auto"
     by_method = options.method is not None
     scene = shared.chosen_scene(
         options,
@@ -177,14 +180,14 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
         from pyharness.engine.attitude_picture import animation, check_animation
         from pyharness.views.pictures import check_matplotlib
 
-        if options.attitude is None:
+        if options.attitude is None and not scene.has_attitude:
             raise InputError(
                 "--animate needs an attitude; request one, as in --attitude quaternion"
             )
         check_animation(options.animate, scene)
         check_matplotlib("--animate")
         check_writable(options.animate, "--animate")
-    effort, attitude = shared.chosen_effort(options), options.attitude is not None
+    effort, attitude = shared.chosen_effort(options), None if options.attitude is None else True
     trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
     if options.animate is not None:
         moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)

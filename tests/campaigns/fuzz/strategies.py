@@ -89,8 +89,8 @@ def scene(random: Random, most_steps: int = 12) -> Scene:
         try:
             if random.random() < 0.6:
                 moments = [abs(x) or 1.0 for x in body]
-                return Scene("random", start, moments, None, law, step_size, steps)
-            return Scene("random", start, None, body, law, step_size, steps)
+                return Scene("random", start, moments, None, law, step_size=step_size, steps=steps)
+            return Scene("random", start, None, body, law, step_size=step_size, steps=steps)
         except InputError:
             continue
 

@@ -20,7 +20,7 @@ def digest(*found: object) -> str:
 
 # `repr` shows every drawn number to the last bit.
 @pytest.mark.parametrize(
-    ("seed", "recorded"), [("base", "d269171283763f2a"), ("2026-W47", "c9e110ce65249107")]
+    ("seed", "recorded"), [("base", "6112b7ef489a69fb"), ("2026-W47", "d65dd1f8d5ec5155")]
 )
 def test_draws_are_as_they_were(seed: str, recorded: str) -> None:
     found = [draw(seed, number) for number in range(400)]
@@ -34,11 +34,11 @@ def test_scenes_by_torque_are_as_they_were() -> None:
         for body in BODIES:
             for speed in SPEEDS if law in WAVES else ("",):
                 found.append(by_torque(Random(f"{law} {body} {speed}"), "", law, speed, body))
-    assert digest(found) == "e360e069a5968892"
+    assert digest(found) == "7234121a037dad4d"
 
 
 @pytest.mark.parametrize(
-    ("kind", "recorded"), [("pointing", "4a4df0e617c90e39"), ("driven", "a81d545afff0886e")]
+    ("kind", "recorded"), [("pointing", "59984f392d4480af"), ("driven", "cd460ea41eb98454")]
 )
 def test_scenes_of_trials_are_as_they_were(kind: str, recorded: str) -> None:
     seeds = [f"attitude {k}" if kind == "pointing" else k for k in range(8)]
@@ -49,13 +49,13 @@ def test_scenes_with_times_are_as_they_were() -> None:
     found = [list(islice(timed_scenes(kind, [1982, 3]), 40)) for kind in timed_kinds.KINDS]
     # The last digits of powers depend on the processor.
     rounded = re.sub(r"-?\d+\.\d+(e[-+]\d+)?", lambda m: f"{float(m[0]):.12g}", repr(found))
-    assert digest(rounded) == "6f241ee7b5f47c5a"
+    assert digest(rounded) == "28f7ce072c1db9d6"
 
 
 def test_other_motions_are_as_they_were() -> None:
     tops = ("plain", "middle axis", "near symmetry", "near separatrix", "wild")
     recorded = {
-        "60d95c9de4712645": [cancelling(kind, k) for kind in (*MERGED, *LEFT) for k in range(20)],
+        "42ad277f30fc4feb": [cancelling(kind, k) for kind in (*MERGED, *LEFT) for k in range(20)],
         "0072db722665f989": [free_motions.draw(Random(k), k) for k in free_motions.KINDS],
         "a1b68adb3412768f": [free_motions.draw_top(Random(kind), kind) for kind in tops],
     }

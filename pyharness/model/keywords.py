@@ -1,0 +1,47 @@
+"""Hints for keyword arguments that users of SciPy expect."""
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_TOLERANCE = "tolerance, the largest error of the result relative to the largest |omega|"
+_TIMES = "times, all in one argument; the initial omega is at time 0"
+_ARGUMENTS = "keyword arguments with defaults in the torque's function, or functools.partial"
+_STEPS = "nothing; steps follow from the tolerance"
+_OMEGA = "omega, of the Scene or of solve_many"
+_ATTITUDE = "attitude, a quaternion with the scalar first, or a Rotation of SciPy"
+_INERTIA = "moments, three principal moments, or inertia, a matrix"
+_HINTS = {
+    **dict.fromkeys(("rtol", "atol", "tol", "rel_tol", "abs_tol"), _TOLERANCE),
+    **dict.fromkeys(("t", "t_eval", "t_span", "t_end", "tspan"), _TIMES),
+    **dict.fromkeys(("args", "kwargs"), _ARGUMENTS),
+    **dict.fromkeys(("max_step", "first_step", "min_step"), _STEPS),
+    **dict.fromkeys(("y0", "w", "w0", "omega0", "omega_0"), _OMEGA),
+    **dict.fromkeys(("q", "q0", "attitude0", "quaternion", "rotation"), _ATTITUDE),
+    **dict.fromkeys(("I", "J", "tensor", "inertia_tensor", "moments_of_inertia"), _INERTIA),
+    "fun": "torque, a function of (t, omega), as an argument of the Scene",
+    "jac": "nothing; derivatives come from the recorded torque",
+    "vectorized": "nothing; the torque is recorded once",
+}
+
+
+def with_hints(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function with a TypeError that says what to write for SciPy's keywords."""
+    allowed = [each for each in inspect.signature(function).parameters if each != "self"]
+    names = frozenset(allowed)
+
+    @wraps(function)
+    def call(*args: P.args, **keywords: P.kwargs) -> R:
+        if not names.issuperset(keywords):
+            wrong = next(each for each in keywords if each not in names)
+            called = function.__qualname__.removesuffix(".__init__")
+            hint = _HINTS.get(wrong)
+            instead = f"write {hint}" if hint else f"allowed: {', '.join(allowed)}"
+            raise TypeError(f"{called} has no argument {wrong!r}; {instead}")
+        return function(*args, **keywords)
+
+    return call

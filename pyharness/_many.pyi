@@ -15,5 +15,5 @@ class ManyStarts:
         slowly: Callable[..., tuple[Array, NDArray[np.int8]]],
     ) -> ManyStarts: ...
     def __call__(
-        self, omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
+        self, omega: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
     ) -> tuple[Array, NDArray[np.int8]]: ...

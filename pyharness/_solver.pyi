@@ -23,9 +23,9 @@ class BoundKernel(Generic[Result]):
     ) -> Self: ...
     def __call__(
         self,
-        omega0: Numbers,
+        omega: Numbers,
         t_end: Number,
-        attitude0: Numbers | Rotation | None = None,
+        attitude: Numbers | Rotation | None = None,
         *,
         out: Array | None = None,
     ) -> Result: ...

@@ -64,7 +64,7 @@ def mixed(n: int, seed: int, by_moments: bool = True, waves: int = _WAVES) -> di
     t_end[rng.random(n) < 0.05] *= 30.0
     drawn = {
         "moments" if by_moments else "coefficients": body,
-        "omega0": omega0,
+        "omega": omega0,
         "torque_constant": np.where(kind >= 2, size * vectors(), 0.0),
         "torque_rate": np.where(kind >= 4, 0.1 * size * rate * vectors(), 0.0),
         "t_end": t_end,
@@ -118,7 +118,7 @@ def regroupings(
     drawn: dict[str, Any], rng: np.random.Generator, alone: int
 ) -> Iterator[tuple[str, Any, int]]:
     """Yield ways to group the bodies: a name, the rows, the number of threads."""
-    n = len(drawn["omega0"])
+    n = len(drawn["omega"])
     # Bodies of one kind, so that a call has no other kind.
     pushed, ramped, waved = (
         (drawn[name].reshape(n, -1) != 0.0).any(axis=1) if name in drawn else np.zeros(n, bool)
@@ -149,7 +149,7 @@ def differing(
 ) -> dict[str, set[int]]:
     """Return by the name of a grouping the bodies whose result changed."""
     rng = np.random.default_rng(seed)
-    n = len(drawn["omega0"])
+    n = len(drawn["omega"])
     whole = solve_many(BASE, **drawn, **settings)
     found: dict[str, set[int]] = {}
     for name, rows, threads in regroupings(drawn, rng, alone):
@@ -166,7 +166,7 @@ def differing_starts(scene: Scene, omega0: Array, t_end: Array, seed: int, **set
     many = prepare(scene, **settings).many
     whole = Ensemble(*many(omega0, t_end))
     changed = np.zeros(len(omega0), bool)
-    for _, rows, threads in regroupings({"omega0": omega0, "t_end": t_end}, rng, _ALONE):
+    for _, rows, threads in regroupings({"omega": omega0, "t_end": t_end}, rng, _ALONE):
         part = Ensemble(*many(np.ascontiguousarray(omega0[rows]), t_end[rows], threads=threads))
         changed[rows] |= ~same_bits(whole, part, rows)
     return int(changed.sum())
@@ -189,7 +189,7 @@ def main(count: int, seed: int) -> int:
         settings = settings_of(generator)
         drawn = mixed(n, own, bool(generator.random() < 0.7), 9 if batch % 8 == 7 else _WAVES)
         if settings["method"] in ("auto", "taylor") and generator.random() < 0.3:
-            drawn["attitude0"] = generator.standard_normal((n, 4))
+            drawn["attitude"] = generator.standard_normal((n, 4))
         changed = differing(drawn, own, **settings)
         for name, rows in changed.items():
             print(

@@ -25,7 +25,7 @@ def bodies(kind: str, n: int, seed: int, decades: float = 3.0) -> dict[str, Any]
     moments = 10.0 ** (decades * rng.uniform(-0.5, 0.5, (n, 3)))
     omega0 = rng.standard_normal((n, 3)) * 10.0 ** rng.uniform(-2, 2, (n, 1))
     rate = np.abs(omega0).max(axis=1, keepdims=True)
-    drawn = {"moments": moments, "omega0": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
+    drawn = {"moments": moments, "omega": omega0, "t_end": rng.uniform(0.3, 10.0, n) / rate[:, 0]}
     if kind != "free":
         drawn["torque_constant"] = moments * rate**2 * rng.standard_normal((n, 3))
     if kind in ("ramp", "waves"):
@@ -52,7 +52,7 @@ def scene_of(drawn: dict[str, Any], row: int) -> Scene:
         waves["sines"],
         waves["cosines"],
     )
-    return Scene("", drawn["omega0"][row], moments=drawn["moments"][row], torque=law)
+    return Scene("", drawn["omega"][row], moments=drawn["moments"][row], torque=law)
 
 
 def exceeding(
@@ -63,7 +63,7 @@ def exceeding(
     Errors are relative to the tolerance; NaN for a body without result.
     """
     done = (found.status == 0) & np.isin(truth.status, (0, 6))
-    ends = np.maximum(np.abs(truth.omega), np.abs(drawn["omega0"])).max(axis=1)
+    ends = np.maximum(np.abs(truth.omega), np.abs(drawn["omega"])).max(axis=1)
     error = np.where(done, np.abs(found.omega - truth.omega).max(axis=1) / ends, np.nan)
     beyond, alike = [], []
     for body in np.flatnonzero(error > tolerance).tolist():

@@ -139,9 +139,9 @@ static int sort_arguments(arguments *found, int width, PyObject *const *given, P
                           PyObject *names)
 {
   const int with_attitude = width > OMEGA;
-  const char *const known[] = {"omega0", "t_end", with_attitude ? "attitude0" : "out"};
-  const char *const signature = with_attitude ? "solver(omega0, t_end, attitude0=None)"
-                                              : "solver(omega0, t_end, *, out=None)";
+  const char *const known[] = {"omega", "t_end", with_attitude ? "attitude" : "out"};
+  const char *const signature = with_attitude ? "solver(omega, t_end, attitude=None)"
+                                              : "solver(omega, t_end, *, out=None)";
   const int most = with_attitude ? 3 : 2;
   PyObject **const places[] = {&found->omega0, &found->t_end, &found->third};
   const Py_ssize_t n_names = names ? PyTuple_GET_SIZE(names) : 0;

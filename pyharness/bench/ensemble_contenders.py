@@ -148,8 +148,8 @@ def _make_own(method: str) -> EnsembleMaker:
         def run() -> Array:
             nonlocal kept
             kept = solve_many(
-                load.scene, load.horizon, omega0=load.omega0, torque_constant=load.torque,
-                attitude0=load.attitude0, method=method, tolerance=tolerance, step=step,
+                load.scene, load.horizon, omega=load.omega0, torque_constant=load.torque,
+                attitude=load.attitude0, method=method, tolerance=tolerance, step=step,
                 threads=threads, out=kept,
             )  # fmt: skip
             if load.attitude0 is None:

@@ -13,33 +13,32 @@ from pyharness.model.errors import InputError, NotBuiltError, unknown
 # used.
 _GROUPS = {
     "for everyone": {
-        "compare": "compare original and corrected programs, Fortran, Python and solve_ivp "
-        "with the truth",
-        "run": "compute one trajectory by a program of the thesis or by another method",
-        "plan": "show which computations a scene requires, which are left out, and why",
+        "compare": "compare original and corrected programs with the true solution",
+        "run": "compute one trajectory by a program of the thesis or another method",
+        "plan": "show which computations a scene requires, and which are left out",
         "scene": "write or check a scene file, or print the schema of scene files",
         "doctor": "report versions, the build and missing packages, for bug reports",
     },
     "the thesis": {
-        "claims": "judge the statements of the thesis for the original and the corrected programs",
-        "figures": "redraw Figures 6 to 12 of the thesis, with original and corrected programs",
-        "cards": "show the printed programs card by card, with scan, Fortran, Python and notes",
-        "defects": "list faults and doubtful cards of the programs, with evidence and effect",
-        "deck": "write a program of the thesis as a deck of cards in fixed-form FORTRAN",
-        "limits": "show what the original programs converge to as the step size goes to zero",
-        "family": "derive and measure the orders of convergence of the weighted residual methods",
-        "words": "run the programs in the arithmetic of CDC computers and in other word lengths",
+        "claims": "judge the statements of the thesis by its programs, with evidence",
+        "figures": "redraw Figures 6 to 12, with original and corrected programs",
+        "cards": "show the printed programs card by card, with scan, ports, notes",
+        "defects": "list faults and doubtful cards of the programs, with effects",
+        "deck": "write a program of the thesis as a deck of FORTRAN cards",
+        "limits": "show what the original programs converge to as steps go to zero",
+        "family": "derive and measure the orders of weighted residual methods",
+        "words": "run the programs in CDC arithmetic and in other word lengths",
     },
     "rigid bodies": {
-        "rotations": "find steady rotations of a body, their stability and the time between flips",
-        "prove": "enclose the true solution in proved intervals, and check certificates",
-        "sweep": "solve a grid of scenes on this machine or a cluster, and store the results",
+        "rotations": "find steady rotations, their stability and the time of flips",
+        "prove": "enclose the true solution in proved intervals, with certificates",
+        "sweep": "solve a grid of scenes here or on a cluster, and store results",
     },
     "checks and publication": {
-        "verify": "check all programs and methods against each other and the true solution",
-        "stress": "test the numerical stability of every method against bounds from theory",
-        "bench": "measure run time against error of our and of third-party integrators",
-        "edition": "write the programs of the thesis, with notes, as a web site or as plain data",
+        "verify": "check programs and methods, your port, or your integrator",
+        "stress": "test the numerical stability of every method against theory",
+        "bench": "measure run time against error of our and other integrators",
+        "edition": "write the programs, with notes, as a web site or as plain data",
     },
 }
 VERBS = {verb: about for group in _GROUPS.values() for verb, about in group.items()}

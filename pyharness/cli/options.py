@@ -29,7 +29,7 @@ BODY = {
     "--case N": "Use this case of Table 1 of the thesis, 1 to 7, as the scene: body, initial "
     "state, torque and steps. Give this or --scene.",
     "--scene FILE": "Read the scene from this TOML file (`pyharness scene new` writes a sample).",
-    "--omega0 A,B,C": "Initial angular velocity (omega), rad/s: three components about the axes "
+    "--omega A,B,C": "Initial angular velocity (omega), rad/s: three components about the axes "
     "of the body (default: the scene's).",
 }
 SCENE = {
@@ -149,7 +149,7 @@ def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[st
 
 
 def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
-    """Return the scene of --case or --scene, with --omega0, --step-size and --steps.
+    """Return the scene of --case or --scene, with --omega, --step-size and --steps.
 
     Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
     matrix, a torque about the axes of space or dependent on the state, or a changing inertia,
@@ -160,10 +160,10 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
     case = chosen_case(options)
     scene = read_scene(options.scene) if case is None else case_scene(case)
     changes: dict[str, Any] = {}
-    if options.omega0 is not None:
-        values = numbers(options.omega0, "--omega0")
+    if options.omega is not None:
+        values = numbers(options.omega, "--omega")
         if len(values) != 3:
-            raise InputError(f"--omega0: {len(values)} numbers; allowed: three, as in 0,1,10")
+            raise InputError(f"--omega: {len(values)} numbers; allowed: three, as in 0,1,10")
         changes["omega"] = tuple(values)
     if getattr(options, "step_size", None) is not None:
         changes["step_size"] = number(options.step_size, "--step-size")

@@ -6,17 +6,23 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
 
-from pyharness.cli.options import FORMATS, LISTING, SCENE, check_known
+from pyharness.cli.options import FORMATS, LISTING, SCENE, check_known, warn
 from pyharness.model.errors import InputError, unknown
 
 _NEGATIVE = re.compile(r"-[.\d]")
 _GROUPS = {**dict.fromkeys(SCENE, "scene"), **dict.fromkeys(LISTING, "version of the programs")}
 _OUTPUTS = ("--format", "--plot", "--out", "--also", "--strict")
+_RENAMED = {"--omega0": "--omega", "--methods": "--method", "--random": "--draws"}
 _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
     """A help formatter that omits options from the usage and keeps an example's lines."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        from textwrap import wrap
+
+        return wrap(" ".join(text.split()), width, break_on_hyphens=False)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if text.startswith("example:"):
@@ -44,15 +50,23 @@ class Parser(argparse.ArgumentParser):
             # Without a width, argparse would import `shutil` for every command.
             formatter_class=lambda prog: _Formatter(prog, width=self._width),
         )
-        titles = ["arguments", *dict.fromkeys([*_GROUPS.values(), "options", "output"])]
-        groups = {title: self.add_argument_group(title) for title in titles}
+        own = {
+            f"--{name}": title
+            for title, names in getattr(self.module, "GROUPS", {}).items()
+            for name in names.split()
+        }
+        titles = ["arguments", "scene", *own.values(), *_GROUPS.values(), "options", "output"]
+        groups = {title: self.add_argument_group(title) for title in dict.fromkeys(titles)}
         for option, text in self.module.OPTIONS.items():
             name, _, metavar = option.partition(" ")
             if not name.startswith("--"):
                 groups["arguments"].add_argument(name, nargs="?", metavar=metavar, help=text)
                 continue
-            group = groups[_GROUPS.get(option, "output" if name in _OUTPUTS else "options")]
-            if metavar:
+            usual = _GROUPS.get(option, "output" if name in _OUTPUTS else "options")
+            group = groups[own.get(name, usual)]
+            if metavar.startswith("["):
+                group.add_argument(name, nargs="?", const="", metavar=metavar[1:-1], help=text)
+            elif metavar:
                 group.add_argument(name, metavar=metavar, help=text)
             else:
                 group.add_argument(name, action="store_true", help=text)
@@ -88,10 +102,14 @@ class Parser(argparse.ArgumentParser):
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments with negative numbers joined to their options, as in --x=-1.
 
-        Argparse would parse such numbers as options.
+        Argparse would parse such numbers as options. Old names of options become the new ones.
         """
         result: list[str] = []
         for argument in arguments:
+            old, equals, value = argument.partition("=")
+            if old in _RENAMED and _RENAMED[old] in self.option_names():
+                warn(f"{old} is now {_RENAMED[old]}")
+                argument = f"{_RENAMED[old]}{equals}{value}"
             if result and result[-1] in self.option_names() and _NEGATIVE.match(argument):
                 result[-1] += "=" + argument
             else:

@@ -14,7 +14,7 @@ import numpy as np
 from pyharness.engine.parameters import (
     ATTITUDE,
     INERTIA_ELEMENTS,
-    OMEGA0,
+    OMEGA,
     TORQUE,
     parameters_of,
     torque_with_values,
@@ -87,7 +87,7 @@ def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], 
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]
         return
-    listed = list(scene.omega) if name == OMEGA0 else parameters_of(scene)[name]
+    listed = list(scene.omega) if name == OMEGA else parameters_of(scene)[name]
     assert listed is not None
     if name.startswith(TORQUE) and len(listed) != 1:
         raise InputError(
@@ -96,7 +96,7 @@ def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], 
         )
     largest = max(map(abs, listed)) or 1.0
     for k, value in enumerate(listed):
-        size = largest if name == OMEGA0 else abs(value) or largest
+        size = largest if name == OMEGA else abs(value) or largest
 
         def moved(h: float, k: int = k) -> Scene:
             return _changed(scene, name, [x + h * (i == k) for i, x in enumerate(listed)])
@@ -105,7 +105,7 @@ def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], 
 
 
 def _changed(scene: Scene, name: str, values: list[float]) -> Scene:
-    if name == OMEGA0:
+    if name == OMEGA:
         return replace(scene, omega=triple(values))
     if name.startswith(TORQUE):
         changed = torque_with_values(scene.torque, {name.removeprefix(TORQUE): values[0]})

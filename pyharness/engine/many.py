@@ -54,8 +54,8 @@ def solve_many(
     t_end: Any = None,
     *,
     times: Numbers | None = None,
-    omega0: Any = None,
-    attitude0: Any = None,
+    omega: Any = None,
+    attitude: Any = None,
     moments: Any = None,
     coefficients: Any = None,
     inertia: Any = None,
@@ -86,9 +86,9 @@ def solve_many(
     times : float or iterable of float, shape (m,)
         Times (s) in order for all bodies instead of `t_end`. The result has a further axis, of
         length m, after that of the bodies; its rows are those for these final times, to the bit.
-    omega0 : array, shape (n, 3) or (3,)
+    omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
-    attitude0 : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
+    attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
         Quaternions at time 0, from body to space, scalar first. The default is the scene's
         attitude; if it has none, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
@@ -148,12 +148,12 @@ def solve_many(
     >>> import numpy as np
     >>> from pyharness import case_scene, solve_many
     >>> starts = np.array([[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]])
-    >>> np.round(solve_many(case_scene(2), 1.0, omega0=starts).omega, 6) + 0.0
+    >>> np.round(solve_many(case_scene(2), 1.0, omega=starts).omega, 6) + 0.0
     array([[-0.958924,  0.283662, 10.      ],
            [ 1.196944, -1.602287,  5.      ]])
     """
     arrays = {
-        "omega0": omega0, "attitude0": scalar_first(attitude0), "moments": moments,
+        "omega": omega, "attitude": scalar_first(attitude), "moments": moments,
         "coefficients": coefficients, "inertia": inertia, "torque_constant": torque_constant,
         "torque_rate": torque_rate, "sines": sines, "cosines": cosines,
     }  # fmt: skip

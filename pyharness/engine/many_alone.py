@@ -33,7 +33,7 @@ from pyharness.model.values import Number
 _REST: Triple = (0.0, 0.0, 0.0)
 _ONES: Triple = (1.0, 1.0, 1.0)
 _MOST_KEPT = 8  # prepared solvers
-NO_ATTITUDE = "the torque needs the initial attitude; give attitude0, or scenes with an attitude"
+NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes with an attitude"
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
@@ -70,16 +70,16 @@ def solve_one_by_one(
             "the torque is about the axes of space, and bodies are given by coefficients; allowed: "
             "moments or inertia"
         )
-    attitude0 = scene.attitude if arrays["attitude0"] is None else arrays["attitude0"]
+    attitude0 = scene.attitude if arrays["attitude"] is None else arrays["attitude"]
     if attitude0 is None and scene.torque.needs_attitude:
         raise InputError(NO_ATTITUDE)
     with_attitude = attitude0 is not None
-    omega0 = scene.omega if arrays["omega0"] is None else arrays["omega0"]
+    omega0 = scene.omega if arrays["omega"] is None else arrays["omega"]
     rows = rows_of_bodies(arrays)
-    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
-    counted = {**rows, "omega0": starts, "t_end": times}
+    starts, times = rows_of("omega", omega0, 3), rows_of("t_end", t_end)
+    counted = {**rows, "omega": starts, "t_end": times}
     if with_attitude:
-        counted["attitude0"] = rows_of("attitude0", attitude0, 4)
+        counted["attitude"] = rows_of("attitude", attitude0, 4)
     n = count_bodies(counted)
     at_rest = replace(scene, omega=_REST, attitude=None)
     found = place_for(out, n, with_attitude, estimates)
@@ -89,11 +89,11 @@ def solve_one_by_one(
     # Bodies that differ in their starts alone share one solver.
     shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
     lanes = _lanes(scene, rows, tolerance, effort, with_attitude) if rows else None
-    # `omega0` or `attitude0` may share memory with `out`.
+    # `omega` or `attitude` may share memory with `out`.
     attitudes = np.full((n, 4), np.nan) if with_attitude else None
     own = Ensemble(np.full((n, 3), np.nan), found.status, attitudes, found.estimates)
     found.status[:] = Statuses.REFUSED
-    turns = counted.get("attitude0")
+    turns = counted.get("attitude")
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         if shared is not None:
@@ -277,11 +277,11 @@ class Details:
 def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return copies of the arrays, with one row for each body or for all."""
     rows = rows_of_bodies(arrays)
-    for name, shape in (("coefficients", 3), ("omega0", 3), ("attitude0", 4)):
+    for name, shape in (("coefficients", 3), ("omega", 3), ("attitude", 4)):
         if arrays[name] is not None:
             rows[name] = rows_of(name, arrays[name], shape)
-    if "attitude0" in rows:
-        rows["attitude0"] = unit_quaternions(rows["attitude0"])
+    if "attitude" in rows:
+        rows["attitude"] = unit_quaternions(rows["attitude"])
     return {name: each.copy() for name, each in rows.items()}
 
 

@@ -35,10 +35,10 @@ _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAY
 
 
 def many_starts(
-    solver: "Solver[Any]", omega0: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
+    solver: "Solver[Any]", omega: Any, t_end: Any, *, threads: int = 1, out: Array | None = None
 ) -> tuple[Array, NDArray[np.int8]]:
     """Return final omegas (rad/s), (n, 3), and statuses, or raise InputError for wrong shapes."""
-    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
+    starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
     n = len(starts)
     check_rows("t_end", times, n)
     omega = np.empty((n, 3)) if out is None else buffer_of("out", out, (n, 3), "d")
@@ -71,20 +71,20 @@ def times_within(scene: Scene, times: Array) -> Array:
 
 
 def many_states(
-    solver: "Solver[Any]", omega0: Any, t_end: Any, attitude0: Any = None, *, threads: int = 1,
+    solver: "Solver[Any]", omega: Any, t_end: Any, attitude: Any = None, *, threads: int = 1,
     out: "Ensemble | Array | None" = None,
 ) -> tuple[Array, Array, NDArray[np.int8]]:  # fmt: skip
     """Return omegas, (n, 3), attitudes, (n, 4), and statuses, as `Solver.many`."""
     usual = solver.scene.attitude or IDENTITY
-    given = usual if attitude0 is None else scalar_first(attitude0)
-    starts, times = rows_of("omega0", omega0, 3), rows_of("t_end", t_end)
-    n, turns = len(starts), rows_of("attitude0", given, 4)
+    given = usual if attitude is None else scalar_first(attitude)
+    starts, times = rows_of("omega", omega, 3), rows_of("t_end", t_end)
+    n, turns = len(starts), rows_of("attitude", given, 4)
     check_rows("t_end", times, n)
-    check_rows("attitude0", turns, n)
+    check_rows("attitude", turns, n)
     code = int(solver.packed[Places.METHOD])
     if code in _SIDE_BY_SIDE and solver.scene.inertia is None:
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
-        own = {"omega0": starts, "t_end": times, "attitude0": turns}
+        own = {"omega": starts, "t_end": times, "attitude": turns}
         bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort)
         found = bodies.solve(threads_of(threads), out, with_estimates=False)
     else:

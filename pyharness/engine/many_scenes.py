@@ -53,16 +53,16 @@ class Axes:
         return quaternions_of_axes(self.axes)
 
     def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert `omega0` and `attitude0` of `given`, if in `names`, to principal axes."""
-        if "omega0" in names:
-            rows = rows_of("omega0", given["omega0"], 3)
-            self._check("omega0", rows)
-            given["omega0"] = rotated(rows, self.axes.transpose(0, 2, 1))
-        if "attitude0" in names:
-            attitudes = unit_quaternions(rows_of("attitude0", given["attitude0"], 4))
-            self._check("attitude0", attitudes)
+        """Convert `omega` and `attitude` of `given`, if in `names`, to principal axes."""
+        if "omega" in names:
+            rows = rows_of("omega", given["omega"], 3)
+            self._check("omega", rows)
+            given["omega"] = rotated(rows, self.axes.transpose(0, 2, 1))
+        if "attitude" in names:
+            attitudes = unit_quaternions(rows_of("attitude", given["attitude"], 4))
+            self._check("attitude", attitudes)
             conjugate = self.turns * np.array([1.0, -1.0, -1.0, -1.0])
-            given["attitude0"] = turned_back(attitudes, conjugate)
+            given["attitude"] = turned_back(attitudes, conjugate)
 
     def give_back(self, omega: Array, attitude: Array | None) -> None:
         """Convert final omegas, (n, 3), and attitudes, (n, 4), back in place."""
@@ -140,12 +140,12 @@ def from_scene(scene: Scene) -> dict[str, Any]:
     kind = next(name for name in BODIES if getattr(scene, name) is not None)
     return {
         kind: getattr(scene, kind),
-        "omega0": scene.omega,
+        "omega": scene.omega,
         "torque_constant": law.constant,
         "torque_rate": law.rate,
         "sines": [[*amplitude, frequency] for amplitude, frequency in law.sines],
         "cosines": [[*amplitude, frequency] for amplitude, frequency in law.cosines],
-        "attitude0": scene.attitude,
+        "attitude": scene.attitude,
     }
 
 
@@ -205,14 +205,14 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 
 def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {"attitude0": None}
-    for name in (*BODIES, "omega0", "torque_constant", "torque_rate"):
+    found: dict[str, Any] = {"attitude": None}
+    for name in (*BODIES, "omega", "torque_constant", "torque_rate"):
         if name in rows[0]:
             found[name] = np.array([row[name] for row in rows])
     for name in ("sines", "cosines"):
         found[name] = _filled([row[name] for row in rows])
-    if any(row["attitude0"] is not None for row in rows):
-        found["attitude0"] = np.array([row["attitude0"] or IDENTITY for row in rows])
+    if any(row["attitude"] is not None for row in rows):
+        found["attitude"] = np.array([row["attitude"] or IDENTITY for row in rows])
     return found
 
 
@@ -220,12 +220,12 @@ def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 _CONVERSIONS: dict[str, Callable[[Any], Array]] = {
     **{
         name: lambda values, name=name: rows_of(name, values, 3)  # type: ignore[misc]
-        for name in ("omega0", "moments", "coefficients", "torque_constant", "torque_rate")
+        for name in ("omega", "moments", "coefficients", "torque_constant", "torque_rate")
     },
     "sines": partial(waves_of, "sines"),
     "cosines": partial(waves_of, "cosines"),
     "t_end": partial(rows_of, "t_end"),
-    "attitude0": lambda values: rows_of("attitude0", values, 4),
+    "attitude": lambda values: rows_of("attitude", values, 4),
 }
 
 
@@ -285,12 +285,12 @@ class Bodies:
         self.by_moments = "moments" in (given if "coefficients" in given else rows)
         self.body = rows["moments" if self.by_moments else "coefficients"]
         self.rate, self.times = rows["torque_rate"], rows["t_end"]
-        self.attitude = rows.get("attitude0")
+        self.attitude = rows.get("attitude")
         law: tuple[Array, Array, Array] | None = ready.get("merged")
         if law is None or not given.keys().isdisjoint(_MERGED):
             law = with_merged_rows(*(rows[name] for name in _MERGED))
         self.constant, self.sines, self.cosines = law
-        self.omega0 = spread(rows["omega0"], self.n)
+        self.omega0 = spread(rows["omega"], self.n)
         self.step = step
         if not step > 0.0:
             raise InputError(f"step is {step:g}; allowed: above 0")

@@ -11,7 +11,7 @@ from pyharness.engine.closed_form import period_of
 from pyharness.engine.differences import States, slopes_by_differences
 from pyharness.engine.parameters import (
     ATTITUDE,
-    OMEGA0,
+    OMEGA,
     initial_state,
     parameters_of,
     varied_equations,
@@ -31,11 +31,11 @@ _OF_PERIOD, _FINEST = 1e-13, 1e-15
 _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
-_THREE = (0.0, 0.0, 0.0)  # stands for omega0 and attitude, which have three columns
+_THREE = (0.0, 0.0, 0.0)  # stands for omega and attitude, which have three columns
 # The parameters whose equations are periodic for a body without torque. All but the torque change
 # the period once; a torque changes it with time.
 _CONSTANT = "torque.constant"
-_PERIODIC = {OMEGA0, "moments", "coefficients", "inertia", _CONSTANT}
+_PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
 
 
 def checked_names(
@@ -48,13 +48,13 @@ def checked_names(
     place = "sensitivities"
     if method not in _METHODS:
         raise InputError(f"{place}: the method is {method}; allowed: {', '.join(_METHODS)}")
-    allowed = "allowed: names, as in ['omega0', 'moments']"
+    allowed = "allowed: names, as in ['omega', 'moments']"
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise InputError(f"{place}: {kind_of(names)}; {allowed}")
     if is_opaque(scene.torque):
         raise InputError(f"{place}: the torque is opaque; allowed: a torque that can be recorded")
     values = parameters_of(scene)
-    known = [OMEGA0, *([ATTITUDE] if attitude else []), *values]
+    known = [OMEGA, *([ATTITUDE] if attitude else []), *values]
     found: dict[str, None] = {}
     for name in itertools.islice(names, _MOST_COLUMNS + 1):
         if not isinstance(name, str):
@@ -168,13 +168,13 @@ def _by_periods(
     # Every period repeats the error of the first.
     tolerance = min(tolerance, _OF_PERIOD)
     columns, rows, starts = _by_series(
-        scene, (OMEGA0, *(x for x in names if x != OMEGA0)), False, inner, tolerance, effort
+        scene, (OMEGA, *(x for x in names if x != OMEGA)), False, inner, tolerance, effort
     )
-    transition, last = rows[:, :, columns[OMEGA0]], rows[place[-1]]
+    transition, last = rows[:, :, columns[OMEGA]], rows[place[-1]]
     slope = _slope(scene)
-    growth = slope @ (last[:, columns[OMEGA0]] - np.eye(3)) / (slope @ slope)
+    growth = slope @ (last[:, columns[OMEGA]] - np.eye(3)) / (slope @ slope)
     shear = np.outer(slope, growth)
-    forced = last - last[:, columns[OMEGA0]] @ starts
+    forced = last - last[:, columns[OMEGA]] @ starts
     drift = np.zeros_like(forced)
     if _CONSTANT in columns:
         drift[:, columns[_CONSTANT]] = shear @ forced[:, columns[_CONSTANT]]

@@ -22,7 +22,7 @@ from pyharness.model.tape import N_INPUTS, Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Triple
 
-OMEGA0, ATTITUDE = "omega0", "attitude"
+OMEGA, ATTITUDE = "omega", "attitude"
 TORQUE = "torque."  # before the names of its parameters
 # The elements of an inertia matrix that are parameters, in this order.
 INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -152,7 +152,7 @@ def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Arra
     state = np.array([*scene.omega, *start])[:n]
     slopes = np.zeros((n, m), order="F")
     for name, columns in equations.columns.items():
-        if name == OMEGA0:
+        if name == OMEGA:
             slopes[:3, columns] = np.eye(3)
         elif name == ATTITUDE:
             turns = [product(start, (0.0, *axis)) for axis in np.eye(3)]

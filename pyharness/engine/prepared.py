@@ -70,7 +70,7 @@ def prepare(
     Returns
     -------
     Solver
-        A callable. ``solver(omega0, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
+        A callable. ``solver(omega, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
         With `attitude` it also returns a quaternion from body to space, scalar first, shape (4,).
         Under a torque that depends on the state, an initial omega above 2**300 or below 2**-300
         rad/s is `refused`; `solve` accepts it.

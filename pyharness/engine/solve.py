@@ -97,7 +97,7 @@ def solve(
         are called with arrays.
     sensitivities : iterable of str
         Names of parameters. `sensitivities` of the trajectory then has the derivatives of omega and
-        of the quaternion with respect to them. A name may be `omega0`, `moments`, `coefficients`,
+        of the quaternion with respect to them. A name may be `omega`, `moments`, `coefficients`,
         or `inertia` (columns I11, I22, I33, I12, I13, I23). `attitude` means small initial
         rotations (rad) about the body axes. In `torque.NAME`, NAME is a constant of a scene file's
         expressions, or a function's keyword argument with a number as its default. For a TorqueLaw,

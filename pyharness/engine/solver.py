@@ -61,12 +61,12 @@ _FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 class Solver(BoundKernel[Result]):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega0, t_end)`` or ``solver(omega0, t_end, out=out)``: three numbers
+    Call it as ``solver(omega, t_end)`` or ``solver(omega, t_end, out=out)``: three numbers
     (rad/s), and the final time (s), positive, negative or 0. A call returns omega (rad/s) at
     `t_end` as a new array of shape (3,), or in `out`, a contiguous array of three floats, which may
-    be `omega0`.
+    be `omega`.
 
-    A solver prepared with ``attitude=True`` is called as ``solver(omega0, t_end, attitude0)``, with
+    A solver prepared with ``attitude=True`` is called as ``solver(omega, t_end, attitude)``, with
     the initial quaternion from body to space, scalar first; by default it is the scene's, or
     (1, 0, 0, 0). It returns omega and the quaternion at `t_end`, shape (4,), as new arrays.
 
@@ -149,13 +149,13 @@ class Solver(BoundKernel[Result]):
     def many(self) -> Any:
         """Return the function that solves many initial states in one call.
 
-        ``solver.many(omega0, t_end, threads=1, out=None)`` takes `omega0` (rad/s) of shape (n, 3),
+        ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
         and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in `out`
         unless None, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
         others or on `threads`, but may differ by rounding from a single call. Invalid arguments
         raise an InputError; a body whose moment reaches 0 before `t_end` is REFUSED.
 
-        With attitude it is ``solver.many(omega0, t_end, attitude0=None, threads=1, out=None)``,
+        With attitude it is ``solver.many(omega, t_end, attitude=None, threads=1, out=None)``,
         with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and statuses; `out`
         may be an Ensemble, or an array for omega.
         """
@@ -185,12 +185,12 @@ class Solver(BoundKernel[Result]):
         """Return the solver for compiled code, such as numba's; C code uses `capsule`."""
         return compiled_call(self)
 
-    def trajectory(self, omega0: Numbers, times: Number | Numbers) -> Trajectory:
-        """Return the trajectory from `omega0` (rad/s) at `times` (s), as `solve` computes it."""
+    def trajectory(self, omega: Numbers, times: Number | Numbers) -> Trajectory:
+        """Return the trajectory from `omega` (rad/s) at `times` (s), as `solve` computes it."""
         from pyharness.engine.registry import METHODS
         from pyharness.engine.solve import solve
 
-        scene = replace(self.scene, omega=three("omega0", omega0))
+        scene = replace(self.scene, omega=three("omega", omega))
         tolerance, asked, effort = self.settings
         method = "taylor" if asked == "quick" else asked
         # `solve` expects the tolerance 1 for a method with a fixed step.
@@ -272,12 +272,12 @@ def _check(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
     """Return a start and `t_end` (s) from arguments that C does not accept."""
-    start, time = three_floats("omega0", omega0), number("t_end", t_end)
+    start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):
         scene.changing.check([time])
     if with_attitude:
         usual = scene.attitude or IDENTITY
-        return (*start, *(usual if third is None else unit_quaternion("attitude0", third)[0])), time
+        return (*start, *(usual if third is None else unit_quaternion("attitude", third)[0])), time
     if third is not None and (found := no_buffer(third)):
         raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
     return start, time

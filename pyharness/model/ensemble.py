@@ -49,7 +49,7 @@ class Ensemble(BatchResult):
     --------
     >>> from pyharness import case_scene, solve_many
     >>> starts = [[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]]
-    >>> found = solve_many(case_scene(2), 1.0, omega0=starts)
+    >>> found = solve_many(case_scene(2), 1.0, omega=starts)
     >>> found.omega.shape
     (2, 3)
     >>> found.has_result
@@ -114,7 +114,7 @@ class Ensemble(BatchResult):
         if frame == "body":
             return momentum
         if self.attitude is None:
-            raise InputError("the bodies have no attitudes; give attitude0 to solve_many")
+            raise InputError("the bodies have no attitudes; give attitude to solve_many")
         turned = turned_to_space(self.attitude.reshape(-1, 4), momentum.reshape(-1, 3))
         return turned.reshape(momentum.shape)
 
@@ -235,8 +235,7 @@ def place_for(
     buffer_of("out.status", out.status, (n,), "b")
     if (out.attitude is None) == with_attitude:
         raise InputError(
-            "out.attitude does not match attitude0; allowed: an array with attitude0, None "
-            "without it"
+            "out.attitude does not match attitude; allowed: an array with attitude, None without it"
         )
     if out.attitude is not None:
         buffer_of("out.attitude", out.attitude, (n, 4), "d")

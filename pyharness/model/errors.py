@@ -117,7 +117,7 @@ def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") ->
         return InputError(f"{place}{what} is {kind_of(name)}; allowed: {', '.join(names)}")
     initials = ["".join(part[:1] for part in each.split("-")) for each in names]
     near = [each for each, short in zip(names, initials, strict=True) if short == name.lower()]
-    near = near or difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    near = near or difflib.get_close_matches(name, names, n=1, cutoff=0.7)
     hint = f"did you mean '{near[0]}'? " if near else ""
     shown = name if len(name) <= 60 else name[:57] + "..."
     return InputError(f"{place}unknown {what} '{shown}'; {hint}allowed: {', '.join(names)}")

@@ -183,7 +183,9 @@ class Scene:
     def __post_init__(self) -> None:
         """Check the fields, or raise InputError."""
         if not isinstance(self.name, str):
-            raise InputError(f"name is {kind_of(self.name)}; it must be text")
+            raise InputError(
+                f"name is {kind_of(self.name)}; allowed: text, or no name with omega=, moments="
+            )
         self._set("name", printable(" ".join(self.name.split()))[:_LONGEST_NAME].rstrip())
         self._set_changing()
         bodies = (self.moments, self.coefficients, self.inertia, self.changing)

@@ -117,8 +117,8 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     t_end = own.get("t_end", t_end)
     found = {
-        "omega0": _omega(scene, own, values if body == "moments" else None, n),
-        "attitude0": _components("attitude", scene.attitude or IDENTITY, own, n, first=0),
+        "omega": _omega(scene, own, values if body == "moments" else None, n),
+        "attitude": _components("attitude", scene.attitude or IDENTITY, own, n, first=0),
         **{name: own.get(name) for name in OF_PROGRAMS},
         body: values,
     }

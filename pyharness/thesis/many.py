@@ -79,7 +79,7 @@ def run_many(
     scene: Scene,
     listing: Listing,
     *,
-    omega0: "ArrayLike | None" = None,
+    omega: "ArrayLike | None" = None,
     moments: "ArrayLike | None" = None,
     coefficients: "ArrayLike | None" = None,
     torque_constant: "ArrayLike | None" = None,
@@ -102,7 +102,7 @@ def run_many(
         The scene that supplies every value for which no array is specified.
     listing : Listing
         The program with its active defects, readings and conjectures.
-    omega0, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
+    omega, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
         Initial angular velocities (rad/s), moments of inertia (kg m2) or Euler coefficients A, B,
         C, and constant torques (N m; 1/s2 for bodies specified by coefficients). At most one of
         `moments` and `coefficients` may be specified.
@@ -140,7 +140,7 @@ def run_many(
     >>> import numpy as np
     >>> from pyharness import case_scene, run_many, subset
     >>> starts = np.array([[0.0, 1.0, 10.0], [0.0, 2.0, 5.0]])
-    >>> found = run_many(case_scene(2), subset("runge-kutta", "corrected"), omega0=starts)
+    >>> found = run_many(case_scene(2), subset("runge-kutta", "corrected"), omega=starts)
     >>> np.round(found.omega[:, -1], 6) + 0.0
     array([[-0.958924,  0.283662, 10.      ],
            [ 1.196944, -1.602287,  5.      ]])
@@ -156,12 +156,12 @@ def run_many(
         kind = "coefficients" if moments is None else "moments"
     by_moments = kind == "moments"
     bodies, rule = (moments, ABOVE_ZERO) if by_moments else (coefficients, FINITE)
-    omega0 = scene.omega if omega0 is None else omega0
+    omega = scene.omega if omega is None else omega
     torque_constant = law.constant if torque_constant is None else torque_constant
     step_size = scene.step_size if step_size is None else step_size
     inputs = {
         kind: rows_of(kind, bodies, 3, rule=rule),
-        "omega0": rows_of("omega0", omega0, 3, rule=FINITE),
+        "omega": rows_of("omega", omega, 3, rule=FINITE),
         "torque_constant": rows_of("torque_constant", torque_constant, 3, rule=FINITE),
         "step_size": rows_of("step_size", step_size, rule=ABOVE_ZERO),
         "lipschitz": rows_of("lipschitz", lipschitz, rule=FROM_ZERO),
@@ -210,7 +210,7 @@ def _run(
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
     body, omega, constant, first, step_size, lipschitz = (
         spread(inputs[name], n)
-        for name in ("body", "omega0", "torque_constant", "first", "step_size", "lipschitz")
+        for name in ("body", "omega", "torque_constant", "first", "step_size", "lipschitz")
     )
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"

@@ -133,7 +133,7 @@ def test_loads_are_all_cases_from_the_axes_of_space() -> None:
 
 
 @pytest.mark.usefixtures("hurried")
-@pytest.mark.parametrize("scene", ["--case 4 --horizon 1", "--random 1 --seed f"])
+@pytest.mark.parametrize("scene", ["--case 4 --horizon 1", "--draws 1 --seed f"])
 def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture) -> None:
     command = ["bench", "--attitude", *scene.split(), "--peers", "none"]
     assert main([*command, "--format", "json"]) == 0
@@ -143,7 +143,7 @@ def test_verb_judges_both_and_says_who_carries_none(scene: str, capsys: Capture)
     assert all(row["error"] <= max(row["setting"] or 0.0, 5e-15) for row in record["rows"])
     reasons = {each["method"]: each["reason"] for each in record["refused"]}
     assert reasons["rk4"] == reasons["two-term-original"] == "does not compute attitudes"
-    assert main([*command, "--methods", "auto", "--format", "markdown"]) == 0
+    assert main([*command, "--method", "auto", "--format", "markdown"]) == 0
     page = capsys.readouterr().out
     assert "# Run time against error of omega and attitude\n" in page
     assert "--attitude --format markdown`" in page

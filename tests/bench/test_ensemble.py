@@ -127,7 +127,7 @@ def test_table_has_every_part(capsys: Capture) -> None:
 def test_json_csv_and_picture(tmp_path: Path, capsys: Capture) -> None:
     pytest.importorskip("matplotlib")
     picture = tmp_path / "growth.svg"
-    one = [*COMMAND[:-1], "none", "--methods", "taylor"]
+    one = [*COMMAND[:-1], "none", "--method", "taylor"]
     assert main([*one, "--plot", str(picture), "--format", "json"]) == 0
     record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert b"<svg" in picture.read_bytes()
@@ -154,7 +154,7 @@ def test_memory_is_at_most_twice_the_arrays() -> None:
 def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     there = property(lambda each: each.package in ("", "numpy"))
     monkeypatch.setattr(Contender, "is_installed", there)
-    assert main([*COMMAND[:-1], "heyoka", "--methods", "closed-form"]) == 2
+    assert main([*COMMAND[:-1], "heyoka", "--method", "closed-form"]) == 2
     assert "heyoka-batch" in capsys.readouterr().err
-    assert main([*COMMAND[:-2], "--methods", "closed-form"]) == 0
+    assert main([*COMMAND[:-2], "--method", "closed-form"]) == 0
     assert "heyoka-batch, heyoka-ensemble, " in capsys.readouterr().out

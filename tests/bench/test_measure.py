@@ -324,7 +324,7 @@ def test_peer_solves_every_law(name: str) -> None:
             assert error < 1e-10
 
 
-ONLY = ["bench", "--case", "4", "--methods", "auto,rk4", "--peers", "none"]
+ONLY = ["bench", "--case", "4", "--method", "auto,rk4", "--peers", "none"]
 
 
 @pytest.mark.campaign
@@ -356,7 +356,7 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
     monkeypatch.setattr(bench, "_BUDGET", dict.fromkeys(("tolerance", "steps", "none"), 0.0))
     assert main(["bench", "--peers", "heyoka"]) == 2
     assert "heyoka" in capsys.readouterr().err
-    assert main(["bench", "--case", "4", "--horizon", "1", "--methods", "closed-form"]) == 0
+    assert main(["bench", "--case", "4", "--horizon", "1", "--method", "closed-form"]) == 0
     assert "heyoka: not installed" in capsys.readouterr().out
 
 

@@ -1,4 +1,4 @@
-"""`bench --random`: scenes are of the kinds they claim, and time ratios have known values."""
+"""`bench --draws`: scenes are of the kinds they claim, and time ratios have known values."""
 
 import csv
 import json
@@ -121,7 +121,7 @@ SPHERE = _finding().workloads[0]
 
 
 def test_every_form_has_the_spreads() -> None:
-    report = bench_report(_finding(), [], "pyharness bench --random 4 --seed x")
+    report = bench_report(_finding(), [], "pyharness bench --draws 4 --seed x")
     text = render(report, "table")
     title = "heyoka time / time of auto, at errors of 1e-6"
     assert title in text.splitlines()
@@ -141,8 +141,8 @@ def test_every_form_has_the_spreads() -> None:
 @pytest.mark.usefixtures("hurried")
 def test_verb_gives_rows_and_spreads(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "_LARGEST_STEPS", 256)
-    few = ["--methods", "auto,rk4", "--peers", "none"]
-    command = ["bench", "--random", "2", "--seed", SEED, *few]
+    few = ["--method", "auto,rk4", "--peers", "none"]
+    command = ["bench", "--draws", "2", "--seed", SEED, *few]
     assert main([*command, "--format", "json"]) == 0
     record: dict[str, Any] = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     contract = ["case", "scene", "horizon", "method", "setting", "seconds", "error", "evaluations"]
@@ -164,5 +164,5 @@ def test_verb_gives_rows_and_spreads(capsys: Capture, monkeypatch: pytest.Monkey
     assert [each["growth"] < MOST_GROWTH for each in record["scenes"]] == [True, True]
     assert {each["method"] for each in record["spreads"]} == {"rk4"}
     assert main([*command, "--format", "markdown"]) == 0
-    told = f"`pyharness bench --random 2 --seed {SEED} --methods auto,rk4 --peers none"
+    told = f"`pyharness bench --draws 2 --seed {SEED} --method auto,rk4 --peers none"
     assert told in capsys.readouterr().out

@@ -126,7 +126,7 @@ def _prepared(entry: str, scene: Scene, times: list[float], tolerance: float) ->
 def _many(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
     if entry == "solve_many":
         starts = [scene.omega, tuple(0.5 * w for w in scene.omega)]
-        found = solve_many(scene, times[-1], omega0=starts, tolerance=tolerance)
+        found = solve_many(scene, times[-1], omega=starts, tolerance=tolerance)
     else:
         found = solve_many([scene, scene], times[-1], tolerance=tolerance)
     turned = None if found.attitude is None else found.attitude[0]

@@ -140,7 +140,7 @@ def results(one: Drawn, seed: str, number: int) -> Iterator[tuple[str, float, Ca
         return solver(start, TIME)[2], solver.status, solver.growth
 
     def many() -> Any:
-        found = solve_many(scene, TIME, omega0=np.array([start] * 3), tolerance=tolerance)
+        found = solve_many(scene, TIME, omega=np.array([start] * 3), tolerance=tolerance)
         return found.omega[1, 2], found.ended[1], None
 
     def by_sol() -> Any:

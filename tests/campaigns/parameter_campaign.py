@@ -40,7 +40,7 @@ _STENCIL = (
 
 def random_scene(source: Random, kind: str) -> tuple[Scene, float, list[str]]:
     """Return a random scene of a kind, a time (s), and the names of its parameters."""
-    names = ["omega0", "moments"]
+    names = ["omega", "moments"]
     if kind in ("terms", "ready"):
         drawn = draw(source, STEADY + TURNING) if kind == "terms" else draw_ready(source)
         return *drawn, names + ["attitude"] * (drawn[0].attitude is not None)
@@ -114,7 +114,7 @@ def _variants(scene: Scene, name: str) -> Iterator[list[tuple[float, Scene]]]:
             before = values[k]
             values[k] += size
             size = values[k] - before
-            if name == "omega0":
+            if name == "omega":
                 changed = replace(scene, omega=values)
             elif name == "moments":
                 changed = replace(scene, moments=values)
@@ -132,7 +132,7 @@ def _variants(scene: Scene, name: str) -> Iterator[list[tuple[float, Scene]]]:
 
 
 def _values(scene: Scene, name: str) -> list[float]:
-    if name in ("omega0", "moments"):
+    if name in ("omega", "moments"):
         return list(getattr(scene, name.removesuffix("0")) or ())
     torque: Any = scene.torque
     if name in ("torque.constant", "torque.rate"):

@@ -107,7 +107,7 @@ def test_run_json_of_a_method_and_of_an_overflow(printed: Printed) -> None:
 
 _FAR = "run --case 3 --method auto --times 1,1000000 --tolerance"
 # Beside the middle axis, which it leaves.
-_BESIDE = "compare --case 3 --program two-term --omega0 1e-5,10,0 --steps 1500 --tolerance 1e-11"
+_BESIDE = "compare --case 3 --program two-term --omega 1e-5,10,0 --steps 1500 --tolerance 1e-11"
 
 
 def test_run_tells_of_error_growth_and_digits(printed: Printed) -> None:
@@ -201,7 +201,7 @@ def test_options_reach_the_program(printed: Printed) -> None:
     assert record("--no-stop")["steps"] == 100
     assert record("--lipschitz 1e9 --steps 7")["steps"] == 7
     assert record("--step-size 0.001")["scene"]["run"]["step_size"] == 0.001
-    assert record("--omega0 -1,2,3e0")["scene"]["initial"]["omega"] == [-1.0, 2.0, 3.0]
+    assert record("--omega -1,2,3e0")["scene"]["initial"]["omega"] == [-1.0, 2.0, 3.0]
     assert record("--listing corrected")["listing"]["defects"] == []
     assert record("--keep stage-base")["listing"]["defects"] == ["stage-base"]
     assert "stage-base" not in record("--fix stage-base")["listing"]["defects"]

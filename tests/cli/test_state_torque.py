@@ -124,7 +124,7 @@ SOLVERS: dict[str, Callable[[Scene], Any]] = {
     "prepare": lambda scene: prepare(scene)(scene.omega, 1.0),
     "prepare taylor": lambda scene: prepare(scene, "taylor")(scene.omega, 1.0),
     "prepare attitude": lambda scene: prepare(scene, attitude=True)(scene.omega, 1.0)[0],
-    "solve_many": lambda scene: solve_many(scene, 1.0, omega0=[scene.omega]).omega[0],
+    "solve_many": lambda scene: solve_many(scene, 1.0, omega=[scene.omega]).omega[0],
     "solve_many scenes": lambda scene: solve_many([case_scene(5), scene], 1.0).omega[1],
     **{name: partial(_solved, name) for name in METHODS},
 }

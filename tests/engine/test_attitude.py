@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 import pyharness
-from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
+from pyharness import (
+    InputError,
+    Scene,
+    Stepper,
+    TorqueLaw,
+    case_scene,
+    prepare,
+    run_program,
+    solve,
+    subset,
+)
 from pyharness.engine.from_rows import attitude_from_rows
 from pyharness.engine.plan import plan
 from pyharness.model.attitude import angle_between
@@ -131,16 +141,16 @@ def test_prepared_solver_takes_every_kind_of_argument() -> None:
     usual = [each.tolist() for each in solver(start, 1.0)]
     for arguments, named in (
         (([1, 2, 3], 1, TURNED), {}),
-        ((start, 1.0), {"attitude0": np.array(TURNED)}),
+        ((start, 1.0), {"attitude": np.array(TURNED)}),
         ((range(1, 4), np.float32(1.0), None), {}),
         ((start, 1.0, [1.0, -0.2, 1.4, 1.0]), {}),
-        ((), {"t_end": 1.0, "omega0": start, "attitude0": iter(TURNED)}),
+        ((), {"t_end": 1.0, "omega": start, "attitude": iter(TURNED)}),
     ):
         found = solver(*arguments, **named)
         assert [each.shape for each in found] == [(3,), (4,)]
         assert np.abs(np.concatenate(found) - np.concatenate(usual)).max() < 1e-14
     for attitude0 in ((1.0, 0.0, 0.0), "1000"):
-        with pytest.raises(InputError, match="attitude0"):
+        with pytest.raises(InputError, match="attitude"):
             solver(start, 1.0, attitude0)
     for more, named in (((TURNED, 1.0), {}), ((), {"out": start})):
         with pytest.raises(TypeError, match="solver"):
@@ -192,7 +202,7 @@ def test_prepared_series_and_batches_rescale_omega_and_torque(factor: float, fra
         body = Scene("", omega, moments=(3.0, 2.0, 1.2), torque=law, attitude=q)
         end = 2.5 / scale
         alone, turned = prepare(body, "taylor", 1e-12, attitude=True)(tuple(omega), end, q)
-        many: Any = pyharness.solve_many(body, end, attitude0=[q], method="taylor", tolerance=1e-12)
+        many: Any = pyharness.solve_many(body, end, attitude=[q], method="taylor", tolerance=1e-12)
         return [np.array(alone) / scale, turned, many.omega[0] / scale, many.attitude[0]]
 
     for found, wanted in zip(states(factor), states(1.0), strict=True):

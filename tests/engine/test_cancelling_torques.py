@@ -57,7 +57,7 @@ def test_every_entry_point_is_right_or_says_that_it_is_not(kind: str, number: in
         many = solve_many([scene] * 3, _TIME, tolerance=tolerance)
         answers.append(("many", str(many.ended[1]), many.omega[1], None))
         many = solve_many(
-            bare, _TIME, omega0=starts, torque_constant=np.array([law.constant] * 3),
+            bare, _TIME, omega=starts, torque_constant=np.array([law.constant] * 3),
             sines=rows(law.sines), cosines=rows(law.cosines), tolerance=tolerance,
         )  # fmt: skip
         answers.append(("arrays", str(many.ended[1]), many.omega[1], None))

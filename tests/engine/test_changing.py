@@ -252,7 +252,7 @@ def test_every_entry_point_has_the_result_of_solve(kind: str) -> None:
     assert status[0] == status[2] == 0 != status[1]
     many = solve_many([case_scene(5), scene], [1.0, 7.0])
     assert many.omega[1] == pytest.approx(end, rel=1e-11)
-    many = solve_many(scene, [7.0, 7.0], omega0=[scene.omega, (1.0, 1.0, 1.0)])
+    many = solve_many(scene, [7.0, 7.0], omega=[scene.omega, (1.0, 1.0, 1.0)])
     assert many.omega[0] == pytest.approx(end, rel=1e-11)
     omega, attitude = prepare(scene, attitude=True)(scene.omega, 7.0)
     found: Any = solve(scene, 7.0, attitude=True)

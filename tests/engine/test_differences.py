@@ -20,7 +20,7 @@ def brake(t: Any, omega: Any, *, strong: float = 0.2, weak: float = 0.02) -> Any
 @pytest.mark.parametrize("reverse", [1, -1])
 def test_derivatives_through_a_jump_are_those_of_the_closed_form(reverse: int) -> None:
     scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
-    names = ["omega0", "torque.strong", "torque.weak", "moments"]
+    names = ["omega", "torque.strong", "torque.weak", "moments"]
     times = np.array([5.0, 12.0, 20.0])[::reverse]
     found = solve(scene, times, sensitivities=names)
     assert found.sensitivities is not None
@@ -28,7 +28,7 @@ def test_derivatives_through_a_jump_are_those_of_the_closed_form(reverse: int) -
     late = times > crossing
     # Later omega3 is 0.3 - weak (t - 2/strong)/I3, where the 2 is I3 (omega3(0) - 0.3).
     expected = {
-        "omega0": np.where(late, 0.02 / 0.2, 1.0),
+        "omega": np.where(late, 0.02 / 0.2, 1.0),
         "torque.strong": np.where(late, -0.02 * 0.5 / 0.2**2, -times / 4.0),
         "torque.weak": np.where(late, -(times - crossing) / 4.0, 0.0),
         "moments": np.where(late, 0.02 * times / 16.0, 0.2 * times / 16.0),
@@ -62,9 +62,9 @@ def test_derivatives_of_own_states() -> None:
 
     scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=law, states={"turned": 0.0})
     times = np.array([1.0, 4.0])
-    found = solve(scene, times, sensitivities=["omega0", "moments"], attitude=True)
+    found = solve(scene, times, sensitivities=["omega", "moments"], attitude=True)
     assert found.sensitivities is not None
-    slopes = found.sensitivities["omega0"]
+    slopes = found.sensitivities["omega"]
     assert slopes.shape == (2, 8, 3)
     frequency = math.sqrt(0.5)
     assert slopes[:, 7, 2] == pytest.approx(np.sin(frequency * times) / frequency, rel=1e-9)
@@ -75,7 +75,7 @@ def test_derivatives_of_own_states() -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["omega0", "attitude", "moments", "inertia", "torque.gain"])
+@pytest.mark.parametrize("name", ["omega", "attitude", "moments", "inertia", "torque.gain"])
 def test_differences_are_the_derivatives_where_no_switch_changes(name: str) -> None:
     def law(t: Any, omega: Any, q: Any, *, gain: float = 0.3) -> Any:
         return -gain * omega - 0.4 * q[1:]
@@ -120,6 +120,6 @@ def test_a_switch_that_is_only_touched_is_refused() -> None:
 
 def test_bodies_have_them_too() -> None:
     scene = Scene("brake", (0.0, 0.0, 0.8), MOMENTS, torque=brake)
-    found = solve_many(scene, 20.0, omega0=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega0"])
+    found = solve_many(scene, 20.0, omega=[(0, 0, 0.8), (0, 0, 0.7)], sensitivities=["omega"])
     assert found.sensitivities is not None
-    assert found.sensitivities["omega0"][:, 2, 2] == pytest.approx([0.1, 0.1], rel=1e-9)
+    assert found.sensitivities["omega"][:, 2, 2] == pytest.approx([0.1, 0.1], rel=1e-9)

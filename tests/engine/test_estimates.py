@@ -25,7 +25,7 @@ BODIES = {
     "constant": {"torque_constant": RNG.standard_normal((N, 3))},
     "waves": {"sines": RNG.standard_normal((N, 2, 4))},
 }
-ATTITUDE = {"attitude0": RNG.standard_normal((N, 4))}
+ATTITUDE = {"attitude": RNG.standard_normal((N, 4))}
 SCENES: dict[str, tuple[Scene, dict[str, Any]]] = {
     **{name: (BASE, own) for name, own in BODIES.items()},
     **{f"{name} with attitude": (BASE, own | ATTITUDE) for name, own in BODIES.items()},
@@ -39,7 +39,7 @@ SCENES: dict[str, tuple[Scene, dict[str, Any]]] = {
 
 def solved(name: str, tolerance: float = 1e-9, t_end: Any = 3.0, **more: Any) -> Any:
     scene, own = SCENES[name]
-    return MANY(scene, t_end, omega0=STARTS, tolerance=tolerance, **own, **more)
+    return MANY(scene, t_end, omega=STARTS, tolerance=tolerance, **own, **more)
 
 
 def largest(name: str) -> Array:
@@ -101,7 +101,7 @@ def test_growth_is_that_of_the_motion() -> None:
 def test_bodies_that_are_solved_alone_have_the_estimates_of_a_single_call() -> None:
     # The exact middle axis, and a time of 0, are left by the kernel for many bodies.
     starts = np.array([[0.0, 2.0, 0.0], [1e-9, 2.0, 1e-9]])
-    found = MANY(BASE, [3.0, 0.0], omega0=starts, tolerance=1e-12, estimates=True)
+    found = MANY(BASE, [3.0, 0.0], omega=starts, tolerance=1e-12, estimates=True)
     solver = prepare(BASE, tolerance=1e-12)
     for i, time in enumerate((3.0, 0.0)):
         solver(starts[i], time)
@@ -112,11 +112,11 @@ def test_bodies_that_are_solved_alone_have_the_estimates_of_a_single_call() -> N
 
 def test_unknown_estimates_are_nan() -> None:
     starts = np.array([[0.3, 0.2, 0.1], [np.nan, 1.0, 1.0]])
-    found = MANY(BASE, 1.0, omega0=starts, estimates=True)
+    found = MANY(BASE, 1.0, omega=starts, estimates=True)
     assert np.isnan(found.estimates).tolist() == [[False, False], [True, True]]
-    found = MANY(DAMPED, 1.0, omega0=starts, estimates=True)
+    found = MANY(DAMPED, 1.0, omega=starts, estimates=True)
     assert np.isnan(found.estimates).tolist() == [[False, False], [True, True]]
-    found = MANY(BASE, 1.0, omega0=starts, method="rk4", estimates=True)
+    found = MANY(BASE, 1.0, omega=starts, method="rk4", estimates=True)
     assert np.isnan(found.error).all()
 
 

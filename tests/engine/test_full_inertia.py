@@ -147,7 +147,7 @@ def test_many_matrices_have_the_principal_axes_of_each(shape: str, apart: float)
     waves[:, 1, 3] = 5.0
     given = {
         "inertia": matrices, "torque_constant": torques, "torque_rate": rows, "sines": waves,
-        "cosines": [], "omega0": (1.0, 2.0, 3.0),
+        "cosines": [], "omega": (1.0, 2.0, 3.0),
     }  # fmt: skip
     found, axes = about_principal(given)
     for n, matrix in enumerate(matrices.tolist()):
@@ -190,7 +190,7 @@ def test_a_needle_beyond_double_double_in_an_array() -> None:
     law = TorqueLaw((1.0, 2.0, 3.0))
     scene, axes = principal(Scene("", (1.0, 2.0, 3.0), inertia=matrix, torque=law))
     given = {"inertia": [matrix], "torque_constant": law.constant, "torque_rate": law.rate}
-    found, own = about_principal({**given, "sines": [], "cosines": [], "omega0": scene.omega})
+    found, own = about_principal({**given, "sines": [], "cosines": [], "omega": scene.omega})
     assert found["coefficients"][0] == pytest.approx(scene.euler_coefficients, rel=4e-16)
     assert found["torque_constant"][0] * scene.moments == pytest.approx(scene.law.constant)
     assert own.axes[0] == pytest.approx(axes, rel=1e-15)

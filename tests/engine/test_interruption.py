@@ -64,14 +64,14 @@ def _linear() -> object:
 def _many(program: str, threads: int) -> object:
     starts = np.full((64, 3), BUSY.omega)
     return run_many(
-        BUSY, Listing.corrected(program), omega0=starts, may_stop=False, threads=threads, effort=1e9
+        BUSY, Listing.corrected(program), omega=starts, may_stop=False, threads=threads, effort=1e9
     )
 
 
 def _bodies(method: str, threads: int) -> object:
     starts = np.full((2000, 3), PUSHED.omega)
     return solve_many(
-        PUSHED, 1e6, omega0=starts, method=method, step=1e-4, threads=threads, effort=1e6
+        PUSHED, 1e6, omega=starts, method=method, step=1e-4, threads=threads, effort=1e6
     )
 
 

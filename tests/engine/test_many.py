@@ -51,7 +51,7 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
     drawn = bodies(kind, 60, 1982)
     found = solve_many(TOP, tolerance=tolerance, **drawn)
     truth = truths(kind, 60, 1982)
-    scale = np.maximum(np.abs(truth).max(axis=1), np.abs(drawn["omega0"]).max(axis=1))
+    scale = np.maximum(np.abs(truth).max(axis=1), np.abs(drawn["omega"]).max(axis=1))
     off = np.abs(found.omega - truth).max(axis=1) / scale
     assert np.count_nonzero(np.isfinite(off)) > 50
     assert np.nanmax(off) <= tolerance + 4e-12
@@ -59,7 +59,7 @@ def test_the_tolerance_holds(kind: str, tolerance: float, level: int) -> None:
     # The results come from lanes: one by one they would have the single solver's bits.
     alone = [prepare(scene_of(drawn, row), tolerance=tolerance) for row in range(20)]
     same = [
-        np.array_equal(solver(drawn["omega0"][row], drawn["t_end"][row]), found.omega[row])
+        np.array_equal(solver(drawn["omega"][row], drawn["t_end"][row]), found.omega[row])
         for row, solver in enumerate(alone)
     ]
     assert np.count_nonzero(same) < 10
@@ -78,7 +78,7 @@ def test_the_tolerance_holds_where_the_motion_magnifies_errors(tolerance: float)
     rate = np.sqrt((middle - least) * (largest - middle) / (least * largest))
     drawn = {
         "moments": np.column_stack([least, middle, largest]),
-        "omega0": omega0,
+        "omega": omega0,
         "t_end": np.minimum(rng.uniform(2.0, 16.0, n) / np.maximum(rate, 0.05), 60.0),
         "torque_constant": 1e-6 * moments * rng.standard_normal((n, 3)),
     }
@@ -99,7 +99,7 @@ def test_fixed_steps_are_those_of_the_single_method(
     starts, moments = rng.standard_normal((90, 3)), rng.uniform(1.0, 3.0, (90, 3))
     scene = replace(TOP, torque=TorqueLaw(torque), step_size=0.07)
     for t_end in (2.1, -1.0, 0.01):
-        found = solve_many(scene, t_end, omega0=starts, moments=moments, method=method)
+        found = solve_many(scene, t_end, omega=starts, moments=moments, method=method)
         assert found.has_result.all()
         for start, body, omega in zip(starts, moments, found.omega, strict=True):
             alone = prepare(replace(scene, moments=body), method)(start, t_end)
@@ -114,7 +114,7 @@ def test_many_bodies_are_those_of_the_prepared_solver(method: str) -> None:
     scene = replace(TOP, torque=law, step_size=0.05)
     tolerance = None if method in FIXED_STEP else 1e-7
     found = solve_many(
-        scene, 2.0, omega0=starts, moments=moments, method=method, tolerance=tolerance
+        scene, 2.0, omega=starts, moments=moments, method=method, tolerance=tolerance
     )
     assert found.has_result.all()
     for start, body, omega in zip(starts, moments, found.omega, strict=True):
@@ -132,7 +132,7 @@ def test_kernels_refuse_a_method_that_they_do_not_have() -> None:
             solver = prepare(scene, "rk4")
             assert np.isnan(solver(scene.omega, 1.0)).all()
             assert solver.status == "refused"
-            found = solve_many(scene, 1.0, omega0=np.ones((40, 3)), method="rk4")
+            found = solve_many(scene, 1.0, omega=np.ones((40, 3)), method="rk4")
             assert not found.has_result.any()
     rows = extension().fixed_step_solution(
         *normalized(scene), scene.omega, [1.0], 99, 0.1, effort=np.array([1.0, 0.0])
@@ -162,7 +162,7 @@ def test_bodies_on_edges_and_near_the_ends_of_the_range() -> None:
     edges = [*EDGES, (large, (3.0, 2.0, 1.0)), (small, (3.0, 2.0, 1.0))]
     omega0, moments = (np.array(each) for each in zip(*edges, strict=True))
     for t_end in (0.0, 1.0, 1e4):
-        found = solve_many(TOP, t_end, omega0=omega0, moments=moments)
+        found = solve_many(TOP, t_end, omega=omega0, moments=moments)
         for row, (start, body) in enumerate(edges):
             alone = prepare(replace(TOP, moments=body))(start, t_end)
             allowed = 1e-12 * np.nan_to_num(np.abs(alone).max())
@@ -194,7 +194,7 @@ def test_coefficients_of_one_sign(level: int) -> None:
             solver = prepare(scene, method)
             alone = np.array([solver(start, 0.5) for start in starts])
             bodies_too = solve_many(
-                TOP, 0.5, omega0=starts, coefficients=coefficients, method=method, step=0.05
+                TOP, 0.5, omega=starts, coefficients=coefficients, method=method, step=0.05
             )
             for found in (solver.many(starts, 0.5)[0], bodies_too.omega):
                 assert np.allclose(found, alone, rtol=0, atol=allowed * np.abs(alone).max())
@@ -214,23 +214,23 @@ def test_the_campaign_finds_what_exceeds() -> None:
 
 
 def test_no_bodies() -> None:
-    assert solve_many(TOP, 1.0, omega0=np.empty((0, 3))).omega.shape == (0, 3)
+    assert solve_many(TOP, 1.0, omega=np.empty((0, 3))).omega.shape == (0, 3)
     assert prepare(TOP).many(np.empty((0, 3)), 1.0)[0].shape == (0, 3)
 
 
 def test_results_go_where_the_caller_says() -> None:
     starts = np.random.default_rng(1).standard_normal((20000, 3))
-    first = solve_many(TOP, 1.0, omega0=starts)
+    first = solve_many(TOP, 1.0, omega=starts)
     array = np.empty((20000, 3))
-    assert solve_many(TOP, 1.0, omega0=starts, out=array).omega is array
+    assert solve_many(TOP, 1.0, omega=starts, out=array).omega is array
     assert prepare(TOP).many(starts, 1.0, out=array)[0] is array
     tracemalloc.start()
-    again = solve_many(TOP, 2.0, omega0=starts, out=first)
+    again = solve_many(TOP, 2.0, omega=starts, out=first)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert again is first
     assert peak < 20000  # bytes: no object for each body
-    assert np.array_equal(again.omega, solve_many(TOP, 2.0, omega0=starts).omega)
+    assert np.array_equal(again.omega, solve_many(TOP, 2.0, omega=starts).omega)
 
 
 @pytest.mark.parametrize("law", [TorqueLaw(), TorqueLaw((1.0, 2.0, 3.0))])
@@ -251,11 +251,11 @@ def test_results_may_overlap_the_starts(law: TorqueLaw) -> None:
         assert out.tobytes() == omega.tobytes()
         assert found[1].tobytes() == status.tobytes()
     place = starts.copy()
-    whole = solve_many(scene, times, omega0=starts)
-    assert same(solve_many(scene, times, omega0=place, out=place), whole)
-    wanted: Any = solve_many(scene, times, omega0=starts, attitude0=turns)
+    whole = solve_many(scene, times, omega=starts)
+    assert same(solve_many(scene, times, omega=place, out=place), whole)
+    wanted: Any = solve_many(scene, times, omega=starts, attitude=turns)
     both = Ensemble(starts.copy(), np.empty(20, np.int8), turns)
-    assert solve_many(scene, times, omega0=both.omega, attitude0=turns, out=both) is both
+    assert solve_many(scene, times, omega=both.omega, attitude=turns, out=both) is both
     assert same(both, wanted)
     assert np.array_equal(turns, wanted.attitude)
     read_only = np.zeros((20, 3))
@@ -297,11 +297,11 @@ def by_loops(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, ...]]:
         omega, attitude, status = loops(
             method, tolerance, 0.001, drawn["moments"], drawn["torque_constant"],
             drawn.get("torque_rate", zero), drawn.get("sines", np.empty((50, 0, 4))),
-            drawn["omega0"], drawn["t_end"], attitude0,
+            drawn["omega"], drawn["t_end"], attitude0,
         )  # fmt: skip
         drawn.pop("cosines", None)
         if not method:
-            drawn["attitude0"] = attitude0
+            drawn["attitude"] = attitude0
         if method:
             drawn["t_end"] = 0.02
         solved.append(("rk4" if method else "taylor", tolerance, drawn, omega, attitude, status))
@@ -345,13 +345,13 @@ def test_a_scene_and_the_same_arrays_have_the_same_bits(torque: TorqueLaw) -> No
         "sines": np.array([[*amplitude, f] for amplitude, f in torque.sines]),
         "cosines": np.array([[*amplitude, f] for amplitude, f in torque.cosines]),
     }
-    first = solve_many(scene, 3.0, omega0=starts)
-    assert same(solve_many(scene, 3.0, omega0=starts), first)
+    first = solve_many(scene, 3.0, omega=starts)
+    assert same(solve_many(scene, 3.0, omega=starts), first)
     for name, array in arrays.items():
-        assert same(solve_many(scene, 3.0, omega0=starts, **{name: array}), first), name
-    other = solve_many(scene, 3.0, omega0=starts, torque_constant=(3.0, 1.0, 1.0))
+        assert same(solve_many(scene, 3.0, omega=starts, **{name: array}), first), name
+    other = solve_many(scene, 3.0, omega=starts, torque_constant=(3.0, 1.0, 1.0))
     assert not same(other, first)
-    assert same(solve_many(scene, 3.0, omega0=starts), first)
+    assert same(solve_many(scene, 3.0, omega=starts), first)
 
 
 def test_equal_scenes_with_other_zeros_keep_their_signs() -> None:
@@ -372,13 +372,13 @@ def test_the_arrays_of_few_scenes_are_kept() -> None:
 def test_one_attitude_for_all_and_arrays_of_the_caller() -> None:
     starts = np.random.default_rng(1).standard_normal((30, 3))
     turned = [0.5, -0.5, 0.5, 0.5]
-    each: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=np.tile(turned, (30, 1)))
-    out: Any = solve_many(TOP, 1.0, omega0=starts, attitude0=turned)
-    shared: Any = solve_many(TOP, 3.0, omega0=starts, attitude0=turned, out=out)
+    each: Any = solve_many(TOP, 3.0, omega=starts, attitude=np.tile(turned, (30, 1)))
+    out: Any = solve_many(TOP, 1.0, omega=starts, attitude=turned)
+    shared: Any = solve_many(TOP, 3.0, omega=starts, attitude=turned, out=out)
     assert shared is out
     assert np.array_equal(shared.attitude, each.attitude)
     scene = replace(TOP, attitude=(0.5, -0.5, 0.5, 0.5))
-    assert np.array_equal(solve_many(scene, 3.0, omega0=starts).omega, each.omega)
+    assert np.array_equal(solve_many(scene, 3.0, omega=starts).omega, each.omega)
 
 
 def test_a_prepared_solver_takes_many_starts() -> None:
@@ -389,13 +389,13 @@ def test_a_prepared_solver_takes_many_starts() -> None:
     for body, law in ((TOP, laws[0]), (TOP, laws[1]), (TOP, laws[2]), (full, laws[1])):
         scene = replace(body, torque=law, attitude=(0.5, 0.5, 0.5, -0.5))
         many = prepare(scene, tolerance=1e-9, attitude=True).many
-        found: Any = solve_many(scene, 2.0, omega0=starts, attitude0=attitudes, tolerance=1e-9)
+        found: Any = solve_many(scene, 2.0, omega=starts, attitude=attitudes, tolerance=1e-9)
         omega, attitude, status = many(starts, 2.0, attitudes, threads=2)
         assert np.allclose(omega, found.omega, rtol=0.0, atol=1e-8)
         assert np.allclose(attitude, found.attitude, rtol=0.0, atol=1e-9)
         assert np.array_equal(omega, found.omega) or body is full
         assert not status.any()
-        usual: Any = solve_many(scene, 2.0, omega0=starts, tolerance=1e-9)
+        usual: Any = solve_many(scene, 2.0, omega=starts, tolerance=1e-9)
         assert np.allclose(many(starts, 2.0)[1], usual.attitude, rtol=0.0, atol=1e-9)
 
 
@@ -425,11 +425,11 @@ def test_a_bad_attitude_spoils_no_other_of_a_prepared_solver(torque: Any) -> Non
 @pytest.mark.parametrize(
     "given",
     [
-        {"omega0": np.ones((5, 2))},
-        {"omega0": "abc"},
-        {"omega0": [10**400, 1, 1]},
-        {"omega0": [[1.0, 2.0, 3.0], [1.0]]},
-        {"omega0": np.ones((4, 3)), "moments": np.ones((3, 3))},
+        {"omega": np.ones((5, 2))},
+        {"omega": "abc"},
+        {"omega": [10**400, 1, 1]},
+        {"omega": [[1.0, 2.0, 3.0], [1.0]]},
+        {"omega": np.ones((4, 3)), "moments": np.ones((3, 3))},
         {"moments": [1.0, 1, 1], "coefficients": [1.0, 1, 1]},
         {"threads": 0},
         {"effort": 0.0},
@@ -441,9 +441,9 @@ def test_mistake_has_the_same_words_for_methods_and_programs(given: dict[str, An
     with pytest.raises(InputError) as second:
         run_many(TOP, LISTING, **given)
     assert str(first.value) == str(second.value)
-    if given.keys() == {"omega0"}:
+    if given.keys() == {"omega"}:
         with pytest.raises(InputError) as third:
-            prepare(TOP).many(given["omega0"], 1.0)
+            prepare(TOP).many(given["omega"], 1.0)
         assert str(first.value) == str(third.value)
 
 
@@ -451,10 +451,10 @@ def test_one_row_is_shared_and_fractions_are_numbers() -> None:
     starts = np.ones((4, 3))
     moments: Any = [[Fraction(5, 2), 3, 4]]
     times = np.full(4, 0.5)
-    found = solve_many(TOP, times, omega0=starts[:1], moments=moments)
-    wanted = solve_many(TOP, times, omega0=starts, moments=np.tile([2.5, 3.0, 4.0], (4, 1)))
+    found = solve_many(TOP, times, omega=starts[:1], moments=moments)
+    wanted = solve_many(TOP, times, omega=starts, moments=np.tile([2.5, 3.0, 4.0], (4, 1)))
     assert np.array_equal(found.omega, wanted.omega)
     sizes = np.full(4, 0.01)
-    run = run_many(TOP, LISTING, omega0=starts[:1], moments=moments, step_size=sizes)
-    alone = run_many(TOP, LISTING, omega0=starts[0], moments=[2.5, 3.0, 4.0], step_size=0.01)
+    run = run_many(TOP, LISTING, omega=starts[:1], moments=moments, step_size=sizes)
+    alone = run_many(TOP, LISTING, omega=starts[0], moments=[2.5, 3.0, 4.0], step_size=0.01)
     assert np.array_equal(run.omega, np.tile(alone.omega, (4, 1, 1)))

@@ -30,7 +30,7 @@ def test_no_bit_depends_on_other_bodies(method: str, level: int) -> None:
 @pytest.mark.parametrize("tolerance", [1e-14, 1e-6])
 def test_no_bit_depends_on_other_bodies_with_attitudes_or_many_waves(tolerance: float) -> None:
     drawn = mixed(200, 8)
-    drawn["attitude0"] = np.random.default_rng(1).standard_normal((200, 4))
+    drawn["attitude"] = np.random.default_rng(1).standard_normal((200, 4))
     assert differing(drawn, 2, alone=20, tolerance=tolerance, effort=1e-4) == {}
     drawn = mixed(200, 9, waves=9)  # some bodies have more than 16 waves, which lanes do not take
     assert differing(drawn, 3, alone=20, tolerance=tolerance, effort=1e-4) == {}
@@ -40,26 +40,26 @@ def test_no_bit_depends_on_other_bodies_with_attitudes_or_many_waves(tolerance: 
 def test_threads_change_no_bit(attitude: bool) -> None:
     drawn = mixed(601, 11)
     if attitude:
-        drawn["attitude0"] = np.random.default_rng(5).standard_normal((601, 4))
+        drawn["attitude"] = np.random.default_rng(5).standard_normal((601, 4))
     whole = solve_many(BASE, tolerance=1e-6, effort=1e-4, **drawn)
     for threads in (2, 7):
         dealt = solve_many(BASE, tolerance=1e-6, effort=1e-4, threads=threads, **drawn)
         assert same_bits(whole, dealt).all()
 
 
-@pytest.mark.parametrize("bad", ["moments", "omega0", "attitude0", "torque_constant", "t_end"])
+@pytest.mark.parametrize("bad", ["moments", "omega", "attitude", "torque_constant", "t_end"])
 @pytest.mark.parametrize("attitude", [False, True])
 def test_a_bad_body_spoils_no_other(bad: str, attitude: bool, level: int) -> None:
     rng = np.random.default_rng(8)
     drawn: dict[str, Any] = {
-        "moments": rng.uniform(2.0, 3.0, (40, 3)), "omega0": rng.standard_normal((40, 3)),
+        "moments": rng.uniform(2.0, 3.0, (40, 3)), "omega": rng.standard_normal((40, 3)),
         "torque_constant": rng.standard_normal((40, 3)), "t_end": np.full(40, 2.0),
     }  # fmt: skip
-    if attitude or bad == "attitude0":
-        drawn["attitude0"] = rng.standard_normal((40, 4))
+    if attitude or bad == "attitude":
+        drawn["attitude"] = rng.standard_normal((40, 4))
     wrong = {
-        "moments": (0.0, -2.0, np.nan), "omega0": (np.nan, np.inf, 1e300), "t_end": (np.inf,),
-        "attitude0": (np.nan, 0.0), "torque_constant": (np.nan,),
+        "moments": (0.0, -2.0, np.nan), "omega": (np.nan, np.inf, 1e300), "t_end": (np.inf,),
+        "attitude": (np.nan, 0.0), "torque_constant": (np.nan,),
     }  # fmt: skip
     for torque in (drawn["torque_constant"], np.zeros((40, 3))):
         drawn["torque_constant"] = torque
@@ -81,9 +81,9 @@ def test_a_bad_body_spoils_no_other(bad: str, attitude: bool, level: int) -> Non
 
 def test_the_norm_of_an_attitude_may_be_any() -> None:
     turns = np.random.default_rng(8).standard_normal((40, 4))
-    good: Any = solve_many(TOP, 2.0, tolerance=1e-9, attitude0=turns)
+    good: Any = solve_many(TOP, 2.0, tolerance=1e-9, attitude=turns)
     found: Any = solve_many(
-        TOP, 2.0, tolerance=1e-9, attitude0=turns * np.logspace(-200, 200, 40)[:, None]
+        TOP, 2.0, tolerance=1e-9, attitude=turns * np.logspace(-200, 200, 40)[:, None]
     )
     assert found.has_result.all()
     assert angle_between(found.attitude, good.attitude).max() <= 1e-9
@@ -108,9 +108,9 @@ def test_no_bit_of_a_prepared_solver_depends_on_other_starts(
 def test_a_torque_elsewhere_takes_no_body_off_the_closed_form() -> None:
     starts = np.random.default_rng(2).standard_normal((500, 3))
     torque = np.zeros((500, 3))
-    free = solve_many(TOP, 1e4, omega0=starts)
+    free = solve_many(TOP, 1e4, omega=starts)
     torque[250] = [1.0, 0.0, 0.0]
-    found = solve_many(TOP, 1e4, omega0=starts, torque_constant=torque, effort=1e-3)
+    found = solve_many(TOP, 1e4, omega=starts, torque_constant=torque, effort=1e-3)
     others = np.arange(500) != 250
     assert same_bits(free, Ensemble(found.omega[others], found.status[others]), others).all()
     assert found.status[250] == Statuses.GAVE_UP
@@ -121,11 +121,11 @@ def test_waves_without_amplitude_are_none() -> None:
     torque = np.tile([1.0, 0.5, 0.0], (40, 1))
     waves = np.zeros((40, 20, 4))
     waves[:, :, 3] = 1e9
-    bare = solve_many(TOP, 2.0, omega0=starts, torque_constant=torque)
-    idle = solve_many(TOP, 2.0, omega0=starts, torque_constant=torque, sines=waves, cosines=waves)
+    bare = solve_many(TOP, 2.0, omega=starts, torque_constant=torque)
+    idle = solve_many(TOP, 2.0, omega=starts, torque_constant=torque, sines=waves, cosines=waves)
     assert same_bits(bare, idle).all()
     waves[3, 4, 3] = np.nan
-    spoilt = solve_many(TOP, 2.0, omega0=starts, torque_constant=torque, sines=waves)
+    spoilt = solve_many(TOP, 2.0, omega=starts, torque_constant=torque, sines=waves)
     assert np.flatnonzero(~same_bits(bare, spoilt)).tolist() == [3]
     assert spoilt.status[3] == Statuses.REFUSED
 
@@ -142,7 +142,7 @@ def unstable(n: int, seed: int, with_torque: bool) -> dict[str, Any]:
     beside = 10.0 ** rng.uniform(-14.0, -1.0, (n, 1)) * rng.standard_normal((n, 3))
     times = 10.0 ** rng.uniform(-0.3, 2.0, n) * rng.choice([-1.0, 1.0], n)
     return {
-        "moments": moments, "omega0": omega + beside, "torque_constant": torque, "t_end": times,
+        "moments": moments, "omega": omega + beside, "torque_constant": torque, "t_end": times,
     }  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def test_statuses_are_those_of_a_single_solver(with_torque: bool, tolerance: flo
             solver(scene.omega, time)
             statuses.append(solver.status)
         if attitude:
-            drawn["attitude0"] = np.tile(IDENTITY, (100, 1))
+            drawn["attitude"] = np.tile(IDENTITY, (100, 1))
         found = solve_many(BASE, tolerance=tolerance, effort=1e-2, **drawn)
         assert found.ended.tolist() == statuses
         assert "sensitive" in statuses or tolerance == 1e-3
@@ -173,7 +173,7 @@ def test_collocation_says_sensitive_where_a_single_solver_does() -> None:
     starts = np.array([[1e-9, 1.0, 0.0], [0.3, -0.4, 1.2]])
     for law in (TorqueLaw(), TorqueLaw((1e-3, 0.0, 0.0))):
         scene = replace(TOP, torque=law, step_size=0.05)
-        found = solve_many(scene, 25.0, omega0=starts, method="gauss-4", tolerance=1e-12)
+        found = solve_many(scene, 25.0, omega=starts, method="gauss-4", tolerance=1e-12)
         solver = prepare(scene, "gauss-4", 1e-12)
         for row, start in enumerate(starts):
             solver(start, 25.0)
@@ -219,7 +219,7 @@ def test_the_bound_of_the_growth_is_above_the_growth() -> None:
         growth = extension().torque_free_growth(scene.euler_coefficients, start, t_end)
         for tolerance in (1e-14, 1e-12, 1e-10):
             limit = 0.3 * tolerance / ROUNDING
-            found = solve_many(scene, t_end, tolerance=tolerance, omega0=start)
+            found = solve_many(scene, t_end, tolerance=tolerance, omega=start)
             if growth > 0.0 and found.has_result[0]:
                 assert (found.ended[0] == "sensitive") == (growth > limit)
 
@@ -243,7 +243,7 @@ def test_arrays_of_full_inertia_matrices_are_those_of_scenes(law: TorqueLaw) -> 
     for row, scene in enumerate(scenes):
         assert same_bits(found, solve_many([scene], 2.0), [row]).all()
     arrays = solve_many(
-        BASE, 2.0, omega0=starts, inertia=np.array(matrices), attitude0=attitudes,
+        BASE, 2.0, omega=starts, inertia=np.array(matrices), attitude=attitudes,
         torque_constant=law.constant, torque_rate=law.rate,
         sines=[[*amplitude, frequency] for amplitude, frequency in law.sines] or None,
     )  # fmt: skip
@@ -251,7 +251,7 @@ def test_arrays_of_full_inertia_matrices_are_those_of_scenes(law: TorqueLaw) -> 
         assert array is not None
         assert wanted is not None
         assert np.allclose(array, wanted[::2], rtol=0, atol=1e-13)
-    shared = solve_many(full[0], 2.0, omega0=starts, out=solve_many(full[0], 2.0, omega0=starts))
+    shared = solve_many(full[0], 2.0, omega=starts, out=solve_many(full[0], 2.0, omega=starts))
     for row, start in enumerate(starts):
         truth = solve(replace(full[0], omega=start), [2.0])
         assert np.allclose(shared.omega[row], truth.omega[-1], rtol=0, atol=1e-10)
@@ -262,7 +262,7 @@ def test_arrays_of_torques_in_space_are_those_of_scenes() -> None:
     starts, attitudes = rng.standard_normal((5, 3)), rng.standard_normal((5, 4))
     torques = rng.standard_normal((5, 3))
     scene = replace(TOP, torque=TorqueLaw((1.0, 0.5, 2.0), frame="space"))
-    found = solve_many(scene, 1.5, omega0=starts, attitude0=attitudes, torque_constant=torques)
+    found = solve_many(scene, 1.5, omega=starts, attitude=attitudes, torque_constant=torques)
     scenes = [
         replace(scene, omega=start, attitude=turn, torque=TorqueLaw(torque, frame="space"))
         for start, turn, torque in zip(starts, attitudes, torques, strict=True)
@@ -274,7 +274,7 @@ def test_arrays_of_torques_in_space_are_those_of_scenes() -> None:
         assert same_bits(listed, solve_many([each], 1.5), [row]).all()
     assert np.array_equal(found.omega, listed.omega[:5])
     starts[1] = np.nan
-    spoilt = solve_many(scene, 1.5, omega0=starts, attitude0=attitudes, torque_constant=torques)
+    spoilt = solve_many(scene, 1.5, omega=starts, attitude=attitudes, torque_constant=torques)
     assert np.flatnonzero(~spoilt.has_result).tolist() == [1]
 
 

@@ -25,17 +25,17 @@ TIMES = RNG.uniform(2.0, 6.0, N)
 MATRIX: Any = ((3.0, 0.1, 0.1), (0.1, 2.0, 0.1), (0.1, 0.1, 1.0))
 LAW = TorqueLaw((0.1, 0.2, 0.0), sines=[((0.1, 0.0, 0.2), 1.5)])
 CASES: dict[str, tuple[Scene, dict[str, Any], list[str]]] = {
-    "free": (TOP, {"moments": RNG.uniform(2.0, 3.0, (N, 3))}, ["omega0", "moments"]),
+    "free": (TOP, {"moments": RNG.uniform(2.0, 3.0, (N, 3))}, ["omega", "moments"]),
     "law": (replace(TOP, torque=LAW), {}, ["torque.constant", "torque.sines"]),
     "constants": (
-        replace(TOP, torque=LAW), {"torque_constant": RNG.standard_normal((N, 3))}, ["omega0"],
+        replace(TOP, torque=LAW), {"torque_constant": RNG.standard_normal((N, 3))}, ["omega"],
     ),
     "coefficients": (TOP, {"coefficients": [[0.3, -0.5, 0.2]]}, ["coefficients"]),
-    "inertia": (TOP, {"inertia": MATRIX, "attitude0": TURNS}, ["inertia", "attitude"]),
+    "inertia": (TOP, {"inertia": MATRIX, "attitude": TURNS}, ["inertia", "attitude"]),
     "in space": (
-        replace(TOP, torque=replace(LAW, frame="space")), {"attitude0": TURNS}, ["attitude"],
+        replace(TOP, torque=replace(LAW, frame="space")), {"attitude": TURNS}, ["attitude"],
     ),
-    "damped": (replace(TOP, torque=damping(0.1)), {}, ["omega0"]),
+    "damped": (replace(TOP, torque=damping(0.1)), {}, ["omega"]),
     "body no longer changing": (
         replace(TOP, moments=None, changing=ChangingMoments([[4.0, 0.1], [3.0], [2.0]])),
         {"moments": [4.0, 3.0, 2.0]}, ["moments"],
@@ -52,10 +52,10 @@ def small(t: Any, omega: Any) -> Any:
 def test_details_are_those_of_single_calls(name: str) -> None:
     scene, own, names = CASES[name]
     found = MANY(
-        scene, TIMES, omega0=STARTS, tolerance=1e-10, events=[flip(1), small],
+        scene, TIMES, omega=STARTS, tolerance=1e-10, events=[flip(1), small],
         sensitivities=names, **own,
     )  # fmt: skip
-    plain = solve_many(scene, TIMES, omega0=STARTS, tolerance=1e-10, **own)
+    plain = solve_many(scene, TIMES, omega=STARTS, tolerance=1e-10, **own)
     assert found.omega.tobytes() == plain.omega.tobytes()
     assert found.status.tobytes() == plain.status.tobytes()
     assert found.refusals == {}
@@ -64,11 +64,11 @@ def test_details_are_those_of_single_calls(name: str) -> None:
     if "inertia" in rows:
         rows["inertia"] = np.array([MATRIX])
     if attitude:
-        rows["attitude0"] = unit_quaternions(rows["attitude0"])
+        rows["attitude"] = unit_quaternions(rows["attitude"])
     base = replace(scene, changing=None, moments=TOP.moments) if scene.changing else scene
     some = 0
     for i in range(N):
-        one = scene_of_row(base, {**rows, "omega0": STARTS}, i)
+        one = scene_of_row(base, {**rows, "omega": STARTS}, i)
         alone: Any = solve(
             one, float(TIMES[i]), tolerance=1e-10, attitude=attitude, events=[flip(1), small],
             sensitivities=names,
@@ -89,18 +89,18 @@ def test_sequences_of_scenes() -> None:
         replace(TOP, moments=None, inertia=MATRIX),
         replace(TOP, torque=damping(0.1)),
     ]
-    found = MANY(scenes, [1.0, 2.0, 9.0], events=flip(2), sensitivities=["omega0"])
+    found = MANY(scenes, [1.0, 2.0, 9.0], events=flip(2), sensitivities=["omega"])
     for i, (scene, time) in enumerate(zip(scenes, (1.0, 2.0, 9.0), strict=True)):
-        alone: Any = solve(scene, time, events=flip(2), sensitivities=["omega0"])
+        alone: Any = solve(scene, time, events=flip(2), sensitivities=["omega"])
         assert np.array_equal(found.t_events[0][i], alone.t_events[0])
-        assert np.array_equal(found.sensitivities["omega0"][i], alone.sensitivities["omega0"][0])
+        assert np.array_equal(found.sensitivities["omega"][i], alone.sensitivities["omega"][0])
 
 
 def test_a_body_without_result_has_no_details() -> None:
     moments = np.array([[4.0, 3.0, 2.0], [4.0, -3.0, 2.0], [4.0, 3.0, 2.0]])
     starts = [STARTS[0], STARTS[1], (np.inf, 0.0, 0.0)]
     found = MANY(
-        TOP, 5.0, omega0=starts, moments=moments, events=small, sensitivities=["moments"]
+        TOP, 5.0, omega=starts, moments=moments, events=small, sensitivities=["moments"]
     )  # fmt: skip
     assert found.status[1] == Statuses.REFUSED
     assert found.t_events[0][0] is not None
@@ -116,33 +116,33 @@ def test_a_refused_body_has_its_reason_and_no_influence() -> None:
         return np.where(np.asarray(omega[2]) > 5.0, np.nan, omega[0])
 
     starts = np.array([STARTS[0], (0.1, 0.2, 6.0), STARTS[1]])
-    found = MANY(TOP, 1.0, omega0=starts, events=wrong, sensitivities=["omega0"])
+    found = MANY(TOP, 1.0, omega=starts, events=wrong, sensitivities=["omega"])
     assert list(found.refusals) == [1]
     assert "the function returned nan" in found.refusals[1]
     assert found.has_result.all()
     assert [each is None for each in found.t_events[0]] == [False, True, False]
-    assert np.isnan(found.sensitivities["omega0"]).any(axis=(1, 2)).tolist() == [False, True, False]
+    assert np.isnan(found.sensitivities["omega"]).any(axis=(1, 2)).tolist() == [False, True, False]
 
 
 def test_results_may_be_written_over_the_starts() -> None:
     starts, turns = STARTS.copy(), TURNS.copy()
-    found = MANY(TOP, 3.0, omega0=starts, attitude0=turns, sensitivities=["omega0"], events=flip(1))
+    found = MANY(TOP, 3.0, omega=starts, attitude=turns, sensitivities=["omega"], events=flip(1))
     again = MANY(
-        TOP, 3.0, omega0=starts, attitude0=turns, sensitivities=["omega0"], events=flip(1),
+        TOP, 3.0, omega=starts, attitude=turns, sensitivities=["omega"], events=flip(1),
         out=replace(found, omega=starts, attitude=turns),
     )  # fmt: skip
     assert again.omega is starts
-    assert np.array_equal(again.sensitivities["omega0"], found.sensitivities["omega0"])
+    assert np.array_equal(again.sensitivities["omega"], found.sensitivities["omega"])
     assert all(map(np.array_equal, again.t_events[0], found.t_events[0]))
-    plain = MANY(TOP, 2.0, omega0=STARTS, attitude0=TURNS, out=again)
+    plain = MANY(TOP, 2.0, omega=STARTS, attitude=TURNS, out=again)
     assert plain.omega is starts
     assert plain.t_events is plain.y_events is plain.sensitivities is plain.refusals is None
 
 
 def test_no_bodies() -> None:
-    found = MANY(TOP, 1.0, omega0=np.empty((0, 3)), events=flip(1), sensitivities=["omega0"])
+    found = MANY(TOP, 1.0, omega=np.empty((0, 3)), events=flip(1), sensitivities=["omega"])
     assert found.t_events == found.y_events == [[]]
-    assert len(found.sensitivities["omega0"]) == 0
+    assert len(found.sensitivities["omega"]) == 0
 
 
 @pytest.mark.parametrize("given", [{"events": crosses(1, 0.1, terminal=True)},
@@ -150,12 +150,12 @@ def test_no_bodies() -> None:
 def test_mistakes_are_refused_before_any_body_is_solved(given: dict[str, Any]) -> None:
     out = np.full((N, 3), 7.0)
     with pytest.raises(InputError):
-        MANY(TOP, 1.0, omega0=STARTS, out=out, **given)
+        MANY(TOP, 1.0, omega=STARTS, out=out, **given)
     assert (out == 7.0).all()
 
 
 def test_bar_counts_the_bodies_again(capsys: pytest.CaptureFixture[str]) -> None:
-    MANY(TOP, 1.0, omega0=STARTS, events=flip(1), progress=True)
+    MANY(TOP, 1.0, omega=STARTS, events=flip(1), progress=True)
     assert capsys.readouterr().err.count("5.00/5.00") >= 2
 
 
@@ -172,13 +172,13 @@ def test_rows_over_time_are_those_of_final_times(name: str) -> None:
     scene, own, names = CASES[name]
     times = [3.0, 0.5, 0.0, -2.0]
     found = MANY(
-        scene, times=times, omega0=STARTS, tolerance=1e-10, estimates=True, threads=2,
+        scene, times=times, omega=STARTS, tolerance=1e-10, estimates=True, threads=2,
         sensitivities=names, events=flip(1), **own,
     )  # fmt: skip
     assert found.times.tolist() == times
     for k, time in enumerate(times):
         one = MANY(
-            scene, time, omega0=STARTS, tolerance=1e-10, estimates=True, sensitivities=names, **own
+            scene, time, omega=STARTS, tolerance=1e-10, estimates=True, sensitivities=names, **own
         )  # fmt: skip
         assert found.omega[:, k].tobytes() == one.omega.tobytes()
         assert found.ended[:, k].tolist() == one.ended.tolist()
@@ -202,7 +202,7 @@ def test_scenes_have_rows_over_time() -> None:
     found = MANY(scenes, times=[1.0, 2.0])
     assert found.omega[:, 1].tobytes() == solve_many(scenes, 2.0).omega.tobytes()
     assert found.omega.shape == (2, 2, 3)
-    assert solve_many(TOP, times=[1.0, 2.0], omega0=np.empty((0, 3))).omega.shape == (0, 2, 3)
+    assert solve_many(TOP, times=[1.0, 2.0], omega=np.empty((0, 3))).omega.shape == (0, 2, 3)
     final = solve_many(TOP, 2.0).to_pandas()
     assert (list(final.columns), final.index.name) == (
         ["omega1", "omega2", "omega3", "ended"], "body",
@@ -221,8 +221,8 @@ def test_energy_and_angular_momentum_are_those_of_trajectories(shape: tuple[int,
     given: Any = {key: body}
     scene = Scene("many", (0.0, 0.0, 1.0), moments=(1.0, 2.0, 2.5))
     turned = (0.5, 0.5, -0.5, 0.5)
-    found = solve_many(scene, times=times, omega0=starts, attitude0=turned, **given)
-    last = solve_many(scene, 2.5, omega0=starts, attitude0=turned, **given)
+    found = solve_many(scene, times=times, omega=starts, attitude=turned, **given)
+    last = solve_many(scene, 2.5, omega=starts, attitude=turned, **given)
     for i in range(4):
         own: Any = body if len(shape) == 1 or shape == (3, 3) else body[i]
         of_one: Any = {key: own.tolist()}

@@ -31,7 +31,7 @@ def drawn(n: int, seed: int = 5) -> dict[str, Any]:
     """Return starts, moments and times."""
     draw = np.random.default_rng(seed)
     return {
-        "omega0": draw.normal(size=(n, 3)), "moments": draw.uniform(1.0, 2.0, (n, 3)),
+        "omega": draw.normal(size=(n, 3)), "moments": draw.uniform(1.0, 2.0, (n, 3)),
         "t_end": draw.uniform(-0.2, 9.0, n), "gain": draw.uniform(0.1, 0.5, n),
     }  # fmt: skip
 
@@ -49,17 +49,17 @@ def test_each_body_is_solved_to_the_tolerance(kind: str, with_moments: bool) -> 
         start = {"omega": [1.0, 0.0, 0.0]}
         torque = scene_of({"body": body, "initial": start, "torque": EXPRESSION}, "").torque
     scene = Scene("many", (1.0, 0.0, 0.0), torque=torque, **body)
-    arrays: dict[str, Any] = {"attitude0": (0.5, 0.5, 0.5, 0.5)} if kind == "attitude" else {}
+    arrays: dict[str, Any] = {"attitude": (0.5, 0.5, 0.5, 0.5)} if kind == "attitude" else {}
     if with_moments:
         arrays["moments"] = given["moments"]
     found = solve_many(
-        scene, given["t_end"], omega0=given["omega0"], parameters={name: given["gain"]},
+        scene, given["t_end"], omega=given["omega"], parameters={name: given["gain"]},
         tolerance=1e-8, estimates=True, **arrays,
     )  # fmt: skip
     assert found.has_result.all()
     assert found.error is not None
     assert found.growth is not None
-    alike = solve_many(scene, given["t_end"], omega0=given["omega0"], tolerance=1e-8, **arrays)
+    alike = solve_many(scene, given["t_end"], omega=given["omega"], tolerance=1e-8, **arrays)
     assert np.abs(alike.omega - found.omega).max() > 1e-3
     for i in range(0, 23, 3):
         value = float(given["gain"][i])
@@ -74,8 +74,8 @@ def test_each_body_is_solved_to_the_tolerance(kind: str, with_moments: bool) -> 
         ]  # fmt: skip
         of_row = {"moments": tuple(given["moments"][i])} if with_moments else body
         one = Scene(
-            "one", tuple(given["omega0"][i]), torque=own[kind],
-            attitude=arrays.get("attitude0"), **of_row,
+            "one", tuple(given["omega"][i]), torque=own[kind],
+            attitude=arrays.get("attitude"), **of_row,
         )  # fmt: skip
         truth = solve(
             one, [0.0, given["t_end"][i]][:: 1 if given["t_end"][i] > 0 else -1], tolerance=1e-13,
@@ -93,12 +93,12 @@ def test_each_body_is_solved_to_the_tolerance(kind: str, with_moments: bool) -> 
 def test_no_bit_depends_on_other_bodies() -> None:
     scene, given = Scene("many", (1.0, 0.0, 0.0), MOMENTS, torque=law), drawn(19)
     every = solve_many(
-        scene, 4.0, omega0=given["omega0"], moments=given["moments"],
+        scene, 4.0, omega=given["omega"], moments=given["moments"],
         parameters={"gain": given["gain"]}, threads=2,
     )  # fmt: skip
     for i in (0, 7, 18):
         one = solve_many(
-            scene, 4.0, omega0=given["omega0"][i], moments=given["moments"][i],
+            scene, 4.0, omega=given["omega"][i], moments=given["moments"][i],
             parameters={"gain": float(given["gain"][i])},
         )  # fmt: skip
         assert one.omega[0].tolist() == every.omega[i].tolist()
@@ -116,7 +116,7 @@ def test_invalid_bodies_are_refused_alone() -> None:
 def test_rows_events_and_sensitivities_are_those_of_a_scene_with_the_value() -> None:
     scene = Scene("many", (1.0, 0.5, -0.2), MOMENTS, torque=law)
     asked: dict[str, Any] = {
-        "sensitivities": ["torque.gain", "omega0"],
+        "sensitivities": ["torque.gain", "omega"],
         "events": lambda t, omega: omega[0] - 0.5,
     }
     found = solve_many(scene, times=[1.0, 4.0], parameters={"gain": [0.1, 0.4]}, **asked)

@@ -66,7 +66,7 @@ def test_results_are_new_arrays_unless_out_is_given(solver: Solver) -> None:
     row = rows[1]
     assert solver(start, 1.0, out=row) is row
     assert rows.tolist() == [[0.0] * 3, wanted]
-    assert solver(out=row, t_end=1.0, omega0=start) is row
+    assert solver(out=row, t_end=1.0, omega=start) is row
     assert solver(start, 1.0, **{"".join("out"): row}) is row
     assert solver(start, 1.0, out=None).tolist() == wanted
     assert solver(start, 1.0, out=start) is start  # into the array of the start
@@ -76,7 +76,7 @@ def test_results_are_new_arrays_unless_out_is_given(solver: Solver) -> None:
 def test_calls_that_are_none_are_type_errors(solver: Any) -> None:
     start = np.ones(3)
     for arguments, named, words in (
-        ((), {}, "omega0"),
+        ((), {}, "omega"),
         ((start,), {}, "t_end"),
         ((start,), {"out": start}, "t_end"),
         ((start, 1.0, start), {}, "2 positional arguments but 3"),
@@ -107,11 +107,11 @@ def test_what_is_no_start_or_no_time_is_refused_and_not_counted(solver: Solver) 
     solver(np.ones(3), 1.0)
     steps = solver.steps
     given: Any
-    for name, wrongs in (("omega0", _NO_STARTS), ("t_end", _NO_TIMES)):
+    for name, wrongs in (("omega", _NO_STARTS), ("t_end", _NO_TIMES)):
         for wrong in wrongs:
-            given = (wrong, 1.0) if name == "omega0" else (np.ones(3), wrong)
+            given = (wrong, 1.0) if name == "omega" else (np.ones(3), wrong)
             calls: list[Any] = [partial(solver, *given), partial(solver, *given, out=out)]
-            if name == "omega0":
+            if name == "omega":
                 calls.append(partial(solver.trajectory, given[0], [1.0]))
             for call in calls:
                 with pytest.raises(InputError, match=name) as caught:

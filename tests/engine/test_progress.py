@@ -22,7 +22,7 @@ def test_bar_counts_bodies_and_changes_no_bit(
     torque: Any, threads: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = replace(BRICK, torque=torque)
-    given: dict[str, Any] = {"omega0": STARTS, "threads": threads}
+    given: dict[str, Any] = {"omega": STARTS, "threads": threads}
     plain = solve_many(scene, 2.0, **given)
     assert capsys.readouterr().err == ""
     found = solve_many(scene, 2.0, **given, progress=True)
@@ -48,17 +48,17 @@ def test_scenes_of_different_kinds_have_one_bar(capsys: pytest.CaptureFixture[st
 def test_programs(capsys: pytest.CaptureFixture[str]) -> None:
     listing = subset("two-term")
     scene = replace(BRICK, steps=20)
-    plain = run_many(scene, listing, omega0=STARTS)
-    found = run_many(scene, listing, omega0=STARTS, progress=True)
+    plain = run_many(scene, listing, omega=STARTS)
+    found = run_many(scene, listing, omega=STARTS, progress=True)
     assert found.omega.tobytes() == plain.omega.tobytes()
     assert "700/700" in capsys.readouterr().err
 
 
 def test_a_call_that_fails_leaves_no_bar(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(InputError, match="threads"):
-        solve_many(BRICK, 1.0, omega0=STARTS, threads=0, progress=True)
+        solve_many(BRICK, 1.0, omega=STARTS, threads=0, progress=True)
     capsys.readouterr()
-    solve_many(BRICK, 1.0, omega0=STARTS)
+    solve_many(BRICK, 1.0, omega=STARTS)
     assert capsys.readouterr().err == ""
 
 

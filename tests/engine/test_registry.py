@@ -115,7 +115,7 @@ def test_names_of_methods_are_in_any_case() -> None:
     scene = case_scene(2)
     wanted = solve(scene, 1.0, "dop853").omega.tolist()
     assert solve(scene, 1.0, "DOP853").omega.tolist() == wanted
-    many = solve_many(scene, 1.0, omega0=[scene.omega], method="TAYLOR").omega[0]
+    many = solve_many(scene, 1.0, omega=[scene.omega], method="TAYLOR").omega[0]
     assert prepare(scene, "Taylor")(scene.omega, 1.0) == pytest.approx(many, abs=1e-13)
 
 

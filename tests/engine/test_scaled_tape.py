@@ -140,7 +140,7 @@ def test_prepared_solvers_refuse_what_only_solve_rescales(kind: str, power: int)
     assert np.isnan(solver(scene.omega, 5.0 / size)).all()
     assert (solver.status, solver.error, solver.growth) == ("refused", None, None)
     assert solver.trajectory(scene.omega, 5.0 / size).ended == "complete"
-    many = solve_many(scene, 5.0 / size, omega0=[scene.omega, tuple(OMEGA)])
+    many = solve_many(scene, 5.0 / size, omega=[scene.omega, tuple(OMEGA)])
     assert many.status[0] == Statuses.REFUSED
     turning = prepare(scene, attitude=True)
     assert np.isnan(turning(scene.omega, 5.0 / size)[1]).all()

@@ -219,7 +219,7 @@ def test_prepared_solver_batch_steps_and_rows_agree() -> None:
     scene = Scene("bounded", (0.3, 0.2, 0.9), moments=BRICK, torque=_bounded)
     (wanted,) = solve(scene, [7.0]).omega
     assert prepare(scene)(scene.omega, 7.0).tolist() == wanted.tolist()
-    assert solve_many(scene, 7.0, omega0=[scene.omega]).omega[0].tolist() == wanted.tolist()
+    assert solve_many(scene, 7.0, omega=[scene.omega]).omega[0].tolist() == wanted.tolist()
     stepper = Stepper(scene, 1e-12)
     stepper.until(7.0)
     assert stepper.omega == pytest.approx(wanted, abs=1e-10)
@@ -413,7 +413,7 @@ def test_a_branch_may_be_singular_where_it_is_not_chosen(name: str) -> None:
     stepper = Stepper(scene, tolerance=1e-11)
     stepper.until(6.0)
     assert stepper.omega == pytest.approx(wanted[-1], abs=1e-9)
-    batch = solve_many(scene, [3.0, 6.0], omega0=[scene.omega] * 2, tolerance=1e-11)
+    batch = solve_many(scene, [3.0, 6.0], omega=[scene.omega] * 2, tolerance=1e-11)
     assert np.abs(batch.omega - wanted).max() <= 1e-11 * np.abs(wanted).max()
 
 

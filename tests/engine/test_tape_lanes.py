@@ -73,7 +73,7 @@ def test_a_torque_about_the_axes_of_space_is_solved_side_by_side(
     alone, left = lanes(scene, starts, times, turns, tolerance)
     assert len(left) <= n // 4
     found: Any = solve_many(
-        scene, times, omega0=starts, attitude0=turns, tolerance=tolerance, estimates=True
+        scene, times, omega=starts, attitude=turns, tolerance=tolerance, estimates=True
     )
     done = sorted(set(range(n)) - set(left))
     assert found.omega[done].tobytes() == alone.omega[done].tobytes()
@@ -91,7 +91,7 @@ def test_a_torque_about_the_axes_of_space_is_solved_side_by_side(
         assert max(error, angle) <= allowed
         if i in left:  # the single-body kernel solved it
             assert np.array_equal(solver(starts[i], times[i], turns[i])[0], found.omega[i])
-    single = solve_many(scene, times[3], omega0=starts[3], attitude0=turns[3], tolerance=tolerance)
+    single = solve_many(scene, times[3], omega=starts[3], attitude=turns[3], tolerance=tolerance)
     assert single.omega[0].tobytes() == found.omega[3].tobytes()
 
 
@@ -102,7 +102,7 @@ def test_a_law_with_too_many_terms_for_a_recording_is_solved_body_by_body() -> N
     )
     starts, turns = np.eye(3)[:2], np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     assert lanes(scene, starts, 0.5, turns)[1] == [0, 1]
-    found = solve_many(scene, 0.5, omega0=starts, attitude0=turns)
+    found = solve_many(scene, 0.5, omega=starts, attitude=turns)
     solver = prepare(scene, attitude=True)
     for i in range(2):
         assert np.array_equal(found.omega[i], solver(starts[i], 0.5, turns[i])[0])
@@ -116,7 +116,7 @@ def test_results_do_not_depend_on_the_other_bodies(level: int) -> None:
 
     def solved(rows: Any, threads: int = 1) -> Ensemble:
         return solve_many(
-            scene, time, omega0=starts[rows], attitude0=turns[rows], method="taylor",
+            scene, time, omega=starts[rows], attitude=turns[rows], method="taylor",
             threads=threads,
         )  # fmt: skip
 
@@ -137,7 +137,7 @@ def test_every_entrance_has_the_same_results() -> None:
     source = np.random.default_rng(3)
     starts, turns = source.normal(size=(30, 3)), source.normal(size=(30, 4))
     found: Any = solve_many(
-        scene, time, omega0=starts, attitude0=turns, tolerance=1e-9, method="taylor"
+        scene, time, omega=starts, attitude=turns, tolerance=1e-9, method="taylor"
     )
     solver = prepare(scene, "taylor", 1e-9, attitude=True)
     omega, attitude, status = solver.many(starts, time, turns)

@@ -518,7 +518,7 @@ def _places(record: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         ("stop", {"step": 1, "variable": "W", "quotient": 1.0}),
         ("stop", {"step": 1, "variable": "U", "quotient": None}),
         ("stop", {"step": -1, "variable": "U", "quotient": 1.0}),
-        ("sensitivities", [["omega0", 3]]), ("sensitivities", [["omega0", -1]]),
+        ("sensitivities", [["omega", 3]]), ("sensitivities", [["omega", -1]]),
         ("sensitivities", 1),
     ],
 )  # fmt: skip

@@ -301,6 +301,6 @@ def test_many_bodies_under_one_torque(kind: str, tolerance: float, level: int) -
     for name, motion in motions(kind).items():
         scene = replace(motion.scene, attitude=motion.scene.attitude or IDENTITY)
         starts = np.tile(scene.omega, (9, 1))
-        found: Any = solve_many(scene, motion.times[-1], omega0=starts, tolerance=tolerance)
+        found: Any = solve_many(scene, motion.times[-1], omega=starts, tolerance=tolerance)
         assert found.ended[8] in _ENDED, name
         check_error(motion, found.omega[8], found.attitude[8], tolerance, name)

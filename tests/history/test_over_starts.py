@@ -36,7 +36,7 @@ FEWER = [STARTS[k] for k in (0, 5, 9)]
 def _solved(omega0: list[Triple], listing: Listing | None, steps: int = 100, **more: Any) -> Batch:
     """Return a batch as a sweep passes it to a claim."""
     scene, ones = replace(case_scene(4), steps=steps), np.full(len(omega0), 1.0)
-    batch = Batch(scene, Solver(), listing, ones, {"omega0": np.array(omega0)})
+    batch = Batch(scene, Solver(), listing, ones, {"omega": np.array(omega0)})
     return replace(batch, **more)
 
 
@@ -49,7 +49,7 @@ def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[
 def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
     assert len(JUDGED) == 12
     for identity in JUDGED:
-        assert "omega0" in claim(identity)["assumptions"]
+        assert "omega" in claim(identity)["assumptions"]
         assert claim(identity)["where"].startswith("V.")
 
 
@@ -83,7 +83,7 @@ def test_silent_of_what_the_thesis_does_not_speak_of() -> None:
     listing = Listing.original("runge-kutta")
     starts = np.array(STARTS)
     others = [
-        _solved(STARTS, listing, arrays={"omega0": starts, "moments": np.ones((len(STARTS), 3))}),
+        _solved(STARTS, listing, arrays={"omega": starts, "moments": np.ones((len(STARTS), 3))}),
         _solved(STARTS, listing, scene=replace(case_scene(4), step_size=0.02)),
         _solved(STARTS, listing, solver=Solver(lipschitz=600.0)),
         _solved(STARTS, subset("runge-kutta", fix=["stage-base"])),

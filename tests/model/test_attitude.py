@@ -133,8 +133,8 @@ def test_a_rotation_of_scipy_is_an_attitude_everywhere() -> None:
     starts = [[0.1, 0.2, 0.3], [0.3, 0.2, 0.1]]
     solver = prepare(body, attitude=True)
     for given, numbers in ((turns[1], rows[1]), (turns, rows)):
-        batch = solve_many(body, 1.0, omega0=starts, attitude0=given)
-        same = solve_many(body, 1.0, omega0=starts, attitude0=numbers)
+        batch = solve_many(body, 1.0, omega=starts, attitude=given)
+        same = solve_many(body, 1.0, omega=starts, attitude=numbers)
         np.testing.assert_array_equal(batch.attitude, same.attitude)
         many = solver.many(starts, 1.0, given)[1]
         np.testing.assert_array_equal(many, solver.many(starts, 1.0, numbers)[1])

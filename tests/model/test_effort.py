@@ -134,7 +134,7 @@ def test_prepared_solver_has_the_limit_too(name: str) -> None:
 def test_compare_refuses_at_once_what_takes_long(capsys: pytest.CaptureFixture[str]) -> None:
     """The pace of the reference's first steps shows it; the refusal once took a minute."""
     begin = time.process_time()
-    command = "compare --case 5 --omega0 0.3,1.1,2.7 --step-size 1 --steps 100000"
+    command = "compare --case 5 --omega 0.3,1.1,2.7 --step-size 1 --steps 100000"
     assert main(command.split()) == 2
     assert time.process_time() - begin < 2.0
     said = capsys.readouterr().err

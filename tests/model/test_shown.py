@@ -37,8 +37,8 @@ def test_a_comparison() -> None:
 def test_other_results() -> None:
     scene = case_scene(2)
     starts = np.ones((1000, 3))
-    assert "omega=<float64 (1000, 3)>" in repr(solve_many(scene, 1.0, omega0=starts))
-    _lines(run_many(scene, subset("two-term"), omega0=starts))
+    assert "omega=<float64 (1000, 3)>" in repr(solve_many(scene, 1.0, omega=starts))
+    _lines(run_many(scene, subset("two-term"), omega=starts))
     _lines(run_program(scene, subset("two-term")))
 
 

@@ -38,7 +38,7 @@ def side_by_side(listing: Listing, steps: int, threads: int = 1, work: int = BOD
     """Return the time of one step (ns) of one body in a batch."""
     scene = replace(case_scene(3), steps=steps)
     omega = np.array(scene.omega) * np.linspace(0.5, 1.0, max(256, work // steps))[:, None]
-    task = partial(run_many, scene, listing, omega0=omega, lipschitz=AT_REST, threads=threads)
+    task = partial(run_many, scene, listing, omega=omega, lipschitz=AT_REST, threads=threads)
     return best(task) / int(task().n_rows.sum()) * 1e9
 
 

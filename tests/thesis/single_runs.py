@@ -28,15 +28,15 @@ def single_scene(scene: Scene, options: Options, row: int) -> Scene:
     """Return the scene of one body."""
     given: Options = {
         name: options[name] if np.ndim(options[name]) < 2 else options[name][row]
-        for name in ("omega0", "moments", "coefficients", "torque_constant")
+        for name in ("omega", "moments", "coefficients", "torque_constant")
         if name in options
     }
     if "torque_constant" in given:
         given["torque"] = replace(scene.law, constant=given.pop("torque_constant"))
     if {"moments", "coefficients"} & given.keys():
         given = {"moments": None, "coefficients": None, "inertia": None} | given
-    if "omega0" in given:
-        given["omega"] = given.pop("omega0")
+    if "omega" in given:
+        given["omega"] = given.pop("omega")
     step_size = options.get("step_size", scene.step_size)
     return replace(scene, **given, step_size=step_size[row] if np.ndim(step_size) else step_size)
 

@@ -21,7 +21,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
     source = np.random.default_rng(number)
     scene = drawn.scene
     options: Options = {
-        "omega0": np.array(scene.omega) * source.uniform(-2.0, 2.0, (n, 3)),
+        "omega": np.array(scene.omega) * source.uniform(-2.0, 2.0, (n, 3)),
         "lipschitz": drawn.lipschitz * 10.0 ** source.uniform(-1.0, 1.0, n),
         "may_stop": drawn.may_stop,
         "velocity": bool(source.random() < 0.5),
@@ -39,7 +39,7 @@ def random_ensemble(number: int, n: int) -> tuple[Scene, Listing, Options]:
     if source.random() < 0.5:
         # Extremes among others: bodies that overflow, do not move, or vanish.
         some = source.choice([0.0, -0.0, 1e-310, 1e160, 1e300], (n, 3))
-        options["omega0"] = np.where(source.random((n, 3)) < 0.1, some, options["omega0"])
+        options["omega"] = np.where(source.random((n, 3)) < 0.1, some, options["omega"])
     return scene, drawn.listing, options
 
 
@@ -61,7 +61,7 @@ def test_every_listing_has_the_bits_of_its_single_runs(program: str) -> None:
     for index, listing in enumerate(all_listings(program)):
         for scene in [scenes[(index + k) % len(scenes)] for k in range(0, len(scenes), 3)]:
             options: Options = {
-                "omega0": np.multiply(scene.omega, [[1.0], [0.5], [-1.5]]),
+                "omega": np.multiply(scene.omega, [[1.0], [0.5], [-1.5]]),
                 "lipschitz": [500.0, 1.0, 1e-2],
                 "velocity": index % 2 == 0,
                 "at": range(1, scene.steps + 1),
@@ -84,7 +84,7 @@ def test_threads_change_no_bit(program: str, n: int, monkeypatch: pytest.MonkeyP
     scene = replace(case_scene(7), steps=20)
     source = np.random.default_rng(n)
     options: Options = {
-        "omega0": source.normal(size=(n, 3)) * 10.0 ** source.uniform(-1.0, 3.0, (n, 1)),
+        "omega": source.normal(size=(n, 3)) * 10.0 ** source.uniform(-1.0, 3.0, (n, 1)),
         "lipschitz": 10.0 ** source.uniform(0.0, 3.0, n),
         "velocity": True,
         "at": [3, 20],
@@ -120,7 +120,7 @@ def test_stops_of_the_thesis() -> None:
     scene, listing = case_scene(2), Listing.original("runge-kutta")
     cases = [case_scene(number) for number in (1, 2, 3)]
     options: Options = {
-        "omega0": [case.omega for case in cases], "moments": [case.moments for case in cases],
+        "omega": [case.omega for case in cases], "moments": [case.moments for case in cases],
         "torque_constant": [case.law.constant for case in cases], "at": [25, 26, 100],
     }  # fmt: skip
     found = run_many(scene, listing, **options)
@@ -136,8 +136,8 @@ def test_stops_of_the_thesis() -> None:
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_bodies_that_overflow_spoil_no_other(program: str) -> None:
     scene = Scene("", (1.0, 1.0, 1.0), coefficients=(50.0, 60.0, 70.0), steps=40)
-    options: Options = {"omega0": np.full((40, 3), 1.0), "at": range(1, 41), "may_stop": False}
-    options["omega0"] *= (10.0 ** np.linspace(-2.0, 2.0, 40))[:, None]
+    options: Options = {"omega": np.full((40, 3), 1.0), "at": range(1, 41), "may_stop": False}
+    options["omega"] *= (10.0 ** np.linspace(-2.0, 2.0, 40))[:, None]
     found = run_many(scene, Listing.corrected(program), **options)
     assert len(set(found.n_rows)) > 10
     assert set(found.status) == {0, 2}
@@ -156,7 +156,7 @@ def test_steps_of_any_size_side_by_side(level: int, program: str) -> None:
         assert {0, 129} <= set(found.ier[:, 0].tolist())
         assert_alike(found, scene, listing, options)
         for one in (1e-17, 1e-9, 1e-3, 2.5, 40.0):
-            alike = {**options, "step_size": one, "omega0": np.eye(3)}
+            alike = {**options, "step_size": one, "omega": np.eye(3)}
             assert_alike(run_many(scene, listing, **alike), scene, listing, alike)
 
 
@@ -170,12 +170,12 @@ def test_rows_in_the_order_asked_for() -> None:
     np.testing.assert_array_equal(some.recorded_time, every.recorded_time[rows])
     np.testing.assert_array_equal(some.at, at)
     np.testing.assert_array_equal(run_many(scene, listing).omega[:, 0], every.omega[:, -1])
-    none = run_many(scene, listing, at=[], omega0=np.ones((5, 3)))
+    none = run_many(scene, listing, at=[], omega=np.ones((5, 3)))
     assert (none.omega.shape, none.n_rows.tolist()) == ((5, 0, 3), [100] * 5)
 
 
 def test_types_and_shapes_of_what_is_found() -> None:
-    scene, given = case_scene(3), Options(omega0=np.ones((4, 3)), at=[1, 2])
+    scene, given = case_scene(3), Options(omega=np.ones((4, 3)), at=[1, 2])
     found = run_many(scene, Listing.corrected("runge-kutta"), **given)
     assert (found.omega.shape, found.recorded_time.shape) == ((4, 2, 3), (2,))
     assert (found.velocity, found.ier) == (None, None)
@@ -187,7 +187,7 @@ def test_types_and_shapes_of_what_is_found() -> None:
     assert apart.velocity is not None
     assert apart.velocity.shape == (4, 2, 3)
     for threads in (1, 2):  # no bodies at all
-        found = run_many(scene, two, omega0=np.ones((0, 3)), threads=threads)
+        found = run_many(scene, two, omega=np.ones((0, 3)), threads=threads)
         assert (found.omega.shape, found.ier is not None) == ((0, 1, 3), True)
         assert np.isnan(found.recorded_time).all()
 
@@ -208,7 +208,7 @@ def test_constants_beside_the_quotient_itself(level: int, keep: list[str]) -> No
     scene = replace(case_scene(5), steps=2)
     sizes = 10.0 ** source.choice([-165.0, -150.0, 0.0, 1.0, 75.0], (80, 1))
     omega = source.normal(size=(80, 3)) * sizes
-    found = run_many(scene, listing, omega0=omega, lipschitz=0.0, at=[])
+    found = run_many(scene, listing, omega=omega, lipschitz=0.0, at=[])
     stopped = found.stop_variable > 0
     assert stopped.sum() > 40
     quotient, omega = found.stop_quotient[stopped], omega[stopped]
@@ -217,5 +217,5 @@ def test_constants_beside_the_quotient_itself(level: int, keep: list[str]) -> No
         *(np.nextafter(quotient, end) for end in (0.0, np.inf)),
         *(quotient * (1.0 + few * 2.0**-52) for few in (-3, -2, 2, 3)),
     ):
-        options: Options = {"omega0": omega, "lipschitz": constant, "at": [1, 2]}
+        options: Options = {"omega": omega, "lipschitz": constant, "at": [1, 2]}
         assert_alike(run_many(scene, listing, **options), scene, listing, options)

@@ -38,7 +38,7 @@ export function fragmentOf(data, state) {
 // is that of a case.
 export function commandOf(data, { moments, omega0, time }) {
   const known = data.bodies.find((body) => body.case && isSame(body.moments, moments));
-  const start = known && !isSame(known.omega, omega0) ? ` --omega0=${omega0}` : "";
+  const start = known && !isSame(known.omega, omega0) ? ` --omega=${omega0}` : "";
   const scene = known ? `--case ${known.case}${start}` : "--scene body.toml";
   const command = `pyharness run ${scene} --method closed-form --attitude quaternion --times ${time}`;
   const file = `[body]\nmoments = [${listed(moments)}]\n[initial]\nomega = [${listed(omega0)}]`;

@@ -57,7 +57,7 @@ class Batch:
     and `stop_variable`, and call `rows` and `by_method`.
 
     `scene` has the quantities that all scenes share. `arrays` has the others, each with a row per
-    scene; its keys are arguments of `solve_many` and `run_many`, always including `omega0`.
+    scene; its keys are arguments of `solve_many` and `run_many`, always including `omega`.
     `listing` is None for a method. `t_end` (s) has shape (n,). `attitude` is for methods only.
     """
 
@@ -74,7 +74,7 @@ class Batch:
     @property
     def omega0(self) -> Array:
         """Return the initial angular velocities, shape (n, 3), rad/s."""
-        return self.arrays["omega0"]
+        return self.arrays["omega"]
 
     @property
     def step_sizes(self) -> Array:
@@ -143,7 +143,7 @@ class Batch:
     @property
     def first_attitudes(self) -> Array:
         """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
-        first = np.array(self.arrays.get("attitude0", [self.scene.attitude or IDENTITY]))
+        first = np.array(self.arrays.get("attitude", [self.scene.attitude or IDENTITY]))
         found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
         return found
 
@@ -153,7 +153,7 @@ class Batch:
 
     def from_start(self, omega0: Array) -> "Batch":
         """Return this batch with the initial `omega0` (rad/s), without results."""
-        return replace(self, arrays={**self.arrays, "omega0": omega0})
+        return replace(self, arrays={**self.arrays, "omega": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
@@ -205,7 +205,7 @@ class Batch:
         if self.attitude and not self.scene.torque.needs_attitude:
             # One attitude suits all scenes, because `attitudes` multiplies the result by
             # `first_attitudes`.
-            return self._solve(method, tolerance, t_end, attitude0=IDENTITY)
+            return self._solve(method, tolerance, t_end, attitude=IDENTITY)
         return self._solve(method, tolerance, t_end)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
@@ -218,7 +218,7 @@ class Batch:
             name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
         }
         if not self.scene.torque.needs_attitude:
-            arrays.pop("attitude0", None)
+            arrays.pop("attitude", None)
         arrays |= more
         return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **arrays)
 

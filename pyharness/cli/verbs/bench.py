@@ -27,7 +27,7 @@ OPTIONS = {
     "with --attitude also Case 1).",
     "--horizon T": "End time of each integration, s, up to 1000 (default: 3, and also 100 for "
     "Cases 3 and 4, with --attitude for all cases except 6).",
-    "--random N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
+    "--draws N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
     "instead of the cases.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
     "body against the number of bodies, and memory.",
@@ -38,7 +38,7 @@ OPTIONS = {
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
     "(default: the present year and week, as in 2026-W47).",
     "--attitude": "Compute and measure the attitude (orientation) of the body together with omega.",
-    "--methods A,B": "Measure only these of our methods and programs, as named in the first "
+    "--method M,...": "Measure only these of our methods and programs, as named in the first "
     "column of the result; none: leave them out (default: all).",
     "--peers X,Y": "Measure only these third-party solvers, by the same names or by package "
     "(heyoka, numba, scipy); none: leave them out (default: all installed ones).",
@@ -47,6 +47,10 @@ OPTIONS = {
     "--growth": "Measure instead how the error of the Taylor method grows with the integration "
     "time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),
+}
+GROUPS = {
+    "what is measured": "case horizon attitude draws ensemble terms bodies seed plan growth",
+    "which solvers": "method peers",
 }
 EXAMPLE = "bench --case 5 --peers none"
 
@@ -68,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         horizon = shared.positive(options.horizon, "--horizon", 0.0)
         if horizon > _LONGEST:
             raise InputError(f"--horizon: {horizon:g}; allowed: above 0, up to {_LONGEST:g}")
-    methods = chosen(list_own_contenders(), options.methods, "method", options.attitude)
+    methods = chosen(list_own_contenders(), options.method, "method", options.attitude)
     others = chosen(peers(), options.peers, "peer", options.attitude)
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
@@ -107,7 +111,7 @@ def _present(
     if not contenders:
         raise InputError(
             "bench: no method and no third-party package is chosen; give at least one, with "
-            "--methods or --peers"
+            "--method or --peers"
         )
     return contenders, missing
 
@@ -117,13 +121,13 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return --random, or 0; set the seed, by default the present year and week."""
-    if options.random is None:
+    """Return --draws, or 0; set the seed, by default the present year and week."""
+    if options.draws is None:
         if options.seed is not None:
-            raise InputError("--seed has no meaning without --random, --ensemble or --terms")
+            raise InputError("--seed has no meaning without --draws, --ensemble or --terms")
         return 0
-    shared.refuse(options, "--random", ["case", "horizon", "plot"])
-    count = shared.chosen_count(options.random, "--random", 0, 1, shared.SCENES)
+    shared.refuse(options, "--draws", ["case", "horizon", "plot"])
+    count = shared.chosen_count(options.draws, "--draws", 0, 1, shared.SCENES)
     seed = shared.chosen_seed(options)
     options.seed = weekly_seed() if seed is None else seed
     return count
@@ -147,7 +151,7 @@ def chosen(
 def _again(options: argparse.Namespace) -> str:
     command = "pyharness bench" + (" --ensemble" if options.ensemble else "")
     command += " --terms" if options.terms else ""
-    for name in ("case", "horizon", "random", "bodies", "seed", "methods", "peers"):
+    for name in ("case", "horizon", "draws", "bodies", "seed", "method", "peers"):
         value = getattr(options, name)
         command += f" --{name} {shlex.quote(value)}" if value is not None else ""
     command += " --attitude" if options.attitude else ""
@@ -158,7 +162,7 @@ def _plan_or_growth(options: argparse.Namespace) -> int:
     from pyharness.bench.growth import growth
     from pyharness.bench.savings import savings
 
-    meaningless = ["case", "horizon", "random", "seed", "attitude", "methods", "peers"]
+    meaningless = ["case", "horizon", "draws", "seed", "attitude", "method", "peers"]
     meaningless += ["plot", "growth"] if options.plan else []
     shared.refuse(options, "--plan" if options.plan else "--growth", meaningless)
     shared.check_outputs(options)
@@ -176,11 +180,11 @@ def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench.ensemble_peers import ensemble_peers
 
     shared.refuse(
-        options, "--ensemble", ["case", "horizon", "random", "attitude", "plan", "growth", "terms"]
+        options, "--ensemble", ["case", "horizon", "draws", "attitude", "plan", "growth", "terms"]
     )
     n = _choose_bodies(options, _BODIES)
     those = ensemble_peers()
-    methods = named(own_ensembles(), options.methods, "method")
+    methods = named(own_ensembles(), options.method, "method")
     others = named(those, options.peers, "peer")
     contenders, missing = _present(methods, others, options.peers is not None)
     shared.check_outputs(options)
@@ -201,7 +205,7 @@ def _terms(options: argparse.Namespace) -> int:
     from pyharness.bench import term_loads, term_report
     from pyharness.bench.ensemble_measure import measure_ensembles
 
-    meaningless = ["case", "horizon", "random", "attitude", "methods", "plan", "growth", "plot"]
+    meaningless = ["case", "horizon", "draws", "attitude", "method", "plan", "growth", "plot"]
     shared.refuse(options, "--terms", meaningless)
     n = _choose_bodies(options, _TERM_BODIES)
     scenes = term_loads.term_scenes()
@@ -238,7 +242,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers that an option, such as --methods for "method", lists by name or package.
+    """Return the solvers that an option, such as --method for "method", lists by name or package.
 
     None selects all, "none" no solver.
     """

@@ -40,6 +40,7 @@ OPTIONS = {
     "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). tei: all cards "
     "and notes in TEI, the XML format of text editions.",
 }
+GROUPS = {"instead of cards": "classes collate origins second-reading scan"}
 EXAMPLE = "cards runge-kutta:860"
 
 

@@ -22,6 +22,7 @@ OPTIONS = {
     "--sweep FILE.toml": "The sweep file from which the folder of --atlas was made.",
     **shared.outputs(plot="the counts of --evidence, or of the map of --atlas,"),
 }
+GROUPS = {"instead of all verdicts": "explain assignments evidence atlas sweep"}
 EXAMPLE = "claims --explain abstract-superior"
 
 

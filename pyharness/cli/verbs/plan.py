@@ -14,7 +14,8 @@ OPTIONS = {
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-12 for auto).",
     "--velocity": "Include the translational velocity.",
-    "--rows": "Include results at intermediate times, as `pyharness run --times` prints them.",
+    "--times T1,T2,...": "Times of the results, s (default: one time); several need "
+    "intermediate output.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "plan --case 5 --tolerance 1e-9"
@@ -28,6 +29,7 @@ def run(options: argparse.Namespace) -> int:
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))
     tolerance = shared.chosen_tolerance(options)
+    rows = options.times is not None and len(shared.numbers(options.times, "--times")) > 1
     shared.check_outputs(options)
-    found = plan(scene, method, tolerance, options.velocity, options.rows)
+    found = plan(scene, method, tolerance, options.velocity, rows)
     return shared.show(plan_report(scene, found), options)

@@ -38,9 +38,9 @@ OPTIONS = {
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
-    "--attitude FORM": "Compute the attitude (orientation) of the body too, and print it as "
-    f"{', '.join(FORMS)} (3-1-3, 3-2-1: Euler angles about these axes). A scene with an attitude "
-    "has quaternions by default.",
+    "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: if the "
+    f"scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}; 3-1-3, 3-2-1: Euler "
+    "angles about these axes).",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
     "needs --method and an attitude.",
     "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "
@@ -51,6 +51,10 @@ OPTIONS = {
     **shared.outputs(FORMATS),
     "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). printer and "
     "tape5, for programs, are the printed page and the binary file TAPE5.",
+}
+GROUPS = {
+    "a program of the thesis": "program implementation word",
+    "another method": "method times attitude tolerance animate strict",
 }
 EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
@@ -78,6 +82,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"run: give either --program ({', '.join(PROGRAMS)}) or --method ({', '.join(METHODS)})"
         )
+    if options.attitude == "":
+        options.attitude = FORMS[0]
     shared.check_known("attitude", options.attitude, FORMS)
     shared.check_known("word", options.word, WORD_NAMES)
     if options.format in PROGRAM_FORMATS:

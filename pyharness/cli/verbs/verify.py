@@ -50,6 +50,11 @@ OPTIONS = {
     **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
     **shared.ALSO,
 }
+GROUPS = {
+    "all programs and methods": "only seed draws self-test update record",
+    "a program of yours": "port integrator order program case cell",
+    "data of yours": "external listing-output",
+}
 EXAMPLE = "verify --only cells,methods"
 
 

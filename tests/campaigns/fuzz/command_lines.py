@@ -126,7 +126,7 @@ def _plausible(random: Random, option: str) -> str:
     choices: dict[str, Callable[[], str]] = {
         "--case": lambda: str(random.randint(0, 8)),
         "--scene": lambda: random.choice((GOOD, GOOD, BAD, BAD, random.choice(_SPECIAL))),
-        "--omega0": lambda: numbers(random.choice((3, 3, 3, 2))),
+        "--omega": lambda: numbers(random.choice((3, 3, 3, 2))),
         "--step-size": lambda: numbers(1),
         "--steps": lambda: str(random.choice((1, 2, 3, 7, 30, 0, -1))),
         "--program": lambda: random.choice(PROGRAMS),

@@ -43,7 +43,7 @@ def test_middle_component_changes_its_sign_once_in_it() -> None:
     times = flip_times(moments, omega)
     signs = []
     for part in np.linspace(0.0, 1.0, 21):
-        ends = solve_many(Scene("", (0, 1, 0), moments=(1, 2, 3)), part * times, omega0=omega,
+        ends = solve_many(Scene("", (0, 1, 0), moments=(1, 2, 3)), part * times, omega=omega,
                           moments=moments).omega  # fmt: skip
         signs.append(np.sign(np.take_along_axis(ends, middle[:, None], axis=1)[:, 0]))
     changes: Any = (np.diff(np.array(signs), axis=0) != 0).sum(axis=0)

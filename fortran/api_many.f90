@@ -77,7 +77,8 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   real(8), intent(in) :: tolerance              ! relative, of the methods that take one
   real(8), intent(in) :: step                   ! s, of the methods with a fixed step
   real(8), intent(in) :: effort                 ! factor on the work limit of each body
-  integer(4), intent(in) :: by_moments          ! 1: body is I1, I2, I3; 0: A, B, C
+  integer(4), intent(in) :: by_moments          ! 1: body is I1, I2, I3; 0: A, B, C; + 2: omega0
+  ! was rounded after a rotation to principal axes
   integer(4), intent(in) :: n_body
   real(8), intent(in), target :: body(3, n_body)
   integer(4), intent(in) :: n_constant
@@ -107,7 +108,8 @@ subroutine solve_ensemble(code, tolerance, step, effort, by_moments, n_body, bod
   type(bodies_t) :: bodies
   real(8) :: packed(0)
 
-  bodies%by_moments = by_moments /= 0
+  bodies%by_moments = btest(by_moments, 0)
+  bodies%is_rounded = btest(by_moments, 1)
   bodies%tolerance = tolerance
   bodies%step = step
   bodies%effort = effort

@@ -32,6 +32,7 @@ module bodies
     real(dp), pointer, contiguous :: rate(:, :)         !! (3, 1 or n)
     real(dp), pointer, contiguous :: sines(:, :, :)     !! (4, waves, 1 or n), as in problem_t
     real(dp), pointer, contiguous :: cosines(:, :, :)   !! (4, waves, 1 or n)
+    logical :: is_rounded = .false.                    !! as ROUNDED of the module places
     real(dp), pointer, contiguous :: omega0(:, :)       !! (3, n), rad/s
     real(dp), pointer, contiguous :: times(:)           !! (1 or n), s
     real(dp), pointer, contiguous :: attitude0(:, :)    !! (4, 0, 1 or n), quaternions

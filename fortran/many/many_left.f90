@@ -8,7 +8,7 @@ module many_left
   use many_kinds, only: is_sphere, single_code
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, SPHERE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
-                    MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
+                    MOMENTS_LOW, N_COSINES, N_SINES, RATE, ROUNDED, STEP, TOLERANCE, WAVES
   use prepared, only: solve_prepared, solve_prepared_attitude, unpack
   use problem, only: problem_t
   use statuses, only: COMPLETE, INTERRUPTED, REFUSED, SENSITIVE
@@ -20,7 +20,9 @@ module many_left
 
   ! As in sensitivity.py, which decides what a prepared solver reports.
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! See sensitivity.py.
   real(dp), parameter :: CLOSED_FORM_ERROR = 16.0_dp*ROUNDING ! relative
+  real(dp), parameter :: NEGLIGIBLE_TO = 2.0_dp**44
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   real(dp), parameter :: COARSE = 1e-3_dp, LITTLE_WORK = 5e-3_dp
   real(dp), parameter :: HARDLY_ANY = 1e300_dp ! steps: so many that their roundings average out
@@ -147,6 +149,7 @@ contains
     packed(CONSTANT:CONSTANT + 2) = bodies%constant(:, of_body(size(bodies%constant, 2), i))/of
     packed(RATE:RATE + 2) = bodies%rate(:, of_body(size(bodies%rate, 2), i))/of
     packed(EFFORT) = bodies%effort
+    packed(ROUNDED) = merge(1.0_dp, 0.0_dp, bodies%is_rounded)
     packed(COEFFICIENTS_LOW:COEFFICIENTS_LOW + 2) = 0.0_dp
     packed(MOMENTS:MOMENTS + 2) = of
     packed(MOMENTS_LOW:MOMENTS_LOW + 2) = 0.0_dp
@@ -197,6 +200,7 @@ contains
       growth = -1.0_dp
       if (code < GAUSS .or. .not. (any(abs(packed(CONSTANT:RATE + 2)) > 0.0_dp) &
                                    .or. n_packed > WAVES)) then
+        if (code < GAUSS .and. .not. packed(ROUNDED) > 0.0_dp) enough = max(enough, NEGLIGIBLE_TO)
         growth = torque_free_growth_of(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, time, enough)
       end if
       if (growth < 0.0_dp .and. code > GAUSS) then
@@ -241,6 +245,7 @@ contains
     integer(int64), intent(in) :: steps !! 0 with a closed form
     integer, intent(in) :: status
     real(dp), intent(inout) :: found(2) !! estimated relative error, amplification; negative: none
+    real(dp) :: amplified               ! factor of rounding errors
 
     if (.not. (status == COMPLETE .or. status == SENSITIVE)) then
       found = -1.0_dp
@@ -250,7 +255,9 @@ contains
         found(2) = torque_free_growth_of(packed(COEFFICIENTS:COEFFICIENTS + 2), omega0, time)
       end if
       if (found(2) < 0.0_dp) return
-      found(1) = ROUNDING*found(2)*roundings_of(packed, n_packed, omega0, time) + CLOSED_FORM_ERROR
+      amplified = 1.0_dp
+      if (found(2) >= NEGLIGIBLE_TO .or. packed(ROUNDED) > 0.0_dp) amplified = found(2)
+      found(1) = ROUNDING*amplified*roundings_of(packed, n_packed, omega0, time) + CLOSED_FORM_ERROR
     end if
   end subroutine estimate
 

@@ -5,7 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pyharness.engine.problem import normalized, remainders, trajectory_of
-from pyharness.engine.sensitivity import closed_form_estimate, is_sensitive, torque_noise
+from pyharness.engine.sensitivity import (
+    closed_form_estimate,
+    growth_of_rounding,
+    is_sensitive,
+    torque_noise,
+)
 from pyharness.model.effort import advice, waves
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, extension
@@ -95,5 +100,6 @@ def known_solution(
         return trajectory_of(times, rows, n_rows, status, len(times), 0, attitudes=attitudes)
     noise = torque_noise(scene, scene.omega, times[-1])
     error, growth = _largest_estimate(scene, times, noise)
-    status = SENSITIVE if is_sensitive(growth, tolerance, noise) else COMPLETE
+    amplified = growth_of_rounding(scene, growth)
+    status = SENSITIVE if is_sensitive(amplified, tolerance, noise) else COMPLETE
     return trajectory_of(times, rows, n_rows, status, len(times), 0, error, growth, attitudes)

@@ -271,7 +271,9 @@ def _solved(
     if step is not None:
         step_size = finite("step", step)
     code, asked = _chosen(method, tolerance)
-    bodies = Bodies(ready, {**own, "t_end": t_end}, step_size, code, asked, checked_effort(effort))
+    own["t_end"] = t_end
+    work, is_rounded = checked_effort(effort), axes is not None
+    bodies = Bodies(ready, own, step_size, code, asked, work, is_rounded)
     if bodies.attitude is not None:
         check_attitude(method)
     found = bodies.solve(threads_of(threads), out, estimates)

@@ -85,7 +85,7 @@ def many_states(
     if code in _SIDE_BY_SIDE and solver.scene.inertia is None:
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
         own = {"omega": starts, "t_end": times, "attitude": turns}
-        bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort)
+        bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort, False)
         found = bodies.solve(threads_of(threads), out, with_estimates=False)
     else:
         found = place_for(out, n, with_attitude=True)

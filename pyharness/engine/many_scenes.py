@@ -257,9 +257,6 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
             torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
     if own.keys() & BODIES:
         own = {**dict.fromkeys(BODIES), **own}
-    for name in ("omega", "attitude"):
-        if f"{name}0" in own:
-            own[name] = own.pop(f"{name}0")
     law = scene.torque
     if torque:
         if isinstance(law, StateTorque):
@@ -277,7 +274,7 @@ class Bodies:
 
     def __init__(
         self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
-        effort: float,
+        effort: float, is_rounded: bool,
     ) -> None:  # fmt: skip
         given = checked_rows(own)
         self.n = count_bodies(given)
@@ -292,6 +289,7 @@ class Bodies:
         self.constant, self.sines, self.cosines = law
         self.omega0 = spread(rows["omega"], self.n)
         self.step = step
+        self.is_rounded = is_rounded
         if not step > 0.0:
             raise InputError(f"step is {step:g}; allowed: above 0")
         self.code, self.tolerance, self.effort = code, tolerance, effort
@@ -331,7 +329,8 @@ class Bodies:
             return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
 
         extension().solve_ensemble(
-            self.code, self.tolerance, self.step, self.effort, self.by_moments,
+            self.code, self.tolerance, self.step, self.effort,
+            self.by_moments + 2 * self.is_rounded,
             part(self.body), part(self.constant), part(self.rate), part(self.sines),
             part(self.cosines), part(self.omega0), part(self.times),
             _NOTHING if self.attitude is None else part(self.attitude), given_up,

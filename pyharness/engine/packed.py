@@ -6,6 +6,7 @@ from pyharness.engine.problem import normalized, normalized_in_space, remainders
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.system import is_recorded, with_constant_body
 from pyharness.model.codes import Methods, Places
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Array
@@ -24,7 +25,8 @@ def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Ar
     packed[Places.RATE : Places.EFFORT] = rate
     packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
     packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
-    packed[Places.MOMENTS_LOW : Places.WAVES] = scene.moments_low
+    packed[Places.MOMENTS_LOW : Places.ROUNDED] = scene.moments_low
+    packed[Places.ROUNDED] = isinstance(scene, PrincipalScene)
     return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
 
 

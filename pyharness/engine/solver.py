@@ -17,6 +17,7 @@ from pyharness.engine.problem import estimate_or_none
 from pyharness.engine.registry import FIXED_STEP, GAUSS
 from pyharness.engine.sensitivity import (
     closed_form_estimate,
+    growth_of_rounding,
     is_sensitive,
     motion_growth,
     torque_noise,
@@ -259,12 +260,14 @@ class Solver(BoundKernel[Result]):
         if self.plan.closed_form and not steps:
             noise = torque_noise(scene, omega0, t_end)
             error, growth = closed_form_estimate(scene, omega0, t_end, noise)
+            amplified = growth_of_rounding(scene, growth)
         elif self.plan.method in GAUSS:
             growth = motion_growth(replace(scene, omega=omega0), t_end)
+            amplified = growth
             noise = torque_noise(scene, omega0, t_end, abs(t_end) / scene.step_size)
         else:
             return status, error, growth
-        is_blurred = is_sensitive(growth, self.settings[0], noise)
+        is_blurred = is_sensitive(amplified, self.settings[0], noise)
         return "sensitive" if is_blurred else status, error, growth
 
 

@@ -51,7 +51,8 @@ class Places:
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
     MOMENTS = 18  # three, kg m2: for the closed form with attitude, and for a torque in space
     MOMENTS_LOW = 21  # three, kg m2: exact minus rounded moments
-    WAVES = 24  # four numbers for each sine, then four for each cosine; or a tape
+    ROUNDED = 24  # 1: the initial omega was rounded after a rotation to principal axes; else 0
+    WAVES = 25  # four numbers for each sine, then four for each cosine; or a tape
 
 
 class Series:

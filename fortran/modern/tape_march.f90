@@ -558,6 +558,8 @@ contains
         if (arrives .or. switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
         if (abs(correction*s%h) <= 2.0_dp*epsilon(factor)*abs(whole_step)) return
+        ! Another switch at the same time, but for rounding.
+        if (abs(before*s%h) <= spacing(t(1))) return
         if (.not. abs(correction) <= 0.01_dp*before) then
           is_continued_to_switch = .false.
           return

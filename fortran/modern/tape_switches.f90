@@ -208,7 +208,7 @@ contains
       ! The operand may depend on another switch, and no more be on its level.
       if (switches%on_level(i) /= 0) then
         terms = terms_from(i, switches%on_level(i), switches, s)
-        if (abs(terms(0)) > FAR*size_of(terms(:s%order - 1), factor)) then
+        if (is_far(i, terms)) then
           call begin_switches(i, nearness(i, factor, switches, s), switches, s)
           verdict = IS_CHANGED
           return
@@ -219,7 +219,7 @@ contains
         if (switches%on_level(i) /= 0 .or. .not. has_level(i, level)) cycle
         terms = terms_from(i, level, switches, s)
         if (terms(0) == 0.0_dp .or. ((terms(0) > 0.0_dp) .eqv. (level == LOWER))) cycle
-        if (abs(terms(0)) > FAR*size_of(terms(:s%order - 1), factor)) then
+        if (is_far(i, terms)) then
           ! The operand depends on another switch.
           call begin_switches(i, nearness(i, factor, switches, s), switches, s)
           verdict = IS_CHANGED
@@ -283,6 +283,15 @@ contains
         has_level = (s%a(0, switches%slots(i)) > 0.5_dp) .eqv. (level == LOWER)
       end if
     end function has_level
+
+    pure logical function is_far(i, terms)
+      !! Return whether an operand less a level is farther from it than rounding explains.
+      integer, intent(in) :: i
+      real(dp), intent(in) :: terms(0:)
+
+      is_far = abs(terms(0)) > max(FAR*size_of(terms(:s%order - 1), factor), &
+                                   nearness(i, factor, switches, s))
+    end function is_far
 
     pure logical function leaves(i)
       !! Return whether an operand on a level moves to the side of its result, or remains where the

@@ -53,7 +53,7 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
         assert len(each["quote"].split()) <= 8
         for assumption in each["assumptions"]:
             name = assumption.removeprefix("reading ").removeprefix("conjecture ")
-            known = ("omega", "steps", *names_of("reading"), *names_of("conjecture"))
+            known = ("omega0", "steps", *names_of("reading"), *names_of("conjecture"))
             assert name in known, each["id"]
     sections = " ".join(each["where"] for each in entries)
     for section in ("abstract", "II.5", "IV.1", "IV.2", "IV.3", "V.1", "V.2", "V.3", "VI"):

@@ -49,7 +49,7 @@ def _codes(identity: str, laboratory: Laboratory, omega0: list[Triple]) -> list[
 def test_claims_of_section_v_that_hang_on_starts_are_there() -> None:
     assert len(JUDGED) == 12
     for identity in JUDGED:
-        assert "omega" in claim(identity)["assumptions"]
+        assert "omega0" in claim(identity)["assumptions"]
         assert claim(identity)["where"].startswith("V.")
 
 

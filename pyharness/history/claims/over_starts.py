@@ -65,7 +65,7 @@ class Starts:
         found = run_many(
             scene,
             self._one.listing(program),
-            omega0=self._starts(case),
+            omega=self._starts(case),
             may_stop=may_stop,
             at=range(parts, scene.steps + 1, parts),
             effort=_EFFORT,
@@ -82,7 +82,9 @@ class Starts:
         rows = np.empty((len(state), scene.steps, 3))
         for step in range(scene.steps):
             later = restarted_at(scene, np.array(scene.omega), step * scene.step_size)
-            state = solve_many(later, scene.step_size, omega0=state, effort=_EFFORT).omega
+            state = solve_many(
+                later, scene.step_size, omega=state, tolerance=_TOLERANCE, effort=_EFFORT
+            ).omega
             rows[:, step] = state
         return self._shaped(case, rows)
 

@@ -25,6 +25,7 @@ module tape_march
   integer, parameter :: FEW = 3      ! terms whose decay bounds the truncation error
   ! Least factor on the first step that was tried, from rest and otherwise.
   real(dp), parameter :: SHORTER = 0.5_dp, MUCH_SHORTER = 0.05_dp
+  real(dp), parameter :: GUESSED = 0.85_dp
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
   ! Largest error for which the linearised equations hold.
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
@@ -100,6 +101,7 @@ contains
     integer :: is_short
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
+    logical :: is_guessed                     ! whether the size of an own state is
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch that is a touch
@@ -160,9 +162,10 @@ contains
         if (solution%status /= COMPLETE) exit
         cycle
       end if
-      if ((found%steps == 0 .or. from_rest) .and. tries < MOST_TRIES) then
-        ! The omega that a body at rest is about to reach is a guess too.
-        if (factor < merge(SHORTER, MUCH_SHORTER, from_rest)) then
+      if ((found%steps == 0 .or. from_rest .or. is_guessed) .and. tries < MOST_TRIES) then
+        ! The omega that a body at rest is about to reach is a guess too. If the last term is the
+        ! largest, it is also the guessed size of an own state, and the series may diverge.
+        if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), is_guessed)) then
           tries = tries + 1
           s%h = factor*s%h
           cycle
@@ -223,6 +226,8 @@ contains
           solution%status = OVERFLOW
           exit
         end if
+        ! In a shorter step a guess would be smaller, and rounding errors relatively larger.
+        if (is_guessed) call keep_guesses()
         s%h = 0.5_dp*factor*s%h
         cycle
       end if
@@ -413,13 +418,26 @@ contains
 
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
       weights(4:first_own - 1) = 2.0_dp
+      is_guessed = .false.
       do i = first_own, n
         own_size = own_sizes(i)
-        if (.not. own_size > 0.0_dp) own_size = largest_terms(i, i, s%order)
+        if (.not. own_size > 0.0_dp) then
+          own_size = largest_terms(i, i, s%order)
+          is_guessed = is_guessed .or. own_size > 0.0_dp
+        end if
         weights(i) = 0.0_dp
         if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
       end do
     end subroutine weigh
+
+    subroutine keep_guesses()
+      !! Set the unknown sizes of own states to their guesses.
+      integer :: i
+
+      do i = first_own, n
+        if (weights(i) > 0.0_dp) own_sizes(i) = max(own_sizes(i), 1.0_dp/weights(i))
+      end do
+    end subroutine keep_guesses
 
     real(dp) function to_end(factor)
       !! Return the factor with which the steps near the end, or before a breakpoint, are equal.

@@ -25,6 +25,7 @@ module tape_solve
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
+  real(dp), parameter :: FINEST = 1e-14_dp ! errors below it are not told from rounding errors
   real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
 
   public :: solve_tape
@@ -106,7 +107,8 @@ contains
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE &
-        .and. (outcome%grazes .or. blurred > UNSURE*request%tolerance)) then
+        .and. (outcome%grazes .or. blurred > UNSURE*request%tolerance &
+               .or. outcome%error > max(request%tolerance, FINEST))) then
       solution%status = SENSITIVE
     end if
     if (solution%status == SLIDING) solution%needed = outcome%slides_at

@@ -286,6 +286,6 @@ def test_arrays_of_torques_in_space_are_those_of_scenes() -> None:
 def test_a_prepared_solver_of_many_starts_has_its_work_limit() -> None:
     scene = case_scene(5)
     starts = np.tile(scene.omega, (2, 1))
-    ample, short = (prepare(scene, "taylor", effort=effort).many for effort in (1.0, 1e-5))
+    ample, short = (prepare(scene, "taylor", 1e-12, effort=effort).many for effort in (1.0, 1e-5))
     assert (ample(starts, 150.0)[1] == Statuses.SENSITIVE).all()
     assert (short(starts, 150.0)[1] == Statuses.GAVE_UP).all()

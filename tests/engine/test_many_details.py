@@ -221,8 +221,9 @@ def test_energy_and_angular_momentum_are_those_of_trajectories(shape: tuple[int,
     given: Any = {key: body}
     scene = Scene("many", (0.0, 0.0, 1.0), moments=(1.0, 2.0, 2.5))
     turned = (0.5, 0.5, -0.5, 0.5)
-    found = solve_many(scene, times=times, omega=starts, attitude=turned, **given)
-    last = solve_many(scene, 2.5, omega=starts, attitude=turned, **given)
+    settings: Any = {**given, "omega": starts, "attitude": turned, "tolerance": 1e-12}
+    found = solve_many(scene, times=times, **settings)
+    last = solve_many(scene, 2.5, **settings)
     for i in range(4):
         own: Any = body if len(shape) == 1 or shape == (3, 3) else body[i]
         of_one: Any = {key: own.tolist()}

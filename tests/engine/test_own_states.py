@@ -1,5 +1,6 @@
 """States of the user's own: examples with a closed form or conserved quantity, random ones."""
 
+import cmath
 import math
 from typing import Any
 
@@ -74,7 +75,7 @@ def test_a_flexible_appendage_keeps_energy_and_has_its_frequency() -> None:
     start = {"angle": 0.1, "rate": 0.0}
     scene = Scene("flexible", (0.0, 0.0, 0.2), MOMENTS, torque=flexible, states=start)
     times = np.linspace(0.0, 50.0, 80)
-    found = solve(scene, times)
+    found = solve(scene, times, tolerance=1e-12)
     angle, rate = found.states["angle"], found.states["rate"]
     frequency = math.sqrt(3.0 / 0.5 + 3.0 / 4.0)
     assert np.abs(angle - 0.1 * np.cos(frequency * times)).max() < 1e-13
@@ -92,7 +93,7 @@ def pendulum(t: Any, omega: Any, states: Any) -> Any:
 def test_a_slosh_pendulum_keeps_its_energy() -> None:
     start = {"angle": 2.0, "rate": 0.3}
     scene = Scene("slosh", (0.0, 0.0, 0.0), MOMENTS, torque=pendulum, states=start)
-    found = solve(scene, np.linspace(0.0, 60.0, 100))
+    found = solve(scene, np.linspace(0.0, 60.0, 100), tolerance=1e-12)
     angle, rate = found.states["angle"], found.states["rate"]
     # In the relative motion, the reduced moment is that of both bodies in series.
     energy = 0.5 / (1.0 / 0.2 + 1.0 / 4.0) * rate**2 - 0.3 * np.cos(angle)
@@ -108,7 +109,7 @@ def lagging(t: Any, omega: Any, states: Any, *, lag: float = 0.25) -> Any:
 def test_an_actuator_follows_its_command_with_a_lag() -> None:
     scene = Scene("lag", (0.0, 0.0, 0.0), MOMENTS, torque=lagging, states={"torque": 0.0})
     times = np.linspace(0.0, 3.0, 20)
-    found = solve(scene, times)
+    found = solve(scene, times, tolerance=1e-12)
     assert np.abs(found.states["torque"] - (1.0 - np.exp(-times / 0.25))).max() < 1e-14
     spin = 0.5 * (times - 0.25 * (1.0 - np.exp(-times / 0.25)))
     assert np.abs(found.omega[:, 0] - spin).max() < 1e-14
@@ -242,6 +243,35 @@ def test_size_of_a_state_does_not_matter() -> None:
         rows = solve(scene, np.linspace(0.0, 9.0, 10), tolerance=1e-9)
         found.append((rows.omega.tolist(), (rows.states["x"] / size).tolist(), rows.steps))
     assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8, 1e-9, 1e-12])
+@pytest.mark.parametrize("start", [0.0, 1.7])
+@pytest.mark.parametrize("power", [0, 6])
+def test_a_state_that_begins_at_zero_has_a_size(tolerance: float, start: float, power: int) -> None:
+    """The first step follows the omega, which is slow, and the guessed size of the state."""
+
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        late = t - start
+        fast = (
+            np.where(t > start, late**power * np.sin(90.0 * late), 0.0)
+            if start
+            else (t**power * np.sin(90.0 * t))
+        )
+        return [0.0, 0.0, 1e-9 * states["fast"]], {"fast": fast}
+
+    scene = Scene("fast", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"fast": 0.0})
+    found: Any = solve(scene, [5.0], tolerance=tolerance)
+    # The integral of s**n exp(90 i s), by parts.
+    late, integral = 5.0 - start, 0j
+    for k in range(power + 1):
+        edge = late**k * cmath.exp(90j * late) - (k == 0)
+        integral = (edge - k * integral) / 90j
+    wanted = integral.imag
+    size = max(late**power / 90.0, abs(wanted))
+    assert found.ended in ("complete", "sensitive")
+    assert found.states["fast"][0] == pytest.approx(wanted, abs=tolerance * size)
+    assert found.error < max(tolerance, 1e-12)
 
 
 def test_a_larger_scale_is_a_looser_tolerance() -> None:

@@ -118,9 +118,9 @@ def test_times_in_any_number_have_the_same_derivatives() -> None:
     times = np.linspace(0.0, 9.0, 300)
     many = slopes(BRICK, times, "omega", "moments")
     one = slopes(BRICK, 9.0, "moments")
-    assert np.abs(many["moments"][-1] - one[0]).max() <= 1e-12 * np.abs(one).max()
+    assert np.abs(many["moments"][-1] - one[0]).max() <= 1e-9 * np.abs(one).max()
     few = slopes(BRICK, times[::50], "omega")
-    assert np.abs(few - many["omega"][::50]).max() <= 1e-12 * np.abs(few).max()
+    assert np.abs(few - many["omega"][::50]).max() <= 1e-9 * np.abs(few).max()
 
 
 def test_more_columns_than_lanes() -> None:

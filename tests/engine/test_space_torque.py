@@ -203,7 +203,7 @@ def test_motion_far_from_one_is_the_same(factor: float) -> None:
 
 
 def test_what_rounding_has_become_is_told() -> None:
-    found: Any = solve(PUSHED, [300.0], attitude=True)
+    found: Any = solve(PUSHED, [300.0], tolerance=1e-12, attitude=True)
     assert found.ended == "sensitive"
     assert found.error > 1e-12
     assert found.growth is None

@@ -28,6 +28,7 @@ from pyharness.thesis.many import run_many
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
+_TOLERANCE = 1e-12
 _EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected time beforehand
 
 

@@ -96,7 +96,7 @@ def test_json_has_the_polynomials(printed: Printed) -> None:
     record = json.loads(printed("run --scene booms.toml --method auto --times 2 --format json"))
     Draft202012Validator(schema_of("run")).validate(record)
     assert record["scene"]["body"] == {"moments": [[40.0, 1.5, -0.25], [30.0, 0.5], [20.0]]}
-    found = solve(Scene("booms", (0.1, 1.0, 1.0), moments=MOMENTS), 2.0)
+    found = solve(Scene("booms", (0.1, 1.0, 1.0), moments=MOMENTS), 2.0, attitude=True)
     assert record["trajectory"]["omega"] == found.omega.tolist()
 
 

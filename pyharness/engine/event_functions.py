@@ -35,9 +35,9 @@ _Columns = tuple[Array, Array, Array | None]
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude, behind which own states may follow, and the derivative
-    of omega. `terminal` and `direction`
-    are as in `crosses`; `counts_touches` says whether roots without a sign change are events.
+    `function` takes time, omega, attitude (perhaps followed by own states) and the derivative of
+    omega. `terminal` and `direction` are as in `crosses`; `counts_touches` says whether roots
+    without a sign change are events.
     """
 
     name: str

@@ -84,8 +84,8 @@ def solve_many(
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
-        Times (s) in order for all bodies instead of `t_end`. The result has a further axis, of
-        length m, after that of the bodies; its rows are those for these final times, to the bit.
+        Times (s) in order for all bodies, instead of `t_end`. The result has a further axis of
+        length m after that of the bodies; each row has the bits of a call with this final time.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -138,8 +138,8 @@ def solve_many(
     ------
     InputError
         If the arrays differ in their numbers of rows, the method can't solve the bodies, the
-        tolerance or effort is out of range, or events or sensitivities can't be computed; or unless
-        one of `t_end` and `times` is given.
+        tolerance or effort is out of range, events or sensitivities can't be computed, or neither
+        or both of `t_end` and `times` are given.
     NotBuiltError
         If the extension is not built.
 

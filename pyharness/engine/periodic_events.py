@@ -38,10 +38,10 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times of events until `end` (s), and how many of the first are from `times`.
+    """Return the times of events until `end` (s), and how many precede the repeated period.
 
-    Raise InputError for more than 5 000 000 events. `times` (s) are the events of the first PERIODS
-    periods.
+    `times` (s) are the events of the first PERIODS periods. Raise InputError for more than
+    5 000 000 events.
     """
     # An event at the end of a period may be found on either side of it, and is not lost here.
     margin = _MARGIN * period

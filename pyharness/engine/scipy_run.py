@@ -73,10 +73,9 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`.
 
-        It has dense output `with_steps`, or if there are no `times`.
-
-        The result's times are in units of `self.unit` seconds, the arguments in s. Raise
-        NoNumberError if Radau's linear algebra refuses a number, or the time is NaN.
+        It has dense output if `with_steps`, or without `times`. Its times are in units of
+        `self.unit` seconds, the arguments in s. Raise NoNumberError if Radau's linear algebra
+        refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 

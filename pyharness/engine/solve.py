@@ -87,9 +87,9 @@ def solve(
         has one or its torque needs one. The tolerance also applies to its angle (rad).
     dense_output : bool
         Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        to within the tolerance. By Taylor series, and for an opaque torque, `sol` has the steps
-        of the integration; else further integrations are needed. With a fixed step it is a cubic on
-        each step.
+        to within the tolerance. It is a closed form, or has the steps of the integration: Taylor
+        series, or under an opaque torque those of `dop853` and `lsoda`. Other methods need further
+        integrations, and those with a fixed step have a cubic on each step.
     events : callable, Event, or list of these
         Functions with the arguments of a torque, or events of `pyharness.events`, whose roots
         between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are as in

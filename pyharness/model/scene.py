@@ -103,10 +103,10 @@ class Scene:
         `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
-    torque : TorqueLaw, three numbers, or function of (t, omega) or (t, omega, attitude)
-        The torque; zero by default. Three numbers are constant. A function returns the components
-        about the body axes. It is recorded with symbols; one that can't be is passed as
-        ``opaque(function)``.
+    torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
+        The torque; zero by default. Three numbers are constant. `pyharness.torques` makes a
+        StateTorque. A function returns the components about the body axes, and is recorded with
+        symbols; one that can't be recorded is passed as ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, or ChangingInertia, optional

@@ -473,7 +473,7 @@ class Symbol:
         return negated((self - other).switch())
 
     def __eq__(self, other: object) -> Any:
-        """Refuse the comparison, which is false but for instants."""
+        """Refuse the comparison, which is true at isolated times at most."""
         raise self.recorder.refusal("a comparison with == or !=", "< and > in numpy.where")
 
     __ne__ = __eq__

@@ -104,7 +104,8 @@ class Trajectory(Conversions):
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        Numbers of steps (for SciPy's methods and the reference, of rows) and right-hand sides.
+        Numbers of steps (SciPy's methods and the reference: of rows), and of evaluations of the
+        right-hand side.
     ended : str
         How the integration ended. Endings with all rows are "complete"; "sensitive" if the
         amplified rounding error exceeds the tolerance; and "unchecked" if the series that bounds
@@ -117,10 +118,11 @@ class Trajectory(Conversions):
     ier : ndarray of int, shape (n,), or None
         Error codes of the collocation programs' linear solver; 129 for a singular matrix.
     error : float or None
-        Estimated error of any component, relative to the largest one along the trajectory.
+        Largest estimated error in any row, of omega relative to its largest component along the
+        trajectory, or of the attitude (rad).
     growth : float or None
-        The error amplification: the largest norm of the state-transition matrices of omega to the
-        end.
+        The error amplification: the largest norm of the state-transition matrix of omega from any
+        time to the end.
     reason : str or None
         The time and the operation at which a recorded torque is undefined, or slides.
     attitude : ndarray, shape (n, 4), or None

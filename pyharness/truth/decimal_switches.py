@@ -18,9 +18,10 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that are one
 
 
 class Switches:
-    """The results of the switches of a tape, in `results` by slot, and the levels of operands.
+    """The results of the switches of a tape, in `results` by slot.
 
-    On a level, the next step begins; `_levels` has it by slot: -1 for the lower, 1 for the upper.
+    An operand at a level, where its switch changes, is in `_levels` by slot, with the end of the
+    interval that the next step leaves: -1 for the lower end, 1 for the upper.
     """
 
     def __init__(self, tape: TapeSeries) -> None:

@@ -45,10 +45,10 @@ class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
     The limits contain `made`, the sum of the errors allowed in the steps (relative, or rad), and
-    rounding errors. `limit` amplifies `made`; its `steps` is the number of roundings of omega, 0
-    with compensated summation. It is at most 2, because components up to `largest` differ by no
-    more. `angle_limit` contains the angle that results if omega has its largest rounding error at
-    all times.
+    rounding errors. `limit` amplifies `made`, and is at most 2, because components up to `largest`
+    differ by no more; its `steps` is the number of roundings of omega, 0 with compensated
+    summation. `angle_limit` contains the angle that results if omega has its largest rounding error
+    at all times.
     """
 
     # largest factor from an error of omega at any time to the error at the end, at least 1
@@ -118,8 +118,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and what is returned with the last
-    times. Raise InputError if more than `most` intervals would be needed; `fewest` are tried first.
+    `sample` returns the largest rate (1/s) at given times, and results there; those at the times
+    returned are returned too. Raise InputError if more than `most` intervals would be needed;
+    `fewest` are tried first.
     """
     count = fewest
     while True:

@@ -2,10 +2,10 @@
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. `parts` divides
 the step size; rows are at the steps of the case. Arrays have the shape (steps, 3) or (n, steps, 3);
-the values of a `Grade` have the shape () or (n,). The `rule`
-of the claim in `data/claims.toml` describes the grades. An error is the largest of any component of
-omega over the steps that the program ran, against the reference solution. The range of a component
-is its largest minus its smallest value.
+the values of a `Grade` have the shape () or (n,). The `rule` of the claim in `data/claims.toml`
+describes the grades. An error is the largest of any component of omega over the steps that the
+program ran, against the reference solution. The range of a component is its largest minus its
+smallest value.
 """
 
 import functools

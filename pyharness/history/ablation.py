@@ -251,7 +251,10 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
             columns += [Column(f"w {end}", short, unit="rad/s")]
             columns += [Column(f"V {end}", short, unit="m/s")]
         columns += [Column("steps"), Column("stop")]
-        text += [[*heading(scene), title, *key], [Table(columns, subsets)]]
+        text += [
+            [*heading(scene, [Listing.original(program)]), title, *key],
+            [Table(columns, subsets)],
+        ]
     return Report(
         "compare",
         text,

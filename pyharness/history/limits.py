@@ -229,7 +229,7 @@ def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
     """Return the report of `limits`: the programs' distances from their limits."""
-    text: list[Section] = [heading(scene)]
+    text: list[Section] = [heading(scene, [Listing.original(each.program) for each in found])]
     data = []
     for each in found:
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]

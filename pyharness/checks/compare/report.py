@@ -5,6 +5,7 @@ from typing import Any
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
 from pyharness.checks.compare.picture import comparison_picture
+from pyharness.model.assumptions import mark
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -40,7 +41,8 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     """
     has_programs = bool(comparison.programs)
     numerics = numerics or not has_programs
-    scene, truth, bound = heading(comparison.scene), comparison.reference, comparison.bound
+    scene = heading(comparison.scene, [each.listing for each in comparison.programs])
+    truth, bound = comparison.reference, comparison.bound
     reference = [f"reference: {truth.source}, error of any w at most {bound.text()}"]
     reference += [f"WARNING: {bound.warning}"] if bound.warning else []
     legend = _PROGRAMS_LEGEND if has_programs else _METHODS_LEGEND
@@ -145,7 +147,8 @@ def _programs(comparison: Comparison, numerics: bool) -> Table:
     for each in comparison.programs:
         run, good, listing = each.trajectory, each.accuracy, each.listing
         end = _end(run, comparison.lipschitz)
-        row = [listing.program, listing.label, run.steps, end, *good.omega, good.velocity]
+        label = f"{listing.label}{mark(comparison.scene, listing)}"
+        row = [listing.program, label, run.steps, end, *good.omega, good.velocity]
         row += [good.energy, good.momentum, each.ulps, each.seconds_per_step]
         rows.append(row[: len(columns)])
     return Table(columns, rows)

@@ -3,6 +3,7 @@
 import math
 import string
 import textwrap
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -153,18 +154,32 @@ def _size(found: Effect) -> list[float]:
     return [float(f"{each:.2e}") for each in (*found.common, found.omega, found.velocity)]
 
 
-def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Return the report of the critical apparatus, with a line for each entry."""
-    rows = [
-        [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
-        for each in entries
-    ]
-    legend = (
+def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
+    """Return the report of the critical apparatus, with a line for each entry.
+
+    The text has the defects that change numbers alone, unless `are_all_shown`.
+    """
+    shown = entries
+    head = (
         "kind: defect (a fault of the author), reading (a card that can be read in two ways), "
         "conjecture (an assumption where no card exists), and others. flag: number of the switch "
         "in the programs; -: no switch. `defects NAME` shows statements, evidence and effect."
     )
-    return Report("defects", [[legend], [Table(_ENTRIES, rows)]], lambda: {"entries": entries})
+    names = ["id", "kind", "certainty", "flag", "summary"]
+    columns, end = _ENTRIES, []
+    if not are_all_shown:
+        shown = [each for each in entries if each["kind"] == "defect" and "flag" in each]
+        names = ["id", "certainty", "summary"]
+        columns = tuple(each for each in _ENTRIES if each.head not in ("kind", "flag"))
+        head = (
+            f"The {len(shown)} faults of the author that change numbers. "
+            "`defects NAME` shows statements, evidence and effect of one."
+        )
+        kinds = Counter(each["kind"] for each in entries if each not in shown)
+        told = ", ".join(f"{kind} {number}" for kind, number in kinds.items())
+        end = [f"{kinds.total()} more entries: {told}. `defects --all` shows them, or --kind KIND."]
+    rows = [[each.get(name, "-") for name in names] for each in shown]
+    return Report("defects", [[head], [Table(columns, rows)], end], lambda: {"entries": entries})
 
 
 def entry_report(

@@ -1,4 +1,4 @@
-"""What this edition supplies where the thesis gives nothing or can be read in two ways."""
+"""Values that this edition supplies where the thesis gives nothing or can be read in two ways."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -85,7 +85,11 @@ def test_lattice_is_whole_and_sorted() -> None:
 
 
 def test_defects_on_the_command_line(printed: Printed) -> None:
-    listed = printed("defects")
+    listed, brief = printed("defects --all"), printed("defects")
+    assert [line.split()[0] for line in brief.splitlines() if line[:1].islower()] == [
+        "name", *names_of("defect")
+    ]  # fmt: skip
+    assert f"\n{len(entries()) - len(names_of('defect'))} more entries: " in brief
     pages = {each["id"]: printed(f"defects {each['id']}") for each in entries()}
     assert max(len(line) for page in (listed, *pages.values()) for line in page.splitlines()) <= 100
     for each in entries():

@@ -1,4 +1,4 @@
-"""What is assumed is marked where a number depends on it, and nowhere else."""
+"""Assumptions are marked where a number depends on them, and nowhere else."""
 
 from dataclasses import replace
 

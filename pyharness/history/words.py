@@ -124,7 +124,8 @@ def _runs(
     for case, listing in product(cases, listings):
         scene = case_scene(case)
         truth = reference(scene, scene.times())
-        pages, found = [], []
+        pages: list[list[str]] = []
+        found: list[WordRun] = []
         for word in (DOUBLE, *words):
             # The compiled program has the bits of the twin in 53 bits.
             run = in_word.run(scene, listing, word) if found else run_program(scene, listing)

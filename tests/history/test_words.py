@@ -69,6 +69,7 @@ def test_double_is_the_run_in_53_bits(found: Found) -> None:
 def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
     """The corrected Runge-Kutta program has an error of 2.5e-7; 16 bits cost 1000 times more."""
     cell = found[2, "runge-kutta", "corrected"]
+    assert cell.widest is not None
     floor = cell.widest.error
     assert floor == pytest.approx(2.5e-7, rel=0.05)
     for rule in RULES:

@@ -241,8 +241,8 @@ def limits_report(
     text: list[Section] = [
         heading(scene, [Listing.original(each.program) for each in found]),
         [
-            "Limits of the original programs as the step shrinks, with the order of convergence, and "
-            "the distance from the true solution at the smallest step (rad/s):",
+            "Limits of the original programs as the step shrinks, with the order of convergence, "
+            "and the distance from the true solution at the smallest step (rad/s):",
             Table(_ENDS, ends),
         ],
         ["defects that change no omega here, corrected alone:", "; ".join(hidden)],

@@ -66,7 +66,7 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
 COUNT_CARDS = ("execution_time", "seconds", "complexity")  # tests that run no program
 
 
-@pytest.mark.campaign
+@pytest.mark.sampled
 @pytest.mark.parametrize("identity", [each["id"] for each in claims()])
 def test_a_verdict_depends_on_no_other_assumption(identity: str) -> None:
     """Each verdict is computed again without every assumption that its entry does not name."""

@@ -44,7 +44,8 @@ def test_all_is_as_expected_in_every_case() -> None:
         found = compare_programs(case_scene(case))
         assert (found.unexpected, found.not_judged) == ((), ())
         assert [each.ulps for each in found.programs] == [0.0] * 6
-        assert max(map(len, _text(found).splitlines())) <= 100
+        for numerics in (False, True):
+            assert max(map(len, _text(found, numerics).splitlines())) <= 100
         assert verdict(found)[0].startswith("as expected: Fortran = Python bit for bit in 6")
         if case == 6:  # the solution reaches 1e111
             files = saved(comparison_picture(found), "x.png")

@@ -11,6 +11,7 @@ from typing import Any
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.history.cards_report import HALF, beside
+from pyharness.model.assumptions import MARK, open_starts
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -223,14 +224,15 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     told: list[Section] = [
         [
             "Effect, measured now over 100 steps. w: largest error of the angular velocity "
-            "(rad/s); V: of the velocity (m/s); stop: variable and step that ended the run.",
+            "(rad/s) up to the end of the run; V: of the velocity (m/s); stop: variable and step "
+            f"that ended the run; {MARK}: omega(0) of the case is assumed.",
             ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
         ]
     ]
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
         for each in (each for each in effects if each.program == program):
-            row: list[Any] = [each.case]
+            row: list[Any] = [f"{each.case}{MARK if each.case in open_starts() else ''}"]
             for found in (getattr(each, name) for name in _LISTINGS):
                 row += [found.omega, found.velocity, _stop(found)]
             rows.append(row)

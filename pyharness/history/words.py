@@ -121,9 +121,9 @@ def _runs(
 ) -> Iterator[list[WordRun]]:
     """Yield the run in binary64 and those in `words`, of each listing on each case."""
     every, done = len(cases) * len(listings) * len(words), 0
+    truths = {case: reference(case_scene(case), case_scene(case).times()) for case in cases}
     for case, listing in product(cases, listings):
-        scene = case_scene(case)
-        truth = reference(scene, scene.times())
+        scene, truth = case_scene(case), truths[case]
         pages: list[list[str]] = []
         found: list[WordRun] = []
         for word in (DOUBLE, *words):

@@ -95,6 +95,8 @@ def test_defects_on_the_command_line(printed: Printed) -> None:
     for each in entries():
         assert f"\n{each['id']} " in listed
         assert ("Effect, measured now" in pages[each["id"]]) == ("flag" in each)
+    rows = [line.split()[0] for line in pages["stage-base"].splitlines() if line[:1].isdigit()]
+    assert rows == ["1*", "2", "3*", "4*", "5", "6*", "7*"]
     record = json.loads(printed("defects --kind reading --format json"))
     assert [each["id"] for each in record["entries"]] == list(names_of("reading"))
     record = json.loads(printed("defects dt-accumulates --format json"))

@@ -29,6 +29,7 @@ from pyharness.history.identifiers import text_digest
 from pyharness.history.limits import limit
 from pyharness.history.words import WordRun
 from pyharness.history.words import cells as word_cells
+from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import Column, Report, Table, words
@@ -319,7 +320,7 @@ def _tuple(numbers: Iterable[float]) -> str:
 
 
 def _cases_table() -> str:
-    assumed = facts("claims")["assumed"]["cases"]
+    assumed = open_starts()
     rows = []
     for each in facts("cases")["case"]:
         start = _tuple(each["omega"])

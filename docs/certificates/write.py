@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pyharness.history.claims.laboratory import starts
-from pyharness.model.facts import facts
+from pyharness.model.assumptions import open_starts
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.truth.certificate import prove
@@ -49,7 +49,7 @@ def planned() -> list[Planned]:
         scene = case_scene(case)
         times = sorted({*scene.times(), *TIMES, *(t / 2.0 for t in TIMES)})
         found.append(Planned(file_name(case), case, scene, times))
-        if case in facts("claims")["assumed"]["cases"]:
+        if case in open_starts():
             for start in starts():
                 if start != scene.omega:
                     name = f"case-{case}-from-{'-'.join(f'{x:g}' for x in start)}.json"

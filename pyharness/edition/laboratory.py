@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.port_protocol import requested_scene
+from pyharness.model.assumptions import MARK
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, flagged, switches
 from pyharness.model.report import short
@@ -122,7 +123,7 @@ def _statements(program: str, first: int, last: int) -> list[tuple[int, str]]:
 def _described(scene: Scene) -> list[str]:
     lines = heading(scene)
     body, torque, *_ = lines[1].split("; ")
-    return [f"{body}; {torque}", *lines[2:]]
+    return [f"{body}; {torque}", *(each for each in lines[2:] if not each.startswith(MARK))]
 
 
 def _first() -> dict[str, Any]:

@@ -106,7 +106,7 @@ def trajectory_report(
     return Report(
         "run",
         text=[
-            [*heading(scene), title],
+            [*heading(scene, filter(None, [listing])), title],
             [counted],
             [ending(trajectory), *estimates(trajectory), *_bounds(bound)],
         ],

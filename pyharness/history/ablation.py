@@ -3,13 +3,15 @@
 import math
 import string
 import textwrap
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.history.cards_report import HALF, beside
+from pyharness.model.assumptions import MARK, open_starts
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -19,7 +21,7 @@ from pyharness.model.report import Column, Field, Report, Section, Table, number
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.scene_report import heading
-from pyharness.model.trajectory import Stop
+from pyharness.model.trajectory import Stop, Trajectory
 from pyharness.thesis.cells import subsets
 from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
@@ -31,17 +33,14 @@ _EFFECTS = words("case")
 for _a in "abcd":
     _EFFECTS += [Column(f"w.{_a}", short, unit="rad/s"), Column(f"V.{_a}", short, unit="m/s")]
     _EFFECTS += [Column(f"stop.{_a}")]
-_SUBSETS = (
-    *words("active"), Column("error of w", short, unit="rad/s"),
-    Column("error of V", short, unit="m/s"), Column("steps"), Column("stop"),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Effect:
     """The outcome of one listing on one scene.
 
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, and
+    `common` those over the steps that all compared listings completed; NaN if not compared.
     """
 
     listing: Listing
@@ -50,6 +49,7 @@ class Effect:
     steps: int
     ended: str
     stop: Stop | None
+    common: tuple[float, float] = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,13 @@ def entry(name: str) -> dict[str, Any]:
 def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0) -> Effect:
     """Return the outcome of a listing on a scene, with errors against `truth`."""
     run = run_program(scene, listing, effort=effort)
+    return Effect(listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop)
+
+
+def _errors(scene: Scene, run: Trajectory, truth: Reference) -> tuple[float, float]:
+    """Return the largest errors of omega (rad/s) and of the velocity (m/s)."""
     found = accuracy(scene, run, truth)
-    velocity = math.nan if found.velocity is None else found.velocity
-    return Effect(listing, max(found.omega), velocity, run.steps, run.ended, run.stop)
+    return max(found.omega), math.nan if found.velocity is None else found.velocity
 
 
 @cache
@@ -118,15 +122,26 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return a program's outcomes with every subset of its defects, largest error first.
+    """Return a program's outcomes with every subset of its defects.
 
-    The `readings` and, under a varying torque, the conjectures vary too. A reading has no effect if
-    a defect in the same statement is corrected.
+    The largest error over the steps that all runs completed comes first. The `readings` and, under
+    a varying torque, the conjectures vary too. A reading has no effect if a defect in the same
+    statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     listings = [Listing(program, each) for each in subsets((*switched(scene, program), *readings))]
-    found = [effect(scene, listing, truth, effort=effort) for listing in listings]
+    runs = [run_program(scene, listing, effort=effort) for listing in listings]
+    n = min(each.steps for each in runs)
+    assert truth.velocity is not None
+    begin = replace(truth, time=truth.time[:n], omega=truth.omega[:n], velocity=truth.velocity[:n])
+    found = [
+        Effect(
+            listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop,
+            _errors(scene, run, begin),
+        )
+        for listing, run in zip(listings, runs, strict=True)
+    ]  # fmt: skip
     return sorted(found, key=_size, reverse=True)
 
 
@@ -135,25 +150,37 @@ def switched(scene: Scene, program: str) -> tuple[str, ...]:
     return switches(program) if scene.torque.varies else names_of("defect", program)
 
 
-def _size(found: Effect) -> tuple[float, float]:
-    # An overflow is worse than any finite error.
-    worst = math.inf if found.ended == "overflow" else found.omega
+def _size(found: Effect) -> list[float]:
     # Rounded to three digits, so that rounding errors do not affect the order.
-    return float(f"{worst:.2e}"), float(f"{found.velocity:.2e}")
+    return [float(f"{each:.2e}") for each in (*found.common, found.omega, found.velocity)]
 
 
-def apparatus_report(entries: Sequence[dict[str, Any]]) -> Report:
-    """Return the report of the critical apparatus, with a line for each entry."""
-    rows = [
-        [each["id"], each["kind"], each["certainty"], each.get("flag", "-"), each["summary"]]
-        for each in entries
-    ]
-    legend = (
+def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
+    """Return the report of the critical apparatus, with a line for each entry.
+
+    The text has the defects that change numbers alone, unless `are_all_shown`.
+    """
+    shown = entries
+    head = (
         "kind: defect (a fault of the author), reading (a card that can be read in two ways), "
         "conjecture (an assumption where no card exists), and others. flag: number of the switch "
         "in the programs; -: no switch. `defects NAME` shows statements, evidence and effect."
     )
-    return Report("defects", [[legend], [Table(_ENTRIES, rows)]], lambda: {"entries": entries})
+    names = ["id", "kind", "certainty", "flag", "summary"]
+    columns, end = _ENTRIES, []
+    if not are_all_shown:
+        shown = [each for each in entries if each["kind"] == "defect" and "flag" in each]
+        names = ["id", "certainty", "summary"]
+        columns = tuple(each for each in _ENTRIES if each.head not in ("kind", "flag"))
+        head = (
+            f"The {len(shown)} faults of the author that change numbers. "
+            "`defects NAME` shows statements, evidence and effect of one."
+        )
+        kinds = Counter(each["kind"] for each in entries if each not in shown)
+        told = ", ".join(f"{kind} {number}" for kind, number in kinds.items())
+        end = [f"{kinds.total()} more entries: {told}. `defects --all` shows them, or --kind KIND."]
+    rows = [[each.get(name, "-") for name in names] for each in shown]
+    return Report("defects", [[head], [Table(columns, rows)], end], lambda: {"entries": entries})
 
 
 def entry_report(
@@ -197,14 +224,15 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     told: list[Section] = [
         [
             "Effect, measured now over 100 steps. w: largest error of the angular velocity "
-            "(rad/s); V: of the velocity (m/s); stop: variable and step that ended the run.",
+            "(rad/s) up to the end of the run; V: of the velocity (m/s); stop: variable and step "
+            f"that ended the run; {MARK}: omega(0) of the case is assumed.",
             ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
         ]
     ]
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
         for each in (each for each in effects if each.program == program):
-            row: list[Any] = [each.case]
+            row: list[Any] = [f"{each.case}{MARK if each.case in open_starts() else ''}"]
             for found in (getattr(each, name) for name in _LISTINGS):
                 row += [found.omega, found.velocity, _stop(found)]
             rows.append(row)
@@ -220,24 +248,42 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
         readings = sorted({name for each in effects for name in each.listing.readings})
         names = (*switched(scene, program), *readings)
         letters = dict(zip(names, string.ascii_lowercase, strict=False))
-        title = f"program {program}: every subset of its defects, sorted by effect"
+        n = min(each.steps for each in effects)
+        title = (
+            f"program {program}: every subset of its defects, largest error first. w, V: largest "
+            f"error of the angular velocity (rad/s) and of the velocity (m/s) up to step {n}, "
+            "which all runs reached, and up to the end of the run"
+        )
         key = [f"  {letter}  {name}" for name, letter in letters.items()]
         subsets = []
         for each in effects:
             errors, active = (each.omega, each.velocity, each.steps), each.listing.active
             written = "".join(a if name in active else "." for name, a in letters.items())
-            subsets.append([written, *errors, _stop(each)])
+            subsets.append([written, *each.common, *errors, _stop(each)])
             variable = each.stop.variable if each.stop else None
-            rows.append([program, " ".join(sorted(active)), *errors, each.ended, variable])
-        text += [[*heading(scene), title, *key], [Table(_SUBSETS, subsets)]]
+            row = [program, " ".join(sorted(active)), *errors, each.ended, variable]
+            rows.append([*row, *each.common])
+        columns = [*words("active")]
+        for end in (f"to {n}", "to end"):
+            columns += [Column(f"w {end}", short, unit="rad/s")]
+            columns += [Column(f"V {end}", short, unit="m/s")]
+        columns += [Column("steps"), Column("stop")]
+        text += [
+            [*heading(scene, [Listing.original(program)]), title, *key],
+            [Table(columns, subsets)],
+        ]
     return Report(
         "compare",
         text,
         record=lambda: {
             "scene": scene_record(scene),
-            "lattice": {name: list(map(_effect_record, each)) for name, each in found.items()},
+            "lattice": {name: list(map(_subset_record, each)) for name, each in found.items()},
         },
-        data=numbers("program active error_w error_v steps ended stop_variable", rows),
+        data=numbers(
+            "program active error_w error_v steps ended stop_variable common_error_w "
+            "common_error_v",
+            rows,
+        ),
     )
 
 
@@ -250,6 +296,11 @@ def _effect_record(effect: Effect) -> dict[str, Any]:
         "ended": effect.ended,
         "stop": None if effect.stop is None else asdict(effect.stop),
     }
+
+
+def _subset_record(effect: Effect) -> dict[str, Any]:
+    common = dict(zip(("common_error", "common_velocity_error"), effect.common, strict=True))
+    return _effect_record(effect) | common
 
 
 def _stop(found: Effect) -> str:

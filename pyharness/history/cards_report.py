@@ -30,18 +30,49 @@ _SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
 HALF = 48  # width, in characters, of each of two texts printed side by side
 
 
-def cards_report(cards: Sequence[Card], title: str = "cards") -> Report:
-    """Return the report of `cards`, each with its lines in scan, port and twin, and its entries."""
+def cards_report(
+    cards: Sequence[Card], title: str = "cards", only_contents: bool = False
+) -> Report:
+    """Return the report of `cards`, each with its lines in scan, port and twin, and its entries.
+
+    With `only_contents` the text has a table of contents instead.
+    """
     rows = [
         [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
         for each in cards
     ]
     return Report(
         title,
-        [_block(each) for each in cards],
+        _contents(cards) if only_contents else [_block(each) for each in cards],
         record=lambda: {"cards": [card_record(each) for each in cards]},
         data=columns("program card statement scan entries", rows),
     )
+
+
+def _contents(cards: Sequence[Card]) -> list[Section]:
+    """Return a table of the parts of each program, as its comment cards name them."""
+    parts: list[str] = []
+    ranges: dict[tuple[str, str], list[int]] = {}
+    for program in PROGRAMS:
+        part, place = "", -1
+        for card in (each for each in cards if each.program == program):
+            if card.is_comment and " " in card.statement:
+                part = card.statement.partition(" ")[2]
+            elif not card.is_comment:
+                if part not in parts:
+                    parts.insert(place + 1, part)
+                place = parts.index(part)
+                ranges.setdefault((part, program), []).append(card.number)
+    rows = []
+    for part in parts:
+        row = [ranges.get((part, program)) for program in PROGRAMS]
+        ends = ["-".join(map(str, dict.fromkeys((x[0], x[-1])))) if x else None for x in row]
+        rows.append([part or "(declarations)", *ends])
+    return [
+        ["Cards of each part of the programs, under the comment card that begins it:"],
+        [Table([*words("part"), *words(" ".join(PROGRAMS))], rows)],
+        ["`cards two-term:1660` shows a card, `cards 1040-1090` a range, `cards two-term` all."],
+    ]
 
 
 def card_record(card: Card) -> dict[str, Any]:

@@ -8,6 +8,7 @@ the coefficients of a method.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
@@ -340,7 +341,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
         [member.weighting, member.points_label, member.terms, member.corrections, *measure.values()]
         for member, measure in zip((each.member for each in found), measures, strict=True)
     ]
-    page = [heading(scene), *_tables(found), verdict(found)]
+    page = [heading(scene), [*_finding(found), *verdict(found)], *_tables(found)]
     return Report(
         "family",
         text=page,
@@ -355,6 +356,24 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
         data=numbers("weighting points terms corrections predicted measured settled error", data),
         page=page,
     )
+
+
+def _finding(found: Sequence[OrderFinding]) -> list[str]:
+    """Return a sentence on the order with one correction, if several methods have one."""
+    orders = Counter(
+        round(each.measured)
+        for each in found
+        if each.member.corrections == 1 and each.measured is not None
+    )
+    if orders.total() < 2:
+        return []
+    (order, number), *_ = orders.most_common(1)
+    best = max(found, key=lambda each: each.predicted)
+    return [
+        f"With one correction, as in the programs of the thesis, {number} of {orders.total()} "
+        f"methods have order {order}, whatever their number of terms; with "
+        f"{best.member.corrections} corrections the highest order is {best.predicted}."
+    ]
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:

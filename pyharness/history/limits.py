@@ -16,7 +16,7 @@ from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.records import scene_record
-from pyharness.model.report import Column, Report, Section, Table, digits, short
+from pyharness.model.report import Column, Report, Section, Table, digits, short, words
 from pyharness.model.scene import Scene
 from pyharness.model.scene_report import heading
 from pyharness.model.trajectory import Array
@@ -40,6 +40,11 @@ _COLUMNS = (
     Column("from the limit", short, unit="rad/s"),
     Column("from the truth", short, unit="rad/s"),
 )
+
+_ENDS = (
+    *words("program"), Column("order", digits(".2f")),
+    Column("from the truth", short, unit="rad/s"), Column("tends to", left=True, fit="wrap"),
+)  # fmt: skip
 
 Rate = Callable[[float, Sequence[float]], list[float]]
 
@@ -229,15 +234,24 @@ def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
     """Return the report of `limits`: the programs' distances from their limits."""
-    text: list[Section] = [heading(scene)]
+    ends = [
+        [each.program, each.order, each.halvings[-1].from_truth, each.tends_to] for each in found
+    ]
+    hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
+    text: list[Section] = [
+        heading(scene, [Listing.original(each.program) for each in found]),
+        [
+            "Limits of the original programs as the step shrinks, with the order of convergence, "
+            "and the distance from the true solution at the smallest step (rad/s):",
+            Table(_ENDS, ends),
+        ],
+        ["defects that change no omega here, corrected alone:", "; ".join(hidden)],
+    ]
     data = []
     for each in found:
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]
         data += [[each.program, *row] for row in rows]
-        title = f"original {each.program}: tends to {each.tends_to}"
-        text.append([title, Table(_COLUMNS, rows), each.approach])
-    hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
-    text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])
+        text.append([f"original {each.program}:", Table(_COLUMNS, rows), each.approach])
     return Report(
         "limits",
         text,

@@ -7,19 +7,30 @@ compared with the page in binary64, and its omega with the reference solution.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import takewhile, zip_longest
+from itertools import product, takewhile, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
-from pyharness.model.report import Column, Picture, Report, Section, Table, numbers, short, words
+from pyharness.model.report import (
+    Column,
+    Picture,
+    Report,
+    Section,
+    Table,
+    counted,
+    numbers,
+    short,
+    words,
+)
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import in_word
 from pyharness.thesis.linear_solver import SINGULAR
 from pyharness.thesis.printer import page
+from pyharness.thesis.programs import run_program
 from pyharness.thesis.word import RULES, Word
 from pyharness.truth.reference import reference
 
@@ -31,6 +42,8 @@ LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
 DOUBLE, WIDEST = Word(53), Word(113)
 # Multiple of the error with 113 bits above which an error counts as rounding.
 ROUNDS = 2.0
+_VISIBLE = 1e-9  # least error (rad/s) that is compared between arithmetics
+_SMALL = 0.01  # largest change of an error, relative, that leaves a result as it is
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
 _SHORT = {"nearest-even": "ne", "chop": "chop", "FX": "FX", "RX": "RX"}
 _STYLES: dict[str, dict[str, Any]] = {
@@ -67,7 +80,7 @@ class WordCell:
     """The runs of one listing on one case: in binary64, with 113 bits, and in other arithmetics."""
 
     double: WordRun
-    widest: WordRun
+    widest: WordRun | None  # not computed for a verdict
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
@@ -87,20 +100,35 @@ def cells(
     progress: Progress = no_progress,
 ) -> Iterator[WordCell]:
     """Yield the runs of each program, original and corrected, on each case."""
-    words = [Word(p, rule) for rule in RULES for p in lengths]
-    chosen = [
-        (case, listing)
-        for case in cases
-        for program in programs
-        for listing in (Listing.original(program), Listing.corrected(program))
-    ]
-    every, done = len(chosen) * (len(words) + 2), 0
-    for case, listing in chosen:
-        scene = case_scene(case)
-        truth = reference(scene, scene.times())
-        pages, found = [], []
-        for word in (DOUBLE, WIDEST, *words):
-            run = in_word.run(scene, listing, word)
+    kinds = (Listing.original, Listing.corrected)
+    listings = [kind(program) for program in programs for kind in kinds]
+    words = [WIDEST, *(Word(p, rule) for rule in RULES for p in lengths)]
+    for double, widest, *runs in _runs(cases, listings, words, progress):
+        yield WordCell(double, widest, tuple(runs))
+
+
+def machine_cells(
+    cases: Sequence[int], programs: Sequence[str] = PROGRAMS, progress: Progress = no_progress
+) -> list[WordCell]:
+    """Return the runs of each original program on each case in the CDC's arithmetic alone."""
+    words = [Word(p, rule) for _, p, rule in _MACHINE]
+    found = _runs(cases, list(map(Listing.original, programs)), words, progress)
+    return [WordCell(double, None, tuple(runs)) for double, *runs in found]
+
+
+def _runs(
+    cases: Sequence[int], listings: Sequence[Listing], words: Sequence[Word], progress: Progress
+) -> Iterator[list[WordRun]]:
+    """Yield the run in binary64 and those in `words`, of each listing on each case."""
+    every, done = len(cases) * len(listings) * len(words), 0
+    truths = {case: reference(case_scene(case), case_scene(case).times()) for case in cases}
+    for case, listing in product(cases, listings):
+        scene, truth = case_scene(case), truths[case]
+        pages: list[list[str]] = []
+        found: list[WordRun] = []
+        for word in (DOUBLE, *words):
+            # The compiled program has the bits of the twin in 53 bits.
+            run = in_word.run(scene, listing, word) if found else run_program(scene, listing)
             lines = page(scene, listing.program, run).splitlines()
             pages.append(" ".join(lines[len(lines) - run.steps :]).split())
             pairs = list(zip_longest(pages[0], pages[-1]))
@@ -112,9 +140,9 @@ def cells(
                     len(pairs), different, error, singular,
                 )
             )  # fmt: skip
-            done += 1
-            progress(done, every, f"case {case}, {listing.program}")
-        yield WordCell(found[0], found[1], tuple(found[2:]))
+        done += len(words)
+        progress(done, every, f"case {case}, {listing.program}")
+        yield found
 
 
 def _stop(found: Trajectory) -> str:
@@ -161,6 +189,26 @@ def words_report(cells: Sequence[WordCell]) -> Report:
     )
 
 
+def machine_report(cells: Sequence[WordCell]) -> Report:
+    """Return the report of the verdict on the CDC's arithmetic, from `machine_cells`."""
+    runs = [(cell.double, run) for cell in cells for run in cell.runs]
+    stops = sum(run.stop != double.stop for double, run in runs)
+    changes = [
+        abs(run.error / double.error - 1.0) for double, run in runs if double.error > _VISIBLE
+    ]
+    largest = max(changes, default=0.0)
+    subject = "Some result" if stops or largest > _SMALL else "No result"
+    told = [
+        f"{subject} of the original programs depends on the CDC's 48 bits, truncated (cdc48) or "
+        "rounded:",
+        *_changes(cells),
+        f"errors above {short(_VISIBLE)} rad/s change by at most {short(largest)} of themselves; "
+        "--lengths shows each run",
+    ]
+    record = {"runs": [run._asdict() for _, run in runs], "build": build_record()}
+    return Report("words", [told], lambda: record)
+
+
 def _head(cell: WordCell) -> list[Any]:
     return [cell.double.case, cell.double.program, cell.double.listing]
 
@@ -189,14 +237,13 @@ def _changes(cells: Sequence[WordCell]) -> list[str]:
     told = []
     for name, p, rule in _MACHINE:
         found = [(cell.double, run) for cell in cells if (run := cell.find_run(p, rule))]
-        of = f"of {len(found)} runs"
         pages = sum(run.different > 0 for _, run in found)
         stops = sum(run.stop != double.stop for double, run in found)
         changed = sum(run.different for _, run in found)
         every = sum(run.fields for _, run in found)
         told.append(
-            f"{name}: {changed} of {every} printed numbers are not those of binary64, on the pages "
-            f"of {pages} {of}; {stops} {of} end otherwise."
+            f"{name}: {changed} of {every} printed numbers differ from binary64, on {pages} of "
+            f"{len(found)} pages; {counted(stops, 'run')} end{'s' if stops == 1 else ''} otherwise"
         )
     return told
 
@@ -220,6 +267,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
     ]  # fmt: skip
     rows = []
     for cell in cells:
+        assert cell.widest is not None
         floor = cell.widest.error
         near = [run for run in cell.runs if run.error <= ROUNDS * floor]
         least = [cell.settled(rule, near) for rule in RULES]
@@ -254,7 +302,7 @@ def _draw(axes: "Axes", cell: WordCell) -> None:
         points = sorted((run.p, run.error) for run in cell.runs if run.rule == rule)
         lengths, errors = zip(*points, strict=True)
         axes.plot(lengths, errors, label=rule, markersize=4.0, linewidth=1.2, **_STYLES[rule])
-    if cell.widest.error > 0.0:
+    if cell.widest is not None and cell.widest.error > 0.0:
         axes.axhline(cell.widest.error, color="black", linestyle="--", linewidth=0.8)
         axes.set_yscale("log")
     axes.grid(visible=True, linewidth=0.3)

@@ -4,7 +4,9 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 
+from pyharness.model.assumptions import MARK, assumed, legend
 from pyharness.model.changing import ChangingMoments
+from pyharness.model.listing import Listing
 from pyharness.model.report import counted, short
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -16,8 +18,8 @@ from pyharness.model.trajectory import Trajectory
 _LONGEST_TEXT = 60
 
 
-def heading(scene: Scene) -> list[str]:
-    """Return lines that describe a scene."""
+def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
+    """Return lines that describe a scene, with a mark on what is assumed in runs of `listings`."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, ChangingMoments):
@@ -33,10 +35,16 @@ def heading(scene: Scene) -> list[str]:
         torque = _state_torque(scene.torque, unit)
     else:
         torque = "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"
+    found = assumed(scene, listings)
+    on_omega, on_steps = (
+        MARK if any(each["on"] == part for each in found) else "" for part in ("omega", "steps")
+    )
+    number, noun = counted(scene.steps, "step").split()
     lines = [
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
-        f"{body}; {torque}; omega(0) = {_tuple(scene.omega)} rad/s; "
-        f"{counted(scene.steps, 'step')} of {scene.step_size:g} s",
+        f"{body}; {torque}; omega(0) = {_tuple(scene.omega)}{on_omega} rad/s; "
+        f"{number}{on_steps} {noun} of {scene.step_size:g} s",
+        *legend(scene, found),
     ]
     if scene.is_impossible:
         lines.append("no rigid body has these moments: the largest exceeds the sum of the others")

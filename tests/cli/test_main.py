@@ -149,7 +149,7 @@ def test_compare_tells_of_the_growth_of_the_motion(printed: Printed) -> None:
     scene = replace(case_scene(3), omega=(1e-5, 10.0, 0.0), steps=1500)
     assert record["growth"] == solve(scene, scene.times()).growth
     assert record["digits"] == pytest.approx(-math.log10(2.0**-53 * record["growth"]))
-    lines = printed(_BESIDE).splitlines()
+    lines = printed(f"{_BESIDE} --numerics").splitlines()
     assert any(line.startswith("sensitive: rounding errors are amplified by ") for line in lines)
     assert any(line.startswith("error amplification ") for line in lines)
     assert max(map(len, lines)) <= 100

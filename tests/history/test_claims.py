@@ -17,6 +17,7 @@ from pyharness.history.claims.report import KINDS, claims_report, explanation, k
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.history.family import Member
+from pyharness.model.assumptions import assumptions
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, names_of, switches
 from pyharness.model.report import Report
@@ -26,6 +27,7 @@ from tests.conftest import Printed
 pytestmark = pytest.mark.claims
 _LARGER = "larger error of collocation over that of Runge-Kutta"
 SILENT = ("i2-euler-symmetric", "i2-lagrange")  # judged by their sources
+KINDS_OF = ("reading", "conjecture")
 ROOT = Path(__file__).parents[2]
 THESIS = ROOT.parent / "shared/thesis/thesis.txt"
 
@@ -59,6 +61,31 @@ def test_every_entry_is_complete_and_quotes_a_few_words() -> None:
     for section in ("abstract", "II.5", "IV.1", "IV.2", "IV.3", "V.1", "V.2", "V.3", "VI"):
         assert section in sections
     assert {int(n) for n in re.findall(r"V.2, Case (\d)", sections)} == set(range(1, 8))
+
+
+COUNT_CARDS = ("execution_time", "seconds", "complexity")  # tests that run no program
+
+
+@pytest.mark.sampled
+@pytest.mark.parametrize("identity", [each["id"] for each in claims()])
+def test_a_verdict_depends_on_no_other_assumption(identity: str) -> None:
+    """Each verdict is computed again without every assumption that its entry does not name."""
+    entry = claim(identity)
+    every = ["omega0", "steps", *(f"{kind} {name}" for kind in KINDS_OF for name in names_of(kind))]
+    left = [name for name in every if name not in entry["assumptions"]]
+    before = [outcome(entry, Laboratory(each)).verdict for each in (True, False)]
+    for told, other in ledger._alternatives({"assumptions": left}):
+        if entry["test"] in COUNT_CARDS and told.startswith(("reading", "with conj")):
+            continue  # these are on no card
+        after = [outcome(entry, Laboratory(each, other)).verdict for each in (True, False)]
+        assert after == before, told
+
+
+def test_assumptions_of_claims_are_those_of_the_list() -> None:
+    named = {name.rpartition(" ")[2] for each in claims() for name in each["assumptions"]}
+    others = {name for each in claims() for name in each.get("otherwise", {})}
+    named |= {name.partition(":")[0].replace(" ", "-") for name in others}
+    assert named == {each["id"] for each in assumptions()} - {"units"}
 
 
 def test_every_claim_is_judged_and_its_numbers_are_told(judged: Judged) -> None:

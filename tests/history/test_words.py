@@ -12,14 +12,21 @@ from jsonschema import Draft202012Validator
 
 from pyharness.cli import options
 from pyharness.cli.main import main
-from pyharness.history.words import WordCell, WordRun, cells, words_report
+from pyharness.history.words import (
+    WordCell,
+    WordRun,
+    cells,
+    machine_cells,
+    machine_report,
+    words_report,
+)
 from pyharness.model.listing import Listing
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import run_program
 from pyharness.thesis.vectors import OURS
 from pyharness.thesis.word import RULES
-from pyharness.views.render import csv_text
+from pyharness.views.render import csv_text, render
 from tests.conftest import Printed
 from tests.json_reference import schema_of
 
@@ -62,6 +69,7 @@ def test_double_is_the_run_in_53_bits(found: Found) -> None:
 def test_rounding_takes_over_where_words_are_short(found: Found) -> None:
     """The corrected Runge-Kutta program has an error of 2.5e-7; 16 bits cost 1000 times more."""
     cell = found[2, "runge-kutta", "corrected"]
+    assert cell.widest is not None
     floor = cell.widest.error
     assert floor == pytest.approx(2.5e-7, rel=0.05)
     for rule in RULES:
@@ -108,6 +116,20 @@ def test_report_has_every_run(found: Found) -> None:
     assert len(report.text) == 4
     short = [*cells([2], ["runge-kutta"], (24,))]
     assert len(words_report(short).text) == 3
+
+
+def test_verdict_on_the_machine_has_four_lines(printed: Printed) -> None:
+    lines = printed("words --case 2").splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("No result of the original programs depends on the CDC's 48 bits")
+    assert lines[1].startswith("cdc48: 2 of 1775 printed numbers differ")
+    (cell,) = machine_cells([2], ["runge-kutta"])
+    assert (cell.double.stop, cell.widest) == ("V2 at 25", None)
+    double = cell.double
+    worse, later = double._replace(error=2.0 * double.error), double._replace(stop="")
+    for other in (worse, later):
+        told = render(machine_report([WordCell(double, None, (other, double))]), "table")
+        assert told.startswith("Some result of the original programs depends")
 
 
 @pytest.mark.campaign

@@ -185,6 +185,17 @@ def test_cards_are_told_in_100_columns(asked: str, printed: Printed) -> None:
     assert max(map(len, printed(f"cards {asked}").splitlines())) <= 100
 
 
+def test_cards_without_arguments_are_contents(printed: Printed) -> None:
+    lines = printed("cards").splitlines()
+    assert len(lines) < 40
+    assert ["LIPSCHITZ", "CONDITIONS", "-", "-", "1270-1600"] in [line.split() for line in lines]
+    for program in PROGRAMS:
+        for number, card in deck(program).cards.items():
+            if card.is_comment and " " in card.statement and number > 200:
+                assert card.statement.partition(" ")[2] in "\n".join(lines), card.name
+    assert len(json.loads(printed("cards --format json"))["cards"]) == 528
+
+
 def test_record_of_a_card(printed: Printed) -> None:
     first, second = json.loads(printed("cards two-term:1650-1660 --format json"))["cards"]
     assert (first["card"], first["scan"]) == (1650, "1650-U3(1)=U3(4)")

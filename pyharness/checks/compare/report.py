@@ -5,6 +5,7 @@ from typing import Any
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
 from pyharness.checks.compare.picture import comparison_picture
+from pyharness.model.assumptions import mark
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -12,60 +13,92 @@ from pyharness.model.records import (
     listing_record,
     scene_record,
 )
-from pyharness.model.report import Column, Report, Table, digits, numbers, short, words
+from pyharness.model.report import Column, Report, Section, Table, digits, numbers, short, words
 from pyharness.model.scene_report import heading, sensitive
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import BINARY64
 
 _OMEGA = tuple(Column(name, short, unit="rad/s") for name in ("w1", "w2", "w3"))
 _PROGRAMS_LEGEND = (
-    "w1 to w3, V: largest error of the angular velocity (rad/s) and of the velocity (m/s). "
-    "energy, mom.sq: largest relative drift of the energy and of the squared angular momentum. "
-    "ulp: largest distance between Fortran and Python, in units in the last place. stop: "
-    "variable that ended the run, its Lipschitz quotient and the limit."
+    "stop: variable that ended the run, its Lipschitz quotient and the limit. w1 to w3, V: largest "
+    "error of the angular velocity (rad/s) and of the velocity (m/s), up to the end of the run."
 )
-_METHODS_LEGEND = (
-    "w1 to w3: largest error of the angular velocity (rad/s). energy, mom.sq: largest relative "
-    "drift of the energy and of the squared angular momentum. ms: time of one call."
+_METHODS_LEGEND = "w1 to w3: largest error of the angular velocity (rad/s). ms: time of one call."
+_DRIFTS_LEGEND = (
+    " energy, mom.sq: largest relative drift of the energy and of the squared angular momentum."
+)
+_ULP_LEGEND = " ulp: largest distance between Fortran and Python, in units in the last place."
+_MORE = (
+    "--numerics adds drifts, units in the last place, error amplification, solve_ivp and run times"
 )
 _DRIFTS = (Column("energy", short), Column("mom.sq", short))
 
 
-def comparison_report(comparison: Comparison) -> Report:
-    """Return the report of a comparison."""
-    scene, truth, bound = heading(comparison.scene), comparison.reference, comparison.bound
+def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
+    """Return the report of a comparison.
+
+    Without `numerics`, tables have only the programs' steps, stops and errors.
+    """
+    has_programs = bool(comparison.programs)
+    numerics = numerics or not has_programs
+    scene = heading(comparison.scene, [each.listing for each in comparison.programs])
+    truth, bound = comparison.reference, comparison.bound
     reference = [f"reference: {truth.source}, error of any w at most {bound.text()}"]
     reference += [f"WARNING: {bound.warning}"] if bound.warning else []
-    legend = _PROGRAMS_LEGEND if comparison.programs else _METHODS_LEGEND
-    if comparison.programs:
-        has_fortran = all(each.ulps is not None for each in comparison.programs)
-        timed = f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
-        if comparison.word == BINARY64:
-            timed = "Fortran, with the call"
-        legend += f" us/step: time per step of {timed}."
+    legend = _PROGRAMS_LEGEND if has_programs else _METHODS_LEGEND
     motion = []
-    if comparison.digits is not None:
-        amplified = f"error amplification {short(comparison.growth)}"
-        motion.append(f"{amplified}: rounding leaves {comparison.digits:.1f} digits")
-    attitudes = _attitudes(comparison)
+    if numerics:
+        legend += _DRIFTS_LEGEND
+        if has_programs:
+            legend += f"{_ULP_LEGEND} us/step: time per step of {_timed(comparison)}."
+        if comparison.digits is not None:
+            amplified = f"error amplification {short(comparison.growth)}"
+            motion.append(f"{amplified}: rounding leaves {comparison.digits:.1f} digits")
+    attitudes = _attitudes(comparison, numerics)
     if attitudes:
         legend += " angle: largest error of the attitude (rad)"
-        if comparison.programs:
+        if has_programs:
             legend += "; a program's attitude is integrated from row to row by a method of order 4"
         legend += ". L in space: largest relative drift of the angular momentum."
     failures = [f"failed: {x.method}: {x.failure}" for x in comparison.methods if x.failure]
     told = verdict(comparison)
-    tables = [[_programs(comparison)]] if comparison.programs else []
-    tables.append([_methods(comparison)])
+    tables: list[Section] = []
+    if has_programs:
+        tables.append([_programs(comparison, numerics), *_short_runs(comparison)])
+    if numerics:
+        tables.append([_methods(comparison)])
 
     return Report(
         "compare",
-        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, [*failures, *told]],
+        text=[
+            [*scene, *reference, *motion],
+            [legend],
+            *tables,
+            *attitudes,
+            [*(failures if numerics else [_MORE]), *told],
+        ],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],
         pictures={"omega": lambda: comparison_picture(comparison)},
     )
+
+
+def _timed(comparison: Comparison) -> str:
+    if comparison.word == BINARY64:
+        return "Fortran, with the call"
+    has_fortran = all(each.ulps is not None for each in comparison.programs)
+    return f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
+
+
+def _short_runs(comparison: Comparison) -> list[str]:
+    """Return a sentence for each program that ended early."""
+    return [
+        f"{each.who} ended at step {each.trajectory.steps} of {comparison.scene.steps}: its errors "
+        "are the largest up to there"
+        for each in comparison.programs
+        if each.trajectory.steps < comparison.scene.steps
+    ]
 
 
 def verdict(comparison: Comparison) -> list[str]:
@@ -99,18 +132,25 @@ def _as_expected(comparison: Comparison) -> str:
     return f"{text}; orders {seen} (expected {due})"
 
 
-def _programs(comparison: Comparison) -> Table:
-    columns = (
+def _programs(comparison: Comparison, numerics: bool) -> Table:
+    columns = [
         *words("program listing"), Column("steps"), Column("stop"), *_OMEGA,
-        Column("V", short, unit="m/s"), *_DRIFTS, Column("ulp", _count),
-        Column("us/step", digits(".2f", 1e6), unit="s"),
-    )  # fmt: skip
+        Column("V", short, unit="m/s"),
+    ]  # fmt: skip
+    if numerics:
+        columns += [
+            *_DRIFTS,
+            Column("ulp", _count),
+            Column("us/step", digits(".2f", 1e6), unit="s"),
+        ]
     rows = []
     for each in comparison.programs:
         run, good, listing = each.trajectory, each.accuracy, each.listing
         end = _end(run, comparison.lipschitz)
-        row = [listing.program, listing.label, run.steps, end, *good.omega, good.velocity]
-        rows.append([*row, good.energy, good.momentum, each.ulps, each.seconds_per_step])
+        label = f"{listing.label}{mark(comparison.scene, listing)}"
+        row = [listing.program, label, run.steps, end, *good.omega, good.velocity]
+        row += [good.energy, good.momentum, each.ulps, each.seconds_per_step]
+        rows.append(row[: len(columns)])
     return Table(columns, rows)
 
 
@@ -130,7 +170,7 @@ def _methods(comparison: Comparison) -> Table:
     return Table(columns, rows)
 
 
-def _attitudes(comparison: Comparison) -> list[list[Table]]:
+def _attitudes(comparison: Comparison, numerics: bool) -> list[list[Table]]:
     if comparison.reference.attitude is None:
         return []
     columns = (
@@ -139,7 +179,9 @@ def _attitudes(comparison: Comparison) -> list[list[Table]]:
     found: list[tuple[str, str | None, Accuracy]] = [
         (each.listing.program, each.listing.label, each.accuracy) for each in comparison.programs
     ]
-    found += [(each.method, None, each.accuracy) for each in comparison.methods if each.accuracy]
+    if numerics:
+        methods = comparison.methods
+        found += [(each.method, None, each.accuracy) for each in methods if each.accuracy]
     rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found]
     return [[Table(columns, rows)]]
 

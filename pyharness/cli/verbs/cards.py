@@ -25,7 +25,7 @@ _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-readi
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards (lines of the programs), by program, number or range, as in "
-    "two-term, 1660, 1040-1090 or two-term:1660 (default: all).",
+    "two-term, 1660, 1040-1090 or two-term:1660 (default: contents; JSON, CSV and Markdown: all).",
     "--classes": "Count the notes of each kind (defect, doubtful reading, ...), the cards that "
     "they name, and the differences from the scan that they explain.",
     "--collate": "Compare the three programs, operation by operation, with each other and with "
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     if not any(given):
         cards = chosen(shared.names(options.cards))
         shared.check_outputs(options)
-        return shared.show(cards_report(cards), options)
+        return shared.show(cards_report(cards, only_contents=options.cards is None), options)
     kind, *others = _KINDS[given.index(True) :]
     shared.refuse(options, kind, others)
     if options.cards is not None:

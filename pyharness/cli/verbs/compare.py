@@ -28,7 +28,9 @@ OPTIONS = {
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
     "--ablate": "Run every subset of each program's defects, and list the subsets by their "
-    "error, largest first.",
+    "error up to the last step that all runs reached, largest first.",
+    "--numerics": "Show also drifts of energy and momentum, units in the last place, error "
+    "amplification, solve_ivp and run times (JSON and CSV always have them).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
@@ -77,12 +79,12 @@ def run(options: argparse.Namespace) -> int:
         attitude=options.attitude,
         word=options.word or BINARY64,
     )
-    shared.show(comparison_report(found), options)
+    shared.show(comparison_report(found, options.numerics), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
 
 
 def _methods(options: argparse.Namespace) -> int:
-    shared.refuse(options, "--method", ("program", *shared.LISTING, "word", "ablate"))
+    shared.refuse(options, "--method", ("program", *shared.LISTING, "word", "ablate", "numerics"))
     scene = shared.chosen_scene(options, any_state=True)
     shared.check_outputs(options)
     found = compare_methods(
@@ -98,7 +100,7 @@ def _methods(options: argparse.Namespace) -> int:
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:
     others = [option for option in shared.LISTING if not option.startswith("--reading")]
-    others += ["tolerance", "word", "attitude", "plot", "strict"]
+    others += ["tolerance", "word", "attitude", "plot", "strict", "numerics"]
     shared.refuse(options, "--ablate", others)
     readings = shared.names(options.reading)
     for name in readings:

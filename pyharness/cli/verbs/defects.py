@@ -9,8 +9,9 @@ from pyharness.model.report import Report
 FORMATS = ("table", "json")
 OPTIONS = {
     "name NAME": "Show this entry and its effect in every case; NAME is its name or its card "
-    "(numbered line of a program), as in stage-base, 1660 or two-term:1660 (default: list all "
-    "entries).",
+    "(numbered line of a program), as in stage-base, 1660 or two-term:1660 (default: list the "
+    "defects that change numbers).",
+    "--all": "List all entries, also those that change no number (JSON always does).",
     "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
     "(doubtful card) or conjecture (missing card) (default: all).",
     **shared.outputs(FORMATS, plot=""),
@@ -19,12 +20,13 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print all apparatus entries, or one with its effect in the seven cases."""
+    """Print apparatus entries, or one with its effect in the seven cases."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)
-        return shared.show(apparatus_report(listed), options)
-    shared.refuse(options, "a name", ("kind",))
+        are_all_shown = options.all or options.kind is not None
+        return shared.show(apparatus_report(listed, are_all_shown), options)
+    shared.refuse(options, "a name", ("kind", "all"))
     if options.name.rpartition(":")[2].isdigit():
         return _card(options)
     entry(options.name)  # refuses an unknown name

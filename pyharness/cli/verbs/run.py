@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from pyharness.cli import options as shared
 from pyharness.engine.report import trajectory_report
+from pyharness.model.assumptions import mark
 from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
@@ -165,7 +166,7 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
         rows = attitude_from_rows(scene, trajectory.time, trajectory.omega)
         trajectory = replace(trajectory, attitude=rows)
     how = implementation if word == BINARY64 else f"{implementation}, {word}"
-    title = f"program {name} ({how}), {shared.listing_text(listing)}"
+    title = f"program {name}{mark(scene, listing)} ({how}), {shared.listing_text(listing)}"
     return name, listing, title, trajectory
 
 

@@ -6,7 +6,7 @@ It also checks our emulation of the CDC's arithmetic by test vectors.
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.words import LENGTHS, cells, words_report
+from pyharness.history.words import LENGTHS, cells, machine_cells, machine_report, words_report
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Report, Table
@@ -17,6 +17,9 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
+    "--lengths": f"Show each run, in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits, "
+    "and not only a verdict on the CDC's arithmetic (about two minutes; other formats and "
+    "--plot imply it).",
     "--all": f"Use every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits instead of selected "
     "ones (about twelve minutes).",
     "--vectors FILE": "Instead, check our emulation of the CDC's arithmetic against the "
@@ -29,13 +32,17 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 def run(options: argparse.Namespace) -> int:
     """Print the programs' errors, or with --vectors check test vectors; return 1 if one fails."""
     if options.vectors is not None:
-        shared.refuse(options, "--vectors", ("case", "program", "all", "plot"))
+        shared.refuse(options, "--vectors", ("case", "program", "lengths", "all", "plot"))
         return _vectors(options)
     cases = shared.chosen_cases(options)
     if options.plot is not None and options.case is None:
         raise InputError("words: --plot draws one case; give --case N (1 to 7)")
     programs = shared.chosen_programs(options)
     shared.check_outputs(options)
+    is_table = (options.format or FORMATS[0]) == FORMATS[0]
+    if is_table and not (options.lengths or options.all or options.plot):
+        verdict = machine_report(machine_cells(cases, programs, shared.progress))
+        return shared.show(verdict, options)
     lengths = range(LENGTHS[0], LENGTHS[-1] + 1) if options.all else LENGTHS
     found = list(cells(cases, programs, lengths, shared.progress))
     return shared.show(words_report(found), options)

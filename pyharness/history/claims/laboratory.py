@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from pyharness.history.claims.rules import Runs, largest_error, largest_of
+from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing, names_of, subset, switchable
 from pyharness.model.scene import Scene, Triple
@@ -64,7 +65,7 @@ class Laboratory:
     def scene(self, case: int, parts: int = 1) -> Scene:
         """Return the scene of a case under the assumptions."""
         scene, given = case_scene(case), self.assumptions
-        is_open = case in facts("claims")["assumed"]["cases"]
+        is_open = case in open_starts()
         start = scene.omega if given.start is None or not is_open else given.start
         h, steps = scene.step_size / parts, given.steps * parts
         return replace(scene, omega=start, step_size=h, steps=steps)

@@ -8,6 +8,7 @@ from typing import Any
 from pyharness.history.claims import methods, rules, theory, verdicts
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, start_text, starts
 from pyharness.history.claims.verdicts import REPRODUCED, Judged
+from pyharness.model.assumptions import open_starts
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing
@@ -124,7 +125,7 @@ def assignments() -> list[Assignment]:
     case has a start with which its claims hold.
     """
     found = []
-    for case in facts("claims")["assumed"]["cases"]:
+    for case in open_starts():
         about = [each for each in claims() if each.get("parameters", {}).get("case") == case]
         table = []
         for start in starts():

@@ -18,6 +18,7 @@ from pyharness.history.claims import rules
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, integrate_models
 from pyharness.history.claims.ledger import claim, claims
 from pyharness.history.claims.rules import Runs
+from pyharness.model.assumptions import open_starts
 from pyharness.model.codes import Statuses
 from pyharness.model.facts import facts
 from pyharness.model.scene import Scene
@@ -55,11 +56,11 @@ class Starts:
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def _starts(self, case: int) -> Array:
-        is_open = case in facts("claims")["assumed"]["cases"]
+        is_open = case in open_starts()
         return self._omega0 if is_open else np.array([self.scene(case).omega])
 
     def _shaped(self, case: int, array: NDArray[Any]) -> NDArray[Any]:
-        return array if case in facts("claims")["assumed"]["cases"] else array[0]
+        return array if case in open_starts() else array[0]
 
     def _run(self, program: str, case: int, may_stop: bool, parts: int) -> Runs:
         scene = self.scene(case, parts)

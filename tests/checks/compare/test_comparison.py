@@ -12,6 +12,7 @@ import pytest
 
 from pyharness import case_scene
 from pyharness.checks.compare import comparison as room
+from pyharness.checks.compare import report as report_module
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
 from pyharness.checks.compare.comparison import compare_programs, listings_for
 from pyharness.checks.compare.findings import Comparison
@@ -28,8 +29,8 @@ from pyharness.views.pictures import saved
 from pyharness.views.render import json_text, render
 
 
-def _text(found: Comparison) -> str:
-    return render(comparison_report(found), "table")
+def _text(found: Comparison, numerics: bool = True) -> str:
+    return render(comparison_report(found, numerics), "table")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,8 @@ def test_all_is_as_expected_in_every_case() -> None:
         found = compare_programs(case_scene(case))
         assert (found.unexpected, found.not_judged) == ((), ())
         assert [each.ulps for each in found.programs] == [0.0] * 6
-        assert max(map(len, _text(found).splitlines())) <= 100
+        for numerics in (False, True):
+            assert max(map(len, _text(found, numerics).splitlines())) <= 100
         assert verdict(found)[0].startswith("as expected: Fortran = Python bit for bit in 6")
         if case == 6:  # the solution reaches 1e111
             files = saved(comparison_picture(found), "x.png")
@@ -54,9 +56,25 @@ def test_all_is_as_expected_in_every_case() -> None:
 
 
 def test_table_says_which_variable_stopped_the_run(case_2: Comparison) -> None:
-    lines = _text(case_2).splitlines()
-    row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
-    assert row.split()[2:5] == ["25", "V2", "3305>500"]
+    for numerics in (False, True):
+        lines = _text(case_2, numerics).splitlines()
+        row = next(line for line in lines if line.startswith("runge-kutta") and "original" in line)
+        assert row.split()[2:5] == ["25", "V2", "3305>500"]
+        early = [line for line in lines if "ended at step" in line]
+        assert [line.partition(":")[0] for line in early] == [
+            "runge-kutta original ended at step 25 of 100"
+        ]
+
+
+def test_numerics_come_only_when_asked_for(case_2: Comparison) -> None:
+    numerics = ("energy", "ulp", "us/step", "error amplification", "solve_ivp ", "radau")
+    brief, whole = _text(case_2, False), _text(case_2)
+    for each in numerics:
+        assert each in whole
+        assert each not in brief.replace(report_module._MORE, "")
+    assert len(brief.splitlines()) < len(whole.splitlines()) - 5
+    for form in ("json", "csv"):
+        assert len({render(comparison_report(case_2, each), form) for each in (False, True)}) == 1
 
 
 def test_table_of_what_failed_and_of_large_quotients_fits() -> None:

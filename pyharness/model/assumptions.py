@@ -1,0 +1,64 @@
+"""Values that this edition supplies where the thesis gives nothing or can be read in two ways."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pyharness.model.facts import facts
+from pyharness.model.listing import Listing
+from pyharness.model.scene import Scene
+
+MARK = "*"
+"""The sign on a number that is assumed."""
+
+
+def assumptions() -> list[dict[str, Any]]:
+    """Return all assumptions, entries of `data/assumptions.toml`."""
+    return list(facts("assumptions")["assumption"])
+
+
+def open_starts() -> dict[int, str]:
+    """Return the cases for which the thesis gives no omega(0), each with whose we take."""
+    cases = facts("cases")["case"]
+    return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
+
+
+def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
+    """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
+
+    A scene that is no case, and a value that the user supplies, depend on none.
+    """
+    among = list(listings)
+    return [each for each in assumptions() if _is_made(each, scene, among)]
+
+
+def _is_made(each: dict[str, Any], scene: Scene, listings: Sequence[Listing]) -> bool:
+    if scene.case is None or scene.case not in each.get("cases", [scene.case]):
+        return False
+    match each["on"]:
+        case "omega":
+            (case,) = (c for c in facts("cases")["case"] if c["number"] == scene.case)
+            return scene.case in open_starts() and list(scene.omega) == case["omega"]
+        case "steps":
+            return bool(scene.steps == facts("cases")["deck"]["steps"])
+        case "listing":
+            return any(_is_in(each, listing) for listing in listings)
+    return bool(each["on"] == "units")
+
+
+def _is_in(each: dict[str, Any], listing: Listing) -> bool:
+    (entry,) = (e for e in facts("apparatus")["entry"] if e["id"] == each["entry"])
+    # A corrected program is the same under every reading and conjecture.
+    has_it = listing.program in entry["programs"] and bool(listing.active)
+    return has_it and listing.has(each["entry"]) == each["active"]
+
+
+def mark(scene: Scene, listing: Listing) -> str:
+    """Return `MARK` if a run of a listing depends on an assumption about its cards, else ""."""
+    return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
+
+
+def legend(scene: Scene, found: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the line that explains the marks; none without an assumption."""
+    start = open_starts().get(scene.case or 0, "")
+    told = "; ".join(each["what"].format(start=start) for each in found)
+    return [f"{MARK} assumed: {told}"] if told else []

@@ -78,7 +78,7 @@ def solve(
         A name in `pyharness.engine.registry.METHODS`. `auto` uses `dop853` for an opaque torque.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
-        from 0 on. The default depends on the method, 1e-12 for `auto`. Methods with a fixed step
+        from 0 on. The default depends on the method, 1e-9 for `auto`. Methods with a fixed step
         take none.
     effort : float
         Factor on the work limit; 1 means some ten seconds.

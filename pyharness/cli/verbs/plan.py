@@ -12,7 +12,7 @@ OPTIONS = {
     "--method M": f"Plan a solution by this method: {', '.join(PREPARED)} (default auto, which "
     "chooses closed-form, quick or taylor).",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
-    "1 (default: the method's own, 1e-12 for auto).",
+    "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Include the translational velocity.",
     "--times T1,T2,...": "Times of the results, s (default: one time); several need "
     "intermediate output.",

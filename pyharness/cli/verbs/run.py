@@ -45,7 +45,7 @@ OPTIONS = {
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
     "needs --method and an attitude.",
     "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "
-    "component (default: the method's own, 1e-12 for auto).",
+    "component (default: the method's own, 1e-9 for auto).",
     "--strict": "Exit with status 1 if amplified rounding errors may exceed the tolerance, or if "
     "a SciPy method may have missed a short change of the torque; needs --method.",
     **shared.EFFORT,

@@ -24,7 +24,7 @@
       if (kept && kept.top < innerHeight) {
         scrollBy(0, kept.card.getBoundingClientRect().top - kept.top);
       }
-      const query = view() === "program" ? "" : `?view=${view()}`;
+      const query = view() === "witness" ? "" : `?view=${view()}`;
       history.replaceState(null, "", location.pathname + query + location.hash);
     });
   }

@@ -22,6 +22,7 @@ from pyharness.history.figures import FigureFinding, figure_picture, together_pi
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Table
+from pyharness.model.scene_file import case_scene
 from pyharness.views import html
 from pyharness.views.pictures import saved
 
@@ -75,6 +76,12 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
     if judgement.claim["kind"] == "result":
         return [("as printed", original), ("corrected", corrected)]
     return [("", original if judgement.claim["kind"] == "design" else corrected)]
+
+
+def assumption(case: int) -> str:
+    """Return what we supply in a case of Table 1, or an empty text."""
+    found = ["its initial omega"] if case in facts("claims")["assumed"]["cases"] else []
+    return " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
 
 
 def counted(judged: Sequence[Judgement]) -> str:
@@ -173,7 +180,7 @@ def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
     the original one as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
-    files = saved(together, "figure-07-together.svg")
+    files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
         files |= saved(figure_picture(each), f"{stem}.svg")
     return files

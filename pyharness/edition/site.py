@@ -99,7 +99,9 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
         "work": facts("account")["work"], "mechanism": facts("account")["mechanism"],
         "timeline": timeline(),
     }  # fmt: skip
-    yield Page("index.html", "Story", "index.html", context)
+    step = facts("account")["mechanism"]["stopped"]["step"]
+    title = f"The program that stopped at step {step}"
+    yield Page("index.html", title, "index.html", context)
     cited = {
         "bibtex": bibtex(), "linked_data": linked_data(), "data_identifier": data_identifier(),
         "data_folder": DATA, "editors": facts("edition"),
@@ -198,7 +200,7 @@ def _sections(path: str, html: str) -> Iterator[Found]:
     _, *parts = re.split(heads, html.partition("</main>")[0])
     for anchor, title, text in zip(*(parts[n::3] for n in range(3)), strict=True):
         words = Markup(re.sub(r"<(svg|math)\b.*?</\1>", "", text, flags=re.DOTALL)).striptags()
-        yield Found(f"{path}#{anchor or 'main'}", title, "page", words)
+        yield Found(f"{path}#{anchor or 'main'}", Markup(title).striptags(), "page", words)
 
 
 def _rendered(page: Page) -> bytes:
@@ -268,4 +270,6 @@ def _templates() -> Environment:
     templates.filters["slug"] = slug
     templates.globals["inline"] = inline
     templates.globals["verdicts"] = ledger.verdicts
+    templates.globals["assumption"] = ledger.assumption
+    templates.globals["supplied"] = ledger.account()["supplied"]
     return templates

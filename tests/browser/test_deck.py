@@ -222,8 +222,12 @@ def test_print_keeps_marks_notes_and_the_citation(browser: Chrome, site: Path, v
         citation = browser.find_element(By.CSS_SELECTOR, ".citation")
         assert not browser.execute_script(is_shown, citation)
         with on_paper(browser):
-            assert within(browser, 970, ".ours").text.strip() == "[A(4,1)=1.]"
-            mark = within(browser, 780, ".ours mark")
+            kind, text = (
+                ("witness", "(not in the scan)") if view == "witness" else ("ours", "[A(4,1)=1.]")
+            )
+            assert within(browser, 970, f".{kind}").text.strip() == text
+            mark = within(browser, 460, ".ours mark")
+            assert mark.is_displayed() == (view != "witness")
             assert "underline" in mark.value_of_css_property("text-decoration-line")
             assert within(browser, 780, ".refs").is_displayed()
             # What is folded away on the screen is printed.

@@ -149,6 +149,7 @@ def test_a_reader_jumps_to_a_card(browser: Chrome, site: Path) -> None:
             assert told.text == answer
         assert browser.current_url.endswith("#100")
         # The cards that the scan lacks are copied with brackets.
+        browser.find_element(By.ID, "view-edited").click()
         text: str = browser.execute_script(
             "getSelection().selectAllChildren(document.getElementById('1010').closest('ol'));"
             "return getSelection().toString()"

@@ -23,6 +23,8 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 from tests.edition.pages import pages
 
+PREVIEW = "figures/preview.png"
+
 
 def _fields(entry: str) -> dict[str, str]:
     return dict(re.findall(r"^  (\w+) = \{(.*)\},$", entry, re.MULTILINE))
@@ -99,8 +101,10 @@ def test_pages_say_their_address_or_how_to_give_one(
         assert (cite["data-path"], str(cite["href"])[-15:]) == (name, "about.html#cite")
         assert not any(each.get("rel") == "canonical" for _, each in page.elements)
     monkeypatch.setattr(site, "address", lambda: "https://example.org/")
-    page = site._rendered(site.Page("search.html", "Search", "search.html")).decode()
-    assert '<link rel="canonical" href="https://example.org/search.html">' in page
+    found = site._rendered(site.Page("search.html", "Search", "search.html")).decode()
+    assert '<link rel="canonical" href="https://example.org/search.html">' in found
+    assert f'content="https://example.org/{PREVIEW}"' in found
+    assert built_site[PREVIEW].startswith(b"\x89PNG")
     data = built_site["assets/cite-data.js"].decode()
     assert json.loads(data.removeprefix("window.citeData=").removesuffix(";\n")) == cite_data()
 

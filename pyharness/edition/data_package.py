@@ -4,8 +4,10 @@ The package is an RO-Crate. Its files contain neither times nor paths of the mac
 runs write the same bytes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
+from io import BytesIO
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
 from pyharness.edition.crate import (
@@ -66,6 +68,15 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
     content[MANIFEST] = "".join(lines).encode()
     return dict(sorted(content.items()))
+
+
+def archive(content: Mapping[str, bytes], folder: str) -> bytes:
+    """Return a ZIP file of files by path, in `folder`; it has no times, as the package."""
+    found = BytesIO()
+    with ZipFile(found, "w") as packed:
+        for path, each in content.items():
+            packed.writestr(ZipInfo(f"{folder}/{path}"), each, ZIP_DEFLATED)
+    return found.getvalue()
 
 
 def _list_files(progress: Progress) -> Iterator[Part]:

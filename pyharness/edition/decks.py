@@ -7,10 +7,12 @@ apparatus; `entry` and `switch` are identifiers of entries.
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
-from pyharness.history.ablation import entries
+from pyharness.history.ablation import effects_of, entries
 from pyharness.model.facts import facts
+from pyharness.model.listing import names_of
 from pyharness.thesis.cards import Card, Place, deck, numbers, switch_at, tight
 from pyharness.thesis.collation import witness_lines
 from pyharness.thesis.decks import corrected_cards, corrections
@@ -43,7 +45,8 @@ class Run(NamedTuple):
 class Note(NamedTuple):
     """A numbered entry of the apparatus, with the cards of one program to which it applies.
 
-    Numbers are from 1, ordered by first card; `cards` is text, as in ``860-910, 1040-1090``.
+    Defects have the first numbers, those first that change most. `cards` is text, as in ``860-910,
+    1040-1090``.
     """
 
     number: int
@@ -72,7 +75,10 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is in brackets if the scan lacks it; `scan` has the scan's blanks, or is None. `port` has
+    `card` is in brackets if the scan lacks it; `witness` is the card with the names of the print
+    where ours are uniform, empty if the scan lacks it, or None if `card` has the same text. `after`
+    are the scan's lines after it that belong to no card, each with its entry. `scan` has the scan's
+    blanks, or is None. `port` has
     each line of the Fortran port, with the defect or reading on which it depends, if any, and
     whether it is executed with this switch on. `notes` begin with the most important kind; `begins`
     has the notes whose range begins here, with this range alone.
@@ -80,6 +86,8 @@ class CardView(NamedTuple):
 
     number: int
     card: list[Run]
+    witness: str | None
+    after: list[Run]
     scan: list[Run] | None
     corrected: Corrected
     port: list[tuple[Place, str | None, bool]]
@@ -119,16 +127,44 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's apparatus entries, numbered from 1 by first card."""
+    """Return a program's apparatus entries: defects by what they change, then by kind and card."""
     having = [each for each in entries() if each["cards"].get(program)]
-    having.sort(key=lambda each: numbers(each["cards"][program])[0])
+    having.sort(
+        key=lambda each: (
+            _ORDER.index(each["kind"]),
+            *(-change for change in _changes(each["id"], program)),
+            numbers(each["cards"][program])[0],
+        )
+    )
     return [Note(n, each, each["cards"][program]) for n, each in enumerate(having, 1)]
+
+
+@cache
+def _changes(name: str, program: str) -> tuple[float, float]:
+    """Return the largest changes in omega and velocity (errors) if an entry alone is corrected."""
+    if name not in names_of("defect", program):
+        return 0.0, 0.0
+    found = [each for each in effects_of(name) if each.program == program]
+    pairs = [(each.original, each.corrected_alone) for each in found]
+    omega, velocity = (
+        max(_change(*(getattr(each, part) for each in pair)) for pair in pairs)
+        for part in ("omega", "velocity")
+    )
+    return omega, velocity
+
+
+def _change(one: float, other: float) -> float:
+    """Return the difference of two errors to three digits; of an overflow, infinity."""
+    if math.isfinite(one) and math.isfinite(other):
+        return float(f"{abs(one - other):.2e}")
+    return math.inf if math.isfinite(one) or math.isfinite(other) else 0.0
 
 
 def card_views(program: str) -> list[CardView]:
     """Return a view of each card of a program."""
     found, every = deck(program), notes(program)
     corrected, changed = corrected_cards(program), corrections(program)
+    phantoms = _phantoms(program)
     views = []
     for card, after in zip(found.cards.values(), [*found.cards, math.inf][1:], strict=True):
         about = [each for each in every if card.number in numbers(each.cards)]
@@ -139,6 +175,8 @@ def card_views(program: str) -> list[CardView]:
             CardView(
                 card.number,
                 _card(card),
+                _witness(card),
+                phantoms.get(card.number, []),
                 _scan(card),
                 Corrected(
                     text,
@@ -182,6 +220,24 @@ def _card(card: Card) -> list[Run]:
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]
+
+
+def _witness(card: Card) -> str | None:
+    """Return the card as the print has it, if this is not our text."""
+    text = "" if card.lost else card.text_with_scanned_names
+    return text if card.lost or text != card.text else None
+
+
+def _phantoms(program: str) -> dict[int, list[Run]]:
+    """Return the scan's lines that belong to no card, by the card before them."""
+    found: dict[int, list[Run]] = {}
+    for page in facts("cards/scan")["page"]:
+        for each in page["lines"] if page["program"] == program else ():
+            if isinstance(each, str):
+                last = numbers(each)[-1]
+            elif "phantom" in each:
+                found.setdefault(last, []).append(Run(each["phantom"], each["entry"]))
+    return found
 
 
 def _scan(card: Card) -> list[Run] | None:

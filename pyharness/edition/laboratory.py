@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.checks.port_protocol import requested_scene
+from pyharness.edition.ledger import assumption
 from pyharness.model.assumptions import MARK
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, flagged, switches
@@ -59,6 +60,7 @@ def data() -> dict[str, Any]:
     """Return the script's `window.laboratoryData`, to run any program on any case."""
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
+        "assumed": {number: assumption(number) for number in case_numbers()},
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
         "programs": list(PROGRAMS),
         "flags": [

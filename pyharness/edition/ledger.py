@@ -15,12 +15,15 @@ from pyharness.edition.markdown import inline
 from pyharness.history.ablation import FIELDS, effects_of, entries, entry_report
 from pyharness.history.claims.evidence import evidence, evidence_report
 from pyharness.history.claims.ledger import Judgement
-from pyharness.history.claims.report import KINDS, claims_report, kinds_table
+from pyharness.history.claims.report import KINDS
 from pyharness.history.claims.stories import Sentence, Story, sentences, story
-from pyharness.history.claims.verdicts import REPRODUCED
+from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.history.figures import FigureFinding, figure_picture, together_picture
+from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
+from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Table
+from pyharness.model.scene_file import case_scene
 from pyharness.views import html
 from pyharness.views.pictures import saved
 
@@ -65,9 +68,35 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
     return {verdict: (original[verdict], corrected[verdict]) for verdict in verdicts}
 
 
-def kinds(judged: Sequence[Judgement]) -> Markup:
-    """Return an HTML table of verdicts by kind of claim."""
-    return Markup(html.table(kinds_table(judged), "verdicts by kind of claim"))
+def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
+    """Return the verdicts to show, each with its programs; a claim not on results has one alone.
+
+    Of a design it is that of the programs as printed, else that without their faults.
+    """
+    original, corrected = judgement.original.verdict, judgement.corrected.verdict
+    if judgement.claim["kind"] == "result":
+        return [("as printed", original), ("corrected", corrected)]
+    return [("", original if judgement.claim["kind"] == "design" else corrected)]
+
+
+def assumption(case: int) -> str:
+    """Return what we supply in a case of Table 1, or an empty text."""
+    found = ["its initial omega"] if case in open_starts() else []
+    return " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
+
+
+def counted(judged: Sequence[Judgement]) -> str:
+    """Return the sentence that counts the verdicts."""
+    results = counts(judged)
+    others = [verdicts(each)[0][1] for each in judged if each.claim["kind"] != "result"]
+    number = Counter(others)
+    printed, corrected = results[REPRODUCED]
+    return (
+        f"Of {len(judged) - len(others)} claims about results, the programs as printed reproduce "
+        f"{printed}, and the corrected ones {corrected}; of the {len(others)} others, "
+        f"{number[REPRODUCED]} hold, {number[IN_PART]} hold in part, {number[FALSE]} are false, "
+        f"and {number[NOT_TESTABLE]} cannot be tested."
+    )
 
 
 def account() -> dict[str, Markup]:
@@ -78,20 +107,18 @@ def account() -> dict[str, Markup]:
 
 
 def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
-    """Return the data of the claims page: tables, stories and evidence, mostly as HTML.
+    """Return the data of the claims page: stories and evidence, mostly as HTML.
 
-    `groups` has, by kind in the order of `KINDS`, each claim with its story and its sentences.
+    `groups` has, by kind in the order of `KINDS`, each claim with verdicts, story and sentences.
     """
-    table = claims_report(judged).data
-    assert table is not None
-    links = {each.claim["id"]: f"#{each.claim['id']}" for each in judged}
     groups: dict[str, list[Any]] = {kind: [] for kind in KINDS}
     for each in judged:
         making = [other for other in told if each.claim["id"] in other.sentence.claims]
-        groups[each.claim["kind"]].append((each, Story(*map(inline, story(each))), making))
+        told_of = Story(*map(inline, story(each)))
+        groups[each.claim["kind"]].append((each, verdicts(each), told_of, making))
     return {
-        "table": Markup(html.table(table, "all claims", links)),
-        "kinds": kinds(judged),
+        "judged": judged,
+        "counted": counted(judged),
         "about": KINDS,
         "groups": groups,
         "evidence": Markup(html.sections(evidence_report(list(evidence())).text)),
@@ -154,7 +181,7 @@ def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
     the original one as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
-    files = saved(together, "figure-07-together.svg")
+    files = saved(together, "figure-07-together.svg", "preview.png")
     for stem, each in figures.items():
         files |= saved(figure_picture(each), f"{stem}.svg")
     return files
@@ -185,15 +212,18 @@ def printed_figures(
     return found
 
 
-def apparatus() -> list[tuple[dict[str, Any], Markup]]:
-    """Return each entry of the apparatus with its report as HTML.
+def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
+    """Return each entry of the apparatus with its report as HTML, by the programs of its cards.
 
     The report of an entry with a switch includes its effect in every case.
     """
-    found = []
+    found: dict[str, list[tuple[dict[str, Any], Markup]]] = {name: [] for name in PROGRAMS}
+    found |= {"several programs": [], "no card": []}
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
         # The page shows the cards as links.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
-        found.append((entry, Markup(html.sections(report.text[1:]))))
+        programs = [*entry["cards"]]
+        group = programs[0] if len(programs) == 1 else "several programs" if programs else "no card"
+        found[group].append((entry, Markup(html.sections(report.text[1:]))))
     return found

@@ -5,6 +5,7 @@ without JavaScript, and loads nothing from other sites. Each result is computed 
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -12,12 +13,22 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from pyharness.edition import api, body, decks, documents, laboratory, ledger, parallel_decks, story
 from pyharness.edition.bundle import bundle
-from pyharness.edition.citation import bibtex, linked_data
+from pyharness.edition.citation import (
+    PUBLISH,
+    address,
+    bibtex,
+    check_publishable,
+    cite_data,
+    linked_data,
+)
+from pyharness.edition.data_package import archive, data_package
 from pyharness.edition.markdown import inline, slug
 from pyharness.edition.report import MARK, listed
+from pyharness.history.ablation import entries
 from pyharness.history.claims.ledger import judgements
 from pyharness.history.claims.report import written
 from pyharness.history.claims.stories import prose
@@ -62,6 +73,7 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
 
     `progress` is as in `data_package`; `docs` is by default the checkout's folder.
     """
+    check_publishable()
     docs = docs or documents.documents_folder()
     progress(0, 5, "figures")
     drawn = {each.plan.stem: each for each in findings()}
@@ -70,7 +82,10 @@ def build_site(progress: Progress = no_progress, docs: Path | None = None) -> di
     for page in _pages(drawn, docs, progress):
         content[page.path] = _rendered(page)
         places += page.found
+        if page.path in ("index.html", "about.html"):
+            places += _sections(page.path, content[page.path].decode())
     content |= _assets(places) | documents.files(docs) | documents.notebooks(docs)
+    content["data.zip"] = archive(data_package(), "jacobs-1982-data")
     content[MARK] = json_text({"schema": SCHEMAS["edition"], **listed(content)}).encode()
     return content
 
@@ -79,15 +94,17 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
     progress(1, 5, "claims")
     judged = judgements()
     context = {
-        "counts": ledger.counts(judged), "kinds": ledger.kinds(judged),
+        "counts": ledger.counts(judged), "counted": ledger.counted(judged),
         "account": ledger.account(), "story": story.context(),
         "work": facts("account")["work"], "mechanism": facts("account")["mechanism"],
         "timeline": timeline(),
     }  # fmt: skip
-    yield Page("index.html", "Story", "index.html", context)
+    step = facts("account")["mechanism"]["stopped"]["step"]
+    title = f"The program that stopped at step {step}"
+    yield Page("index.html", title, "index.html", context)
     cited = {
         "bibtex": bibtex(), "linked_data": linked_data(), "data_identifier": data_identifier(),
-        "data_folder": DATA,
+        "data_folder": DATA, "editors": facts("edition"),
     }  # fmt: skip
     yield Page("about.html", "About this edition", "about.html", {**context, **cited})
     progress(2, 5, "listing")
@@ -118,14 +135,14 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
         ],
     )  # fmt: skip
     progress(3, 5, "apparatus")
-    entries = ledger.apparatus()
+    groups = ledger.apparatus()
     yield Page(
         "apparatus.html", "Apparatus", "apparatus.html",
-        {"entries": entries, "disagreements": disagreements()},
+        {"groups": groups, "programs": decks.TITLES, "disagreements": disagreements()},
         [
             Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
                   ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
-            for each, _ in entries
+            for entries in groups.values() for each, _ in entries
         ],
     )  # fmt: skip
     progress(4, 5, "documents")
@@ -148,7 +165,7 @@ def _listing() -> Iterator[Page]:
         context = {
             "program": program, "programs": decks.TITLES, "sheets": pages, "cards": views,
             "kinds": decks.kinds_of(views), "notes": decks.notes(program), "deck": deck(program),
-            "parallels": parallels,
+            "parallels": parallels, "entry_kinds": {x["id"]: x["kind"] for x in entries()},
         }  # fmt: skip
         found = [
             Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
@@ -177,6 +194,15 @@ def _documents(docs: Path) -> Iterator[Page]:
                    menu=path if path in listed_pages else "docs/index.html")  # fmt: skip
 
 
+def _sections(path: str, html: str) -> Iterator[Found]:
+    """Yield the sections of a page, for the search, with their text."""
+    heads = r'<h[12](?: id="(?:h-)?([\w-]+)")?>(.*?)</h[12]>'
+    _, *parts = re.split(heads, html.partition("</main>")[0])
+    for anchor, title, text in zip(*(parts[n::3] for n in range(3)), strict=True):
+        words = Markup(re.sub(r"<(svg|math)\b.*?</\1>", "", text, flags=re.DOTALL)).striptags()
+        yield Found(f"{path}#{anchor or 'main'}", Markup(title).striptags(), "page", words)
+
+
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
     section = next(name for name, of in MENU.items() if here in of.values())
@@ -185,6 +211,7 @@ def _rendered(page: Page) -> bytes:
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": here, "section": section,
          "build": build_record(), "digest": text_digest(), "edition": facts("account")["edition"],
+         "address": address(), "publish": PUBLISH,
          **page.context}
     )  # fmt: skip
     return html.encode()
@@ -203,7 +230,10 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
         content[f"assets/{package['name']}-LICENSE.txt"] = licence
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
-    scripts = {"story": story.data(), "laboratory": laboratory.data(), "about": None}
+    scripts = {
+        "story": story.data(), "laboratory": laboratory.data(), "about": None,
+        "cite": cite_data(),
+    }  # fmt: skip
     for name, data in (*scripts.items(), ("body", body.data())):
         content[f"assets/{name}.js"] = bundle(web / name / f"{name}.js").encode()
         if data is not None:
@@ -239,4 +269,7 @@ def _templates() -> Environment:
     templates.filters["prose"] = prose
     templates.filters["slug"] = slug
     templates.globals["inline"] = inline
+    templates.globals["verdicts"] = ledger.verdicts
+    templates.globals["assumption"] = ledger.assumption
+    templates.globals["supplied"] = ledger.account()["supplied"]
     return templates

@@ -1,11 +1,12 @@
-"""The data of the story, the home page: charts and numbers of its six scenes.
+"""The data of the story, the home page: charts and numbers of its seven scenes.
 
 They are from runs of the twins. In the browser, a script repeats the runs when a visitor changes a
 value.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ import numpy as np
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.decks import TITLES
 from pyharness.history.ablation import case_truth
+from pyharness.history.claims.laboratory import starts
 from pyharness.history.claims.stories import power_of_ten
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
@@ -28,6 +30,10 @@ BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # The plot area of every chart in its units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
+# The terms of the trial functions, and the step that is shown at first: the two-term program
+# overflows in it.
+TERMS = {"two-term": 2, "four-term": 4}
+POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
 Range = tuple[float, float]
@@ -45,6 +51,7 @@ class Chart(NamedTuple):
 
     `x` and `y` are ranges, in exponents of ten for a logarithmic `y`. Ticks are pairs of position
     and label. If `is_marked`, points are marks without lines.
+    `marks` tell apart curves that coincide.
     """
 
     name: str
@@ -56,6 +63,7 @@ class Chart(NamedTuple):
     curves: list[Curve]
     is_logarithmic: bool = False
     is_marked: bool = False
+    marks: Sequence[Curve] = ()
 
 
 def data() -> dict[str, Any]:
@@ -65,6 +73,7 @@ def data() -> dict[str, Any]:
         "scenes": {number: requested_scene(case_scene(number)) for number in cases},
         "original": {name: list(switches(name)) for name in PROGRAMS},
         "letters": LETTERS,
+        "fractions": {name: _fractions(name) for name in TERMS},
         "lipschitz": facts("cases")["deck"]["lipschitz"],
     }
 
@@ -83,8 +92,9 @@ def context() -> dict[str, Any]:
     half_speed = _chart_of_case("half-speed", 2, {"runge-kutta": endless}, (-1.6, 2.2))
     curve = _curve(half_speed, "limit", scene.times(), limit[:, 0])
     by_letter = {name: _run(2, name) for name in LETTERS.values()}
+    claim = _chart_of_case("claim", 2, by_letter, (-1.2, 1.5))
     charts = [
-        _chart_of_case("claim", 2, by_letter, (-1.2, 1.5)),
+        claim._replace(marks=_marks(claim, by_letter)),
         _chart_of_case("stop", 2, {"runge-kutta": stopped}, (-1.2, 1.5), in_steps=True),
         velocity_chart._replace(curves=[velocity_curve]),
         _chart("quotient", ("step", "quotient, 1/s"), (0, 100), (0, 5), is_log=True),
@@ -93,8 +103,11 @@ def context() -> dict[str, Any]:
             _chart_of_case(f"blind-{n}", n, {"runge-kutta": _run(n, "runge-kutta")}, _span(n))
             for n in BLIND_CASES
         ),
+        _points_chart(scene.step_size),
+        _chart_of_case("points-run", 6, {"two-term": _run(6, "two-term")}, _span(6)),
         *(_race_chart(listing) for listing in ("original", "corrected")),
     ]
+    point_at = POINTS_STEP * scene.step_size  # what DT has become
     ratios = {case: _ratios(case) for case in RACE_CASES}
     others = [ratio for case in RACE_CASES if case != 7 for ratio in ratios[case].values()]
     corrected = {name: _run(2, name, "corrected") for name in PROGRAMS}
@@ -115,6 +128,14 @@ def context() -> dict[str, Any]:
         "alone": _run(2, "runge-kutta", without=("lipschitz-tests-velocity",)),
         "right": _run(2, "runge-kutta", without=tuple(facts("account")["mechanism"]["alone"])),
         "in_48_bits": run_program(scene, Listing.original("runge-kutta"), "python", word="cdc48"),
+        "shown_starts": [
+            run_program(replace(case_scene(1), omega=start), Listing.original("runge-kutta")).steps
+            for start in starts()
+            if start != case_scene(1).omega
+        ],
+        "points_step": POINTS_STEP,
+        "points_at": [each * point_at for each in _fractions("two-term")],
+        "points_run": (_run(6, "two-term"), _first_error(6, "two-term")),
         "blind": {n: (_run(n, "runge-kutta"), _first_error(n, "runge-kutta")) for n in BLIND_CASES},
         "evaluations": {name: run.evaluations // run.steps for name, run in corrected.items()},
         "ratio": min(ratios[2].values()),
@@ -182,6 +203,14 @@ def _chart_of_case(
     return found._replace(curves=curves)
 
 
+def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
+    """Return marks on the curves of omega1 over time, at other steps on each curve."""
+    return [
+        _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
+        for first, (name, run) in zip((9, 4, 14), runs.items(), strict=True)
+    ]
+
+
 def _race_chart(listing: str) -> Chart:
     axes = ("case", "largest error, rad/s")
     found = _chart(f"race-{listing}", axes, (1.5, 7.5), (-8, 2), is_log=True)
@@ -191,6 +220,24 @@ def _race_chart(listing: str) -> Chart:
     ]
     ticks = [(f"{_across(found, n):.1f}", str(n)) for n in RACE_CASES]
     return found._replace(x_ticks=ticks, curves=curves, is_marked=True)
+
+
+def _fractions(program: str) -> list[float]:
+    """Return the places of a program's collocation points, as fractions of DT."""
+    return [n / (TERMS[program] + 1) for n in range(1, TERMS[program] + 1)]
+
+
+def _points_chart(step_size: float) -> Chart:
+    """Return the chart of the two-term program's points after the beginning of each step."""
+    axes = ("step", "time after the beginning of the step, s")
+    found = _chart("points", axes, (0, 100), (-3, 0), is_log=True)
+    steps = range(1, 101)
+    curves = [
+        _curve(found, f"point-{n}", steps, [each * step_size * step for step in steps])
+        for n, each in enumerate(_fractions("two-term"), 1)
+    ]
+    end = _curve(found, "threshold", (0, 100), (step_size, step_size))
+    return found._replace(curves=[*curves, end])
 
 
 def _chart(name: str, axes: tuple[str, str], x: Range, y: Range, is_log: bool = False) -> Chart:

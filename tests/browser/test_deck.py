@@ -20,7 +20,7 @@ from tests.browser.screen import (
 )
 from tests.browser.test_pages import Examined
 
-VIEWS = ("program", "apparatus", "side")
+VIEWS = ("witness", "edited", "apparatus", "side")
 
 
 def go(browser: Chrome, site: Path, address: str) -> None:
@@ -49,6 +49,35 @@ def place(browser: Chrome, number: int) -> float:
     return box(browser, number)["top"] - float(browser.execute_script(script))
 
 
+def test_the_witness_and_our_text_are_views(browser: Chrome, site: Path) -> None:
+    foot = "//li[contains(@class, 'nowhere')][contains(., 'END DETERMINATION')]"
+    with screen(browser, 1440):
+        go(browser, site, "runge-kutta.html")
+        # As the print has it: its names, no card where the scan has none, and its stray lines.
+        for number, text in ((250, "M2=200."), (410, "R1=M1/I1"), (1010, "(not in the scan)")):
+            assert browser.find_element(By.ID, str(number)).text.split("\n")[1].strip() == text
+        lines = browser.find_element(By.XPATH, foot)
+        assert lines.text.split("\n")[1].endswith("END DETERMINATION OF K'S.")
+        assert len(lines.text.split("\n")) == 4
+        assert box(browser, 1050)["bottom"] <= lines.rect["y"]
+        browser.find_element(By.ID, "view-edited").click()
+        assert browser.current_url.endswith("?view=edited")
+        for number, text in ((250, "N2=200."), (410, "R1=N1/I1"), (1010, "[C]")):
+            assert within(browser, number, ".ours").text.strip() == text
+        assert not browser.find_element(By.XPATH, foot).is_displayed()
+        # N is marked as ours. What the scan misreads is marked in the apparatus alone.
+        style = "text-decoration-line"
+        misread = within(browser, 800, ".ours mark.misreading")
+        assert within(browser, 250, ".ours mark").value_of_css_property(style) == "underline"
+        assert misread.value_of_css_property(style) == "none"
+        seen = [each.text for each in browser.find_elements(By.CSS_SELECTOR, "[id='800'] .refs")]
+        assert "26" not in " ".join(seen)
+        browser.find_element(By.ID, "view-apparatus").click()
+        assert misread.value_of_css_property(style) == "underline"
+        assert "26" in within(browser, 800, ".refs").text.split()
+        assert browser.find_element(By.XPATH, foot).is_displayed()
+
+
 def test_the_program_comes_first_and_the_apparatus_on_demand(browser: Chrome, site: Path) -> None:
     with screen(browser, 1440):
         go(browser, site, "runge-kutta.html")
@@ -60,7 +89,7 @@ def test_the_program_comes_first_and_the_apparatus_on_demand(browser: Chrome, si
             assert box(browser, 860, name)["left"] == box(browser, 1270, name)["left"]
         browser.find_element(By.ID, "view-apparatus").click()
         assert within(browser, 890, ".scan").text == "630-      U1(I)=U1(J)+.5*DT*KX(I)"
-        assert "Cards 890\u2013910: 7 redundant" in within(browser, 890, ".ranges").text
+        assert "Cards 890\u2013910: 14 redundant" in within(browser, 890, ".ranges").text
         assert not browser.find_elements(By.CSS_SELECTOR, "[id='900'] .ranges")
         browser.find_element(By.ID, "view-side").click()
         boxes = [box(browser, 860, name) for name in (".ours", ".corrected", ".port", ".twin")]
@@ -86,7 +115,7 @@ def test_a_deep_link_shows_its_card(browser: Chrome, site: Path, view: str, widt
         assert browser.execute_script(style, "880") == "none"
         # All that is known of the card is shown, also a note whose range begins before it.
         text = browser.find_element(By.ID, "870").text
-        for told in ("18 defect", "stage-base", "630-", "U2(I)=UU2+.5*DT*KG(I)", "card 870; in"):
+        for told in ("2 defect", "stage-base", "630-", "U2(I)=UU2+.5*DT*KG(I)", "card 870; in"):
             assert told in text
         assert box(browser, 870, ".about")["right"] <= width
         time.sleep(0.3)
@@ -120,6 +149,7 @@ def test_a_reader_jumps_to_a_card(browser: Chrome, site: Path) -> None:
             assert told.text == answer
         assert browser.current_url.endswith("#100")
         # The cards that the scan lacks are copied with brackets.
+        browser.find_element(By.ID, "view-edited").click()
         text: str = browser.execute_script(
             "getSelection().selectAllChildren(document.getElementById('1010').closest('ol'));"
             "return getSelection().toString()"
@@ -151,7 +181,7 @@ def test_notes_are_shown_on_hover_and_on_focus(browser: Chrome, site: Path, widt
         browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", card)
         for over in (".refs", ".ours mark"):
             ActionChains(browser).move_to_element(within(browser, 1260, over)).perform()
-            assert "24 defect x3-reads-acl2 (probable): X3 is built on ACL2" in notes.text
+            assert "2 defect x3-reads-acl2 (probable): X3 is built on ACL2" in notes.text
             # The pointer can move into the notes, which then stay.
             ActionChains(browser).move_to_element(within(browser, 1260, ".about a")).perform()
             assert notes.is_displayed()
@@ -180,7 +210,7 @@ def test_the_address_keeps_the_view_and_a_view_keeps_the_card(browser: Chrome, s
         browser.refresh()
         assert browser.find_element(By.ID, "view-apparatus").is_selected()
         assert 0 <= place(browser, 1260) < 60
-        browser.find_element(By.ID, "view-program").click()
+        browser.find_element(By.ID, "view-witness").click()
         assert browser.current_url.endswith("two-term.html#1260")
 
 
@@ -193,8 +223,12 @@ def test_print_keeps_marks_notes_and_the_citation(browser: Chrome, site: Path, v
         citation = browser.find_element(By.CSS_SELECTOR, ".citation")
         assert not browser.execute_script(is_shown, citation)
         with on_paper(browser):
-            assert within(browser, 970, ".ours").text.strip() == "[A(4,1)=1.]"
-            mark = within(browser, 780, ".ours mark")
+            kind, text = (
+                ("witness", "(not in the scan)") if view == "witness" else ("ours", "[A(4,1)=1.]")
+            )
+            assert within(browser, 970, f".{kind}").text.strip() == text
+            mark = within(browser, 460, ".ours mark")
+            assert mark.is_displayed() == (view != "witness")
             assert "underline" in mark.value_of_css_property("text-decoration-line")
             assert within(browser, 780, ".refs").is_displayed()
             # What is folded away on the screen is printed.

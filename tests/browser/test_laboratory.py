@@ -14,6 +14,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from pyharness import case_scene, run_program
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, subset
+from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.printer import page
 from tests.browser.screen import UNNAMED, WIDTHS, fragment, opening, screen, text_of, too_wide
 
@@ -158,6 +159,17 @@ def test_curves_are_hidden_and_the_pointer_tells_numbers(browser: Chrome, labora
     assert "quotient: V1 " in told
 
 
+def _check_rows(rows: list[list[str]], twin: Trajectory, step: int) -> None:
+    """Check that program and solution have the digits in which they differ, and not many more."""
+    assert twin.velocity is not None
+    exact = [*twin.omega[step], *twin.velocity[step]]
+    assert [float(row[1]) for row in rows] == pytest.approx(exact, rel=1e-3)
+    for _, program, solution, error, *_ in rows[:3]:
+        apart = float(error)
+        assert abs(float(program) - float(solution)) == pytest.approx(apart, rel=0.02)
+        assert len(program) < 10
+
+
 @pytest.mark.campaign
 def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Open) -> None:
     laboratory("")
@@ -165,8 +177,8 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     assert twin.velocity is not None
     assert twin.stop is not None
     rows = _table(browser, "#step-numbers tr")
-    assert [float(row[1]) for row in rows] == [*twin.omega[-1], *twin.velocity[-1]]
-    assert float(rows[4][4]) == twin.stop.quotient
+    _check_rows(rows, twin, -1)
+    assert float(rows[4][4]) == pytest.approx(twin.stop.quotient, rel=1e-3)
     cards = _table(browser, ".cards tbody tr")
     stopping = next(row for row in cards if row[0] == "1420")
     assert "ends the run" in stopping[1]
@@ -176,7 +188,7 @@ def test_the_step_slider_shows_numbers_and_cards(browser: Chrome, laboratory: Op
     browser.find_element(By.ID, "step").send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT)
     assert text_of(browser, "step-told") == "23 of 25, at 0.23 s"
     rows = _table(browser, "#step-numbers tr")
-    assert [float(row[1]) for row in rows] == [*twin.omega[22], *twin.velocity[22]]
+    _check_rows(rows, twin, 22)
     cards = _table(browser, ".cards tbody tr")
     results = {row[2].partition(" = ")[0]: row[2].partition(" = ")[2] for row in cards if row[2:]}
     assert [float(results[f"U{axis}(4)"]) for axis in (1, 2, 3)] == twin.omega[22].tolist()
@@ -257,6 +269,43 @@ def test_the_limit_is_told(browser: Chrome, laboratory: Open) -> None:
         assert told in text_of(browser, "limit")
         assert browser.find_element(By.ID, "show-limit").is_enabled() == shown
     assert not browser.find_element(By.ID, "quotient").is_displayed()
+
+
+_LISTING = "return document.querySelector('input[name=listing]:checked').value"
+_SWITCHES = """
+return [...document.querySelectorAll("fieldset.switches")].map((group) =>
+  [...group.querySelectorAll(".reason")].map((each) => each.textContent !== ""));
+"""
+
+
+@pytest.mark.campaign
+def test_some_faults_are_a_state_of_their_own(browser: Chrome, laboratory: Open) -> None:
+    laboratory("#case=2&program=runge-kutta&listing=original")
+    some = browser.find_element(By.CSS_SELECTOR, "input[name=listing][value=some]")
+    assert (browser.execute_script(_LISTING), some.is_enabled()) == ("original", False)
+    _click(browser, "input[value=stage-base]")
+    assert (browser.execute_script(_LISTING), some.is_enabled()) == ("some", True)
+    assert "some faults" in text_of(browser, "sheet-told")
+    _click(browser, "input[value=stage-base]")
+    assert browser.execute_script(_LISTING) == "original"
+    _click(browser, "input[name=listing][value=corrected]")
+    assert browser.execute_script(_LISTING) == "corrected"
+    # A start that we supply is marked, and not one of the reader's.
+    for case, told in ((2, ""), (3, "its initial omega"), (7, "its initial omega and its cards")):
+        Select(browser.find_element(By.ID, "case")).select_by_value(str(case))
+        assert text_of(browser, "assumed-what") == told
+        assert browser.find_element(By.ID, "assumed-case").is_displayed() == (told != "")
+    laboratory("#case=3&program=runge-kutta&listing=original&omega0=1,2,3")
+    assert not browser.find_element(By.ID, "assumed-case").is_displayed()
+
+
+@pytest.mark.campaign
+def test_choices_without_effect_are_last(browser: Chrome, laboratory: Open) -> None:
+    for program in PROGRAMS:
+        laboratory(f"#case=2&program={program}&listing=original")
+        _wait(browser, lambda: any(map(any, browser.execute_script(_SWITCHES))))
+        groups = browser.execute_script(_SWITCHES)
+        assert all(idle == sorted(idle) for idle in groups), program
 
 
 @pytest.mark.campaign

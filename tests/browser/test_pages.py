@@ -325,6 +325,12 @@ def test_the_search_finds_a_card_and_is_in_the_address(browser: Chrome, site: Pa
     browser.execute_script("location.hash = '#q=Lipschitz'")
     results = browser.find_element(By.ID, "results")
     WebDriverWait(browser, 5).until(lambda _: "lipschitz-tests-velocity" in results.text)
+    # What readers look for first is found first.
+    for words, href in (("cite", "about.html#cite"), ("step+25", "index.html#")):
+        browser.get("about:blank")
+        browser.get((site / "search.html").as_uri() + f"#q={words}")
+        first = browser.find_element(By.CSS_SELECTOR, "#results a")
+        assert str(first.get_dom_attribute("href")).startswith(href)
 
 
 @pytest.mark.campaign
@@ -346,7 +352,7 @@ def test_a_filter_leaves_the_cards_of_a_kind(browser: Chrome, site: Path) -> Non
     browser.execute_script("location.hash = '#160'")
     assert shown() == defects | {"160"}
     # The program is shown whole.
-    assert shown("view-program") == every
+    assert shown("view-witness") == every
     assert shown("view-apparatus") == defects | {"160"}
     browser.execute_script("document.getElementById('kind-all').click()")
     assert shown() == every

@@ -1,4 +1,4 @@
-"""The six scenes of the story in a browser: each with its action, and the twins' numbers."""
+"""The seven scenes of the story in a browser: each with its action, and the twins' numbers."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -52,6 +52,33 @@ def _largest(case: int, program: str, listing: Listing, components: slice = slic
     run = run_program(scene, listing, "python")
     truth = reference(scene, scene.times()).omega[: run.steps]
     return float(np.abs(run.omega - truth)[:, components].max())
+
+
+@pytest.mark.campaign
+def test_the_points_of_a_step_and_their_fault(browser: Chrome) -> None:
+    assert _value(browser, "points-at") == story.POINTS_STEP
+    assert _points(browser, "points-run", "two-term") == _first_points("points-run", "two-term")
+    assert _points(browser, "points", "point-2") == _first_points("points", "point-2")
+    assert _points(browser, "points", "point-3") == ""
+    browser.find_element(By.ID, "points-step").send_keys(Keys.HOME)
+    assert _value(browser, "point-last") == pytest.approx(0.02 / 3)
+    click(browser, "input[name=points-program][value=four-term]")
+    assert _value(browser, "point-last") == pytest.approx(0.008)
+    four = subset("four-term")
+    assert _value(browser, "points-error") == pytest.approx(
+        _largest(6, "four-term", four, slice(0, 1)), rel=1e-9
+    )
+    assert _points(browser, "points-run", "two-term") == ""
+    assert _points(browser, "points", "point-4") != ""
+    click(browser, "input[name=points-program][value=two-term]")
+    click(browser, "#points-fault")
+    browser.find_element(By.ID, "points-step").send_keys(Keys.END)
+    assert _value(browser, "point-last") == pytest.approx(0.02 / 3)
+    assert _value(browser, "points-steps") == 100
+    without = subset("two-term", fix=["dt-accumulates"])
+    assert _value(browser, "points-error") == pytest.approx(
+        _largest(6, "two-term", without, slice(0, 1)), rel=1e-9
+    )
 
 
 @pytest.mark.campaign
@@ -167,7 +194,7 @@ def test_the_story_can_be_read_in_four_minutes(browser: Chrome) -> None:
         focus = browser.switch_to.active_element
         reached.append(focus.get_dom_attribute("id") or focus.get_dom_attribute("name"))
     wanted = "trust prediction run step omega-alone fault step-size blind-case blind-program race"
-    assert set(wanted.split()) <= set(reached)
+    assert {*wanted.split(), "points-step", "points-program", "points-fault"} <= set(reached)
 
 
 @pytest.mark.campaign

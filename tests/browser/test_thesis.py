@@ -1,5 +1,7 @@
 """The pages of the thesis, claims and figures: what an address opens, and what is side by side."""
 
+import base64
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,12 @@ from tests.browser.screen import errors, on_paper, screen
 
 _OPEN = """
 const [id] = arguments, named = document.getElementById(id);
-const folded = [...named.querySelectorAll("details")];
+const folded = [...(named.matches("details") ? [named] : []), ...named.querySelectorAll("details")];
 const others = [...document.querySelectorAll(".claim, .sentence")].filter((each) => each !== named);
 return {
   folded: folded.length,
   open: folded.filter((each) => each.open).length,
-  others: others.filter((each) => each.querySelector("details[open]")).length,
+  others: others.filter((each) => each.open || each.querySelector("details[open]")).length,
   top: named.getBoundingClientRect().top,
 };
 """
@@ -35,16 +37,18 @@ def _boxes(browser: Chrome, *selectors: str) -> list[dict[str, float]]:
 @pytest.mark.campaign
 def test_an_address_and_a_link_open_what_is_folded_there_alone(browser: Chrome, site: Path) -> None:
     with screen(browser, 1440):
-        for page, name in (("thesis.html", "sentence-27"), ("claims.html", "vi-superior")):
+        for page, name, folded in (
+            ("thesis.html", "sentence-27", 2), ("claims.html", "vi-superior", 3),
+        ):  # fmt: skip
             browser.get(f"{(site / page).as_uri()}#{name}")
             found: dict[str, Any] = browser.execute_script(_OPEN, name)
-            assert (found["folded"], found["open"], found["others"]) == (2, 2, 0)
+            assert (found["folded"], found["open"], found["others"]) == (folded, folded, 0)
             assert 0 <= found["top"] < 100  # at its place at once
         assert browser.execute_script(_OPEN, "v2-case-2-stopped")["open"] == 0
         browser.execute_async_script(
             "const done = arguments[1]; addEventListener('hashchange', () => setTimeout(done));"
-            "document.querySelector(arguments[0]).click();",
-            'section#all a[href="#v2-case-2-stopped"]',
+            "location.hash = arguments[0];",
+            "#v2-case-2-stopped",
         )
         found = browser.execute_script(_OPEN, "v2-case-2-stopped")
         assert found["open"] == found["folded"] > 0
@@ -79,17 +83,44 @@ def test_figures_of_the_paper_are_beside_ours(browser: Chrome, site: Path) -> No
 
 
 @pytest.mark.campaign
-def test_print_keeps_verdicts_and_numbers(browser: Chrome, site: Path) -> None:
+def test_all_claims_and_entries_open_at_once(browser: Chrome, site: Path) -> None:
+    for page, each in (("claims.html", ".claim"), ("apparatus.html", ".entry")):
+        browser.get((site / page).as_uri())
+        count = f"return document.querySelectorAll('{each}[open]').length"
+        assert browser.execute_script(count) == 0
+        for _ in range(2):
+            browser.find_element("css selector", ".open-all").click()
+        assert browser.execute_script(count) == 0
+        browser.find_element("css selector", ".open-all").click()
+        everything = f"return document.querySelectorAll('{each}').length"
+        assert browser.execute_script(count) == browser.execute_script(everything) > 50
+
+
+@pytest.mark.campaign
+def test_print_keeps_verdicts_and_the_numbers_of_the_thesis(browser: Chrome, site: Path) -> None:
     script = (
-        "const seen = (each) => each.getBoundingClientRect().height > 0;"
+        "const seen = (each) => each.checkVisibility();"
         "return ['.verdict', 'details table td'].map((each) => {"
         "  const all = [...document.querySelectorAll(each)];"
         "  return [all.length, all.filter(seen).length];"
         "});"
     )
-    for page, least in (("claims.html", 116), ("thesis.html", 78)):
+    for page, least in (("claims.html", 87), ("thesis.html", 60)):
         browser.get((site / page).as_uri())
         with on_paper(browser):
             (verdicts, seen), (cells, printed) = browser.execute_script(script)
         assert verdicts == seen >= least
-        assert cells == printed > 100
+        assert printed == (0 if page == "claims.html" else cells)
+        assert cells > 100
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("page", "most"), [("claims.html", 8), ("apparatus.html", 8)])
+def test_claims_and_apparatus_are_short(browser: Chrome, site: Path, page: str, most: int) -> None:
+    browser.get((site / page).as_uri())
+    paper = {"paperWidth": 8.27, "paperHeight": 11.69}
+    printed = browser.execute_cdp_cmd("Page.printToPDF", paper)["data"]
+    assert len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(printed))) <= most
+    with screen(browser, 360):
+        height = browser.execute_script("return document.documentElement.scrollHeight")
+        assert height < 10000

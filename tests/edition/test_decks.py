@@ -3,15 +3,19 @@
 import re
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from pyharness.edition import decks, parallel_decks
+from pyharness.history.ablation import case_truth
 from pyharness.history.identifiers import text_digest
 from pyharness.model.facts import facts
-from pyharness.model.listing import PROGRAMS, Listing, switches
-from pyharness.thesis.cards import deck, numbers, tight
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
+from pyharness.model.scene_file import case_numbers, case_scene
+from pyharness.thesis.cards import deck, tight
 from pyharness.thesis.collation import expected_lines, witness_lines
 from pyharness.thesis.decks import corrections
+from pyharness.thesis.programs import run_program
 from tests.edition.pages import pages
 
 
@@ -52,14 +56,48 @@ def test_a_note_is_shown_once_for_its_range_of_cards(program: str) -> None:
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_notes_are_numbered_by_first_cards(built_site: dict[str, bytes], program: str) -> None:
+def test_defects_have_the_first_notes(built_site: dict[str, bytes], program: str) -> None:
     found = decks.notes(program)
     assert [each.number for each in found] == list(range(1, len(found) + 1))
-    firsts = [numbers(each.cards)[0] for each in found]
-    assert firsts == sorted(firsts)
+    kinds = [decks._ORDER.index(each.kind) for each in found]
+    assert kinds == sorted(kinds)
     anchors = pages(built_site)[f"listing/{program}.html"].anchors
     shown = [each for each in anchors if each.startswith("note-")]
     assert shown == [f"note-{each.number}" for each in found]
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_defects_that_change_most_are_first(program: str) -> None:
+    """The order follows from runs with one defect corrected at a time."""
+    defects = [each.entry["id"] for each in decks.notes(program) if each.kind == "defect"]
+    changes = []
+    for name in defects:
+        largest = 0.0
+        for case in case_numbers() if name in names_of("defect", program) else ():
+            scene, truth = case_scene(case), case_truth(case).omega
+            errors = []
+            for active in (switches(program), set(switches(program)) - {name}):
+                run = run_program(scene, Listing(program, active), "fortran")
+                errors.append(float(np.abs(run.omega - truth[: run.steps]).max()))
+            if np.isfinite(errors).all():
+                largest = max(largest, abs(errors[0] - errors[1]))
+            elif np.isfinite(errors).any():
+                largest = np.inf
+        changes.append(float(f"{largest:.2e}"))
+    assert changes == sorted(changes, reverse=True)
+    assert changes[0] > 0.0
+
+
+def test_the_witness_has_its_own_names_and_lines() -> None:
+    (view,) = [each for each in decks.card_views("runge-kutta") if each.number == 1050]
+    assert [each.text for each in view.after][1] == "630-      END DETERMINATION OF K'S."
+    views = {each.number: each for each in decks.card_views("four-term")}
+    assert views[460].witness == "      M1=M1/I1"
+    assert views[970].witness == ""
+    assert views[450].witness is None
+    scanned = [text for text, name in expected_lines() if name == "phantom"]
+    shown = [tight(r.text) for p in PROGRAMS for v in decks.card_views(p) for r in v.after]
+    assert sorted(shown) == sorted(scanned)
 
 
 def test_conjectured_cards_are_in_brackets_and_no_other() -> None:

@@ -1,14 +1,17 @@
 """The site: no dead link, nothing from outside, everything of the edition on its page."""
 
 import hashlib
+import io
 import json
 import re
 import tomllib
+import zipfile
 from itertools import pairwise
 
 import pytest
 
 from pyharness.edition import api, decks, documents, ledger, parallel_decks, site
+from pyharness.edition.data_package import archive, data_package
 from pyharness.edition.ledger import counts
 from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
@@ -21,7 +24,7 @@ from pyharness.model.facts import facts, shipped
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Picture
 from pyharness.thesis.cards import deck, tight
-from pyharness.views import html, pictures
+from pyharness.views import pictures
 from tests.edition.pages import dead, pages
 
 
@@ -36,7 +39,7 @@ def test_no_link_is_dead(built_site: dict[str, bytes]) -> None:
     ("page", "old", "new"),
     [
         ("index.html", b'href="thesis.html"', b'href="these.html"'),
-        ("claims.html", b'href="#vi-superior"', b'href="#vi-inferior"'),
+        ("claims.html", b'href="#evidence"', b'href="#evident"'),
         ("docs/article/article.html", b'src="../figures/', b'src="../figure/'),
         ("listing/two-term.html", b"../apparatus.html#", b"../apparatus.html#no-"),
     ],
@@ -125,20 +128,50 @@ def test_every_claim_entry_and_sentence_is_there(built_site: dict[str, bytes]) -
     }
 
 
-def test_counts_by_kind_and_verdicts_are_on_their_pages(built_site: dict[str, bytes]) -> None:
-    table = kinds_table(judgements())
-    home = built_site["index.html"].decode()
-    about = built_site["about.html"].decode()
-    assert html.table(table, "verdicts by kind of claim") in about
-    results = next(row for row in table.rows if row[0] == "result")
-    before, after = results[2].split(" / ")
-    told = f"Of {results[1]} statements about results, the programs as printed reproduce {before},"
-    assert f"{told} and the corrected ones {after}." in " ".join(home.split())
-    # The ledger has the verdicts.
+def test_counts_and_verdicts_are_on_their_pages(built_site: dict[str, bytes]) -> None:
+    counted = kinds_table(judgements())
+    names = [each.head for each in counted.columns]
+    table = {row[0]: dict(zip(names, row, strict=True)) for row in counted.rows}
+    before, after = table["result"]["reproduced"].split(" / ")
+    # A design is judged as printed, all else without the faults.
+    sides = {"theory": 1, "design": 0, "history": 1, "recommendation": 1}
+    hold, part, false, untested = (
+        sum(int(table[kind][verdict].split(" / ")[side]) for kind, side in sides.items()
+            if table[kind][verdict] != "-")
+        for verdict in ("reproduced", "reproduced in part", "false", "not testable")
+    )  # fmt: skip
+    told = (
+        f"Of 29 claims about results, the programs as printed reproduce {before}, and the "
+        f"corrected ones {after}; of the 29 others, {hold} hold, {part} hold in part, {false} are "
+        f"false, and {untested} cannot be tested."
+    )
+    assert hold + part + false + untested == 29
+    for name in ("about.html", "claims.html"):
+        assert told in " ".join(built_site[name].decode().split())
+    told = f"Of 29 statements about results, the programs as printed reproduce {before},"
+    home = " ".join(built_site["index.html"].decode().split())
+    assert f"{told} and the corrected ones {after}." in home
+    # Two verdicts on a result, one on any other claim.
     text = built_site["claims.html"].decode()
-    _, _, story = text.partition('id="vi-superior"')
-    verdicts = re.findall(r'class="verdict [\w-]+">([\w ]+)<', story)[:2]
-    assert verdicts == ["reproduced", "false"]
+    for each in judgements():
+        _, _, line = text.partition(f'id="{each.claim["id"]}"')
+        line = line.partition("</summary>")[0]
+        found = re.findall(r'class="verdict [\w-]+">([\w ]+)<', line)
+        both = [each.original.verdict, each.corrected.verdict]
+        if each.claim["kind"] == "result":
+            assert found == both
+        else:
+            assert found == [both[sides[each.claim["kind"]]]]
+
+
+def test_the_data_are_downloaded_from_every_page(built_site: dict[str, bytes]) -> None:
+    for name, page in pages(built_site).items():
+        links = [each.path for each in page.targets if each.path.endswith("data.zip")]
+        assert links, name
+    with zipfile.ZipFile(io.BytesIO(built_site["data.zip"])) as packed:
+        found = {each.partition("/")[2]: packed.read(each) for each in packed.namelist()}
+    assert found == data_package()
+    assert built_site["data.zip"] == archive(found, "jacobs-1982-data")
 
 
 def test_the_search_knows_cards_entries_claims_and_names(built_site: dict[str, bytes]) -> None:
@@ -167,9 +200,9 @@ def test_what_others_wrote_is_what_its_checksum_says() -> None:
 
 @pytest.mark.campaign
 def test_builds_are_alike(built_site: dict[str, bytes], monkeypatch: pytest.MonkeyPatch) -> None:
-    def saved(picture: Picture, name: str) -> dict[str, bytes]:
+    def saved(picture: Picture, name: str, *more: str) -> dict[str, bytes]:
         if name in ("figure-07-together.svg", "figure-10b-corrected.svg"):
-            return pictures.saved(picture, name)
+            return pictures.saved(picture, name, *more)
         names = (name, name.replace(".svg", ".csv"))
         return {each: built_site[f"figures/{each}"] for each in names}
 

@@ -11,11 +11,15 @@ import pytest
 
 from pyharness import case_scene, run_program
 from pyharness.edition import story
-from pyharness.history.claims.ledger import judgement
+from pyharness.edition.ledger import assumption
+from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED
+from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
+from pyharness.model.scene_file import case_numbers
+from pyharness.thesis.cards import deck
 from pyharness.truth.reference import reference
 from tests.edition.pages import pages
 from tests.ports import WEB, run_javascript
@@ -90,6 +94,64 @@ def test_what_ends_a_run_whose_omega_is_right(slots: Slots, built_site: dict[str
     assert b'data-text="alone-variable">U1<' in built_site["index.html"]
 
 
+CARDS_OF_POINTS = {
+    "two-term": ("T1=DT/3.", "T2=2.*DT/3."),
+    "four-term": ("T1=DT*.2", "T2=DT*.4", "T3=DT*.6", "T4=DT*.8"),
+}
+
+
+def test_the_points_leave_the_step(slots: Slots) -> None:
+    """The points are those of the twin, and only the two-term program suffers."""
+    scene, step = case_scene(6), story.POINTS_STEP
+    assert slots["points-at"] == step
+    run = run_program(scene, subset("two-term"), "python")
+    assert (run.ended, run.steps) == ("overflow", step - 1)
+    assert slots["points-steps"] == run.steps
+    assert slots["points-error"] == _error(6, "two-term", "original", slice(0, 1))
+    for program, terms in story.TERMS.items():
+        fractions = [n / (terms + 1) for n in range(1, terms + 1)]
+        assert story.data()["fractions"][program] == fractions
+        cards = {card.text.strip() for card in deck(program).cards.values()}
+        assert set(CARDS_OF_POINTS[program]) <= cards
+    assert slots["point-first"] == pytest.approx(step * 0.01 / 3)
+    assert slots["point-last"] == pytest.approx(2 * step * 0.01 / 3)
+    # A quadratic is determined by three points: four terms do not suffer under constant torques.
+    for case in range(2, 7):
+        one, other = (
+            run_program(case_scene(case), listing, "python").omega
+            for listing in (subset("four-term"), subset("four-term", fix=["dt-accumulates"]))
+        )
+        assert np.abs(one - other).max() < 1e-13
+
+
+def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
+    assumed = open_starts()
+    for case in case_numbers():
+        assert bool(assumption(case)) == (case in assumed)
+    assert "cards" in assumption(7)
+    supplied = facts("account")["statement"]
+    (text,) = [each["text"] for each in supplied if each["id"] == "supplied"]
+    for page in ("index", "laboratory", "figures", "claims", "thesis"):
+        told = " ".join(html.unescape(built_site[f"{page}.html"].decode()).split())
+        assert told.count("△ assumed") >= 2, page
+        assert text in told
+    # From both starts that the thesis shows, Case 1 ends before.
+    home = " ".join(built_site["index.html"].decode().split())
+    steps = []
+    for start in ((0.0, 1.0, 10.0), (0.0, 1.0, 1.0)):
+        run = run_program(replace(case_scene(1), omega=start), subset("runge-kutta"))
+        steps.append(run.steps)
+    assert f"at steps {steps[0]} and {steps[1]}." in home
+    figures = built_site["figures.html"].decode().split("<figcaption>")[1:]
+    for caption in figures:
+        (case,) = set(re.findall(r"laboratory.html#case=(\d)", caption.partition("</fig")[0]))
+        assert ("△ assumed" in caption.partition("</fig")[0]) == (int(case) in assumed)
+    claims = built_site["claims.html"].decode()
+    for each in judgements():
+        line = claims.partition(f'id="{each.claim["id"]}"')[2].partition("</summary>")[0]
+        assert ("△ assumed" in line) == (not all(x.survives for x in each.survivals))
+
+
 @pytest.mark.campaign
 def test_ratios_are_those_of_the_largest_errors(slots: Slots) -> None:
     ratios = {}
@@ -157,8 +219,9 @@ def test_both_languages_write_a_number_alike(built_site: dict[str, bytes]) -> No
 
 def test_the_name_of_the_edition_is_everywhere(built_site: dict[str, bytes]) -> None:
     home = built_site["index.html"].decode()
-    assert f"<h1>{EDITION['name']}</h1>" in home
-    assert f"<title>{EDITION['name']}</title>" in home
+    title = f"The program that stopped at step {facts('account')['mechanism']['stopped']['step']}"
+    assert f"<h1>{title}</h1>" in home
+    assert f"<title>{title} · {EDITION['name']}</title>" in home
     for name in ("index.html", "about.html"):
         assert EDITION["subtitle"] in built_site[name].decode()
     assert EDITION["name"] in (ROOT / "README.md").read_text()

@@ -2,16 +2,16 @@
 
 const element = (id) => document.getElementById(id);
 
-export function startCopying() {
-  for (const button of document.querySelectorAll("button.copy")) {
+export function startCopying(within = document, told = "copied") {
+  for (const button of within.querySelectorAll("button.copy")) {
     const of = element(button.dataset.of);
     button.hidden = navigator.clipboard === undefined;
     button.addEventListener("click", async () => {
       try {
         await navigator.clipboard.writeText(of.href ?? of.textContent);
-        element("copied").textContent = "copied";
+        element(told).textContent = "copied";
       } catch {
-        element("copied").textContent = "the browser does not allow copying from here";
+        element(told).textContent = "the browser does not allow copying from here";
       }
     });
   }

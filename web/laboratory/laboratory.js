@@ -16,6 +16,7 @@ import {
   defaultState,
   fragmentOf,
   hasStopTest,
+  listingOf,
   omegaFrom,
   positiveFrom,
   sceneOfCase,
@@ -67,9 +68,9 @@ function show(next, problems = []) {
   showPinned();
   steps.show(found);
   showCharts();
-  const switches = state.base === "corrected" ? "corrected" : "original";
+  const listing = listingOf(data, state);
   element("sheet-told").textContent =
-    `Case ${state.case}, ${state.program}, ${switches}: ${shortEnding(found)}`;
+    `Case ${state.case}, ${state.program}, ${listing === "some" ? "some faults" : listing}: ${shortEnding(found)}`;
   element("copied").textContent = "";
   element("command").textContent = commandOf(data, state);
   element("address").href = `#${fragmentOf(data, state, pinned)}`;
@@ -135,6 +136,18 @@ function showIdle() {
     label.classList.toggle("idle", reason !== null);
     label.querySelector(".reason").textContent = reason === null ? "" : `No effect here: ${reason}.`;
   }
+  // Choices without effect are last in their group, the others in their order.
+  for (const group of all("fieldset.switches")) {
+    const labels = [...group.querySelectorAll("label")];
+    const rank = (label) => Number(reasons.get(label.querySelector("input").value) !== null);
+    const order = (label) => data.flags.findIndex(({ id }) => id === label.querySelector("input").value);
+    const sorted = labels.toSorted((a, b) => rank(a) - rank(b) || order(a) - order(b));
+    if (sorted.some((label, n) => label !== labels[n])) {
+      const active = document.activeElement;
+      group.append(...sorted);
+      active?.focus({ preventScroll: true });
+    }
+  }
 }
 
 function tell(problems = []) {
@@ -150,6 +163,9 @@ function withoutTruth() {
 function showControls() {
   element("case").value = state.case;
   element("heading").textContent = data.headings[state.case].join("; ");
+  const supplied = state.omega0 === null ? data.assumed[state.case] : "";
+  element("assumed-case").hidden = supplied === "";
+  element("assumed-what").textContent = supplied;
   const values = {
     omega0: (state.omega0 ?? sceneOfCase(data, state.case).initial.omega).map(written).join(", "),
     "step-size": written(state.stepSize),
@@ -162,7 +178,12 @@ function showControls() {
     element(id).removeAttribute("aria-invalid");
   }
   element("program").value = state.program;
-  for (const radio of all("input[name=listing]")) radio.checked = radio.value === state.base;
+  const listing = listingOf(data, state);
+  for (const radio of all("input[name=listing]")) {
+    radio.checked = radio.value === listing;
+    // The reader comes there by a switch.
+    if (radio.value === "some") radio.disabled = listing !== "some";
+  }
   for (const box of all("input[name=switch]")) {
     const label = box.closest("label");
     const absent = !label.dataset.programs.split(" ").includes(state.program);
@@ -219,6 +240,7 @@ onNumber("lipschitz", positiveFrom, (lipschitz) => ({ ...state, lipschitz }));
 for (const radio of all("input[name=listing]")) {
   radio.addEventListener("change", () => {
     const base = radio.value;
+    if (base === "some") return;
     change({ ...state, base, active: activeIn(data, base) });
   });
 }

@@ -46,6 +46,14 @@ export function activeIn(data, base) {
   return data.flags.filter((flag) => flag.in_original && base !== "corrected").map((flag) => flag.id);
 }
 
+// Return the listing that the switches of a program make: original, corrected, or some of the faults.
+export function listingOf(data, { program, active }) {
+  const own = KINDS.flatMap((kind) => namesOf(data, program, kind));
+  const chosen = own.filter((name) => active.includes(name)).join();
+  const usual = (base) => own.filter((name) => activeIn(data, base).includes(name)).join();
+  return LISTINGS.find((base) => usual(base) === chosen) ?? "some";
+}
+
 // Return the words of a state, each as a name and its value; a switch has the value null. Case,
 // program and listing are always included, other words only if they differ from the defaults.
 export function wordsOf(data, state) {

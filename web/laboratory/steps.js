@@ -59,6 +59,22 @@ export class StepViewer {
   }
 }
 
+// Return a number with four significant digits, and nothing for none.
+function short(value) {
+  return value === undefined || value === null ? "" : written(Number(value.toPrecision(4)));
+}
+
+// Return the texts of a number and of its solution with as many digits as they need to differ by
+// three of them; all digits are in the table of all numbers.
+function alike(value, solved) {
+  if (typeof solved !== "number") return [short(value), ""];
+  const scale = Math.max(Math.abs(value), Math.abs(solved));
+  const apart = Math.abs(value - solved);
+  if (apart === 0 || !Number.isFinite(scale)) return [written(value), written(solved)];
+  const digits = Math.min(Math.max(Math.ceil(Math.log10(scale / apart)) + 2, 4), 17);
+  return [value, solved].map((each) => written(Number(each.toPrecision(digits))));
+}
+
 function numbers({ run, truth, errors, tests }, step) {
   const row = run.rows[step - 1];
   const names = ["U1", "U2", "U3", "V1", "V2", "V3"];
@@ -67,14 +83,12 @@ function numbers({ run, truth, errors, tests }, step) {
     const solved = n < 3 ? truth[step - 1]?.[n] : undefined;
     const error = n < 3 ? errors[step - 1]?.[n] : undefined;
     const quotient = quotients.get(name);
-    const cells = [row[n + 1], solved, error, quotient].map((value) =>
-      value === undefined || value === null ? "" : written(value),
-    );
+    const cells = [...alike(row[n + 1], solved), ...[error, quotient].map(short)];
     return `<tr><th scope="row">${name}</th><td>${cells.join("</td><td>")}</td></tr>`;
   });
   const joint = ["U", "UV"]
     .filter((name) => quotients.has(name))
-    .map((name) => `<tr><th scope="row">${name}</th><td></td><td></td><td></td><td>${written(quotients.get(name) ?? 0)}</td></tr>`);
+    .map((name) => `<tr><th scope="row">${name}</th><td></td><td></td><td></td><td>${short(quotients.get(name) ?? 0)}</td></tr>`);
   return [...lines, ...joint].join("");
 }
 

@@ -15,7 +15,7 @@
     const target = document.querySelector(".line:target");
     const top = target?.getBoundingClientRect().top;
     const card = top >= below && top < innerHeight ? target
-      : [...document.querySelectorAll(".line")].find((each) => each.getBoundingClientRect().top >= below);
+      : [...document.querySelectorAll(".line[id]")].find((each) => each.getBoundingClientRect().top >= below);
     kept = card && { card, top: card.getBoundingClientRect().top };
   };
   for (const event of ["pointerdown", "keydown"]) tools.addEventListener(event, keep);
@@ -24,14 +24,14 @@
       if (kept && kept.top < innerHeight) {
         scrollBy(0, kept.card.getBoundingClientRect().top - kept.top);
       }
-      const query = view() === "program" ? "" : `?view=${view()}`;
+      const query = view() === "witness" ? "" : `?view=${view()}`;
       history.replaceState(null, "", location.pathname + query + location.hash);
     });
   }
 
   document.getElementById("jump").addEventListener("submit", (event) => {
     event.preventDefault();
-    const numbers = [...document.querySelectorAll(".line")].map((each) => Number(each.id));
+    const numbers = [...document.querySelectorAll(".line[id]")].map((each) => Number(each.id));
     const told = document.getElementById("jumped");
     const given = document.getElementById("card").value.trim();
     const number = Number(given);

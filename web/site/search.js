@@ -10,6 +10,8 @@
     fields: ["title", "kind", "text"],
     searchOptions: {
       boost: { title: 3 },
+      // The story and the page about the edition say first what others say in detail.
+      boostDocument: (id) => (places[id].kind === "page" ? 4 : 1),
       // Another number is another place.
       prefix: (term) => !/\d/.test(term),
       fuzzy: (term) => (/\d/.test(term) ? false : 0.15),

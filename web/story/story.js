@@ -8,7 +8,7 @@ import { Trace } from "../programs/trace.js";
 import { draw, mark } from "./chart.js";
 import { prose } from "./numbers.js";
 
-const { scenes, original, letters, lipschitz } = window.storyData;
+const { scenes, original, letters, lipschitz, fractions } = window.storyData;
 const element = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 const chosen = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
@@ -161,6 +161,32 @@ function blind() {
   show("blind", `case-${number}`);
 }
 
+// Show the points of collocation of a step, and the run in Case 6 to which they lead.
+function points() {
+  const program = chosen("points-program");
+  const grows = element("points-fault").checked;
+  const step = Number(element("points-step").value);
+  const chart = element("chart-points");
+  const { step_size: size, steps: count } = scenes[6].run;
+  const steps = Array.from({ length: count }, (_, n) => n + 1);
+  for (let n = 1; n <= 4; n += 1) {
+    const part = fractions[program][n - 1];
+    const places = part === undefined ? [] : steps.map((each) => part * size * (grows ? each : 1));
+    draw(chart, `point-${n}`, places.length > 0 ? steps : [], places);
+  }
+  mark(chart, "marker", step);
+  const found = run(6, program, { without: grows ? [] : ["dt-accumulates"] });
+  for (const name of Object.keys(fractions)) {
+    draw(element("chart-points-run"), name, ...(name === program ? firstOmega(found) : [[], []]));
+  }
+  document.querySelector("output[for=points-step]").textContent = step;
+  fill("points-at", step);
+  fill("point-first", fractions[program][0] * size * (grows ? step : 1));
+  fill("point-last", fractions[program].at(-1) * size * (grows ? step : 1));
+  fill("points-steps", found.rows.length);
+  fill("points-error", distance(found, reference(found.scene, found.times), [0]));
+}
+
 // Run all programs in all cases but the first, and compare Runge-Kutta with collocation.
 function race() {
   const listing = chosen("race");
@@ -201,4 +227,7 @@ turn();
 element("step-size").addEventListener("change", slow);
 onChange(["fault"], slow);
 onChange(["blind-case", "blind-program"], blind);
+element("points-step").addEventListener("input", points);
+element("points-fault").addEventListener("change", points);
+onChange(["points-program"], points);
 onChange(["race"], race);

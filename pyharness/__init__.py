@@ -1,7 +1,7 @@
-"""Three FORTRAN programs of 1982 for rotating rigid bodies, their corrections, and fast solvers.
+"""Rigid-body rotation: a fast engine, checks, and three FORTRAN programs of a thesis.
 
-The programs are from a thesis. The package has them as printed and as corrected, checks their
-results, and solves Euler's equations by other methods.
+The engine estimates the error of each result. The package has the programs as printed and as
+corrected. The checks are also for ports of them, and for other integrators.
 """
 
 # The public names by module, which type checkers read in `__init__.pyi`. Modules are imported at

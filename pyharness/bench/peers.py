@@ -38,7 +38,7 @@ def peers() -> list[SceneContender]:
     finest = (*TOLERANCES, 2.0**-52)
 
     def adaptive(name: str, package: str, prepare: Callable[[Scene], Maker]) -> SceneContender:
-        settings = finest if name == "heyoka" else TOLERANCES
+        settings = finest if package == "heyoka" else TOLERANCES
         return SceneContender(name, "tolerance", prepare, settings, package=package, attitude=True)
 
     def fixed(name: str, order: int) -> SceneContender:
@@ -47,6 +47,8 @@ def peers() -> list[SceneContender]:
 
     return [
         adaptive("heyoka", "heyoka", heyoka_maker),
+        # With the derivatives by the initial state, from which our error amplification comes too.
+        adaptive("heyoka-variational", "heyoka", partial(heyoka_maker, variational=True)),
         fixed("rk4", 4),
         fixed("dop8", 8),
         adaptive("odeint", "scipy", _odeint),
@@ -57,16 +59,22 @@ def peers() -> list[SceneContender]:
     ]
 
 
-def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
+def heyoka_maker(
+    scene: Scene, formula: Formula | None = None, *, variational: bool = False
+) -> Maker:
     """Return a maker of heyoka integrations, with one integrator for each tolerance.
 
     Each run first resets time and state. `formula` is as in `heyoka_equations`.
     """
     import heyoka
 
-    equations = heyoka_equations(scene, formula)
+    equations: Any = heyoka_equations(scene, formula)
     integrators: dict[float, Any] = {}
     start = np.array(state_of(scene))
+    n = len(start)
+    if variational:
+        equations = heyoka.var_ode_sys(equations, heyoka.var_args.vars, order=1)
+        start = np.concatenate([start, np.eye(n).ravel()])
 
     def make(horizon: float, setting: float) -> Ready:
         if setting not in integrators:
@@ -75,7 +83,7 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
             if hasattr(heyoka.llvm_state, "set_diskcache_enabled"):
                 heyoka.llvm_state.set_diskcache_enabled(False)
             integrators[setting] = heyoka.taylor_adaptive(
-                equations, start.tolist(), tol=setting, compact_mode=False
+                equations, start[:n].tolist(), tol=setting, compact_mode=False
             )
         integrator = integrators[setting]
         state = integrator.state
@@ -87,7 +95,7 @@ def heyoka_maker(scene: Scene, formula: Formula | None = None) -> Maker:
             return integrator.propagate_until(horizon)
 
         def read(result: Any) -> End:
-            return end_of(state) if result[0] == reached else not_finite(str(result[0]))
+            return end_of(state[:n]) if result[0] == reached else not_finite(str(result[0]))
 
         return Ready(run, read)
 

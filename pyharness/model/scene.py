@@ -142,7 +142,7 @@ class Scene:
     """
 
     name: str = "body"
-    omega: Triple | None = None
+    omega: Triple = ()  # type: ignore[assignment]  # required, in spite of the name's default
     moments: Triple | None = None
     coefficients: Triple | None = None
     torque: TorqueLaw | StateTorque = field(default_factory=TorqueLaw)
@@ -201,7 +201,7 @@ class Scene:
             from pyharness.model.inertia import checked_inertia
 
             self._set("inertia", checked_inertia("[body] inertia", self.inertia))
-        if self.omega is None:
+        if isinstance(self.omega, tuple) and not self.omega:
             raise InputError("[initial] omega is missing; give three numbers, in rad/s")
         self._set("omega", three("[initial] omega", self.omega))
         if self.attitude is not None:

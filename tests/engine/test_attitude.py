@@ -75,10 +75,13 @@ def test_attitude_is_computed_by_default_if_the_scene_has_one() -> None:
     assert found.attitude is None
     assert found.omega.tolist() == bare.omega.tolist()
     assert solve(scene, [1.0], "gauss-4").attitude is None
-    asked, found = solve(scene, [1.0], attitude=True), solve(scene, [1.0])
-    assert found.attitude.tolist() == asked.attitude.tolist()
-    assert Stepper(scene).attitude.tolist() == list(scene.attitude)
-    turning = replace(case_scene(5), torque=lambda t, w, q: -q[1:])
+    asked: Any = solve(scene, [1.0], attitude=True)
+    default: Any = solve(scene, [1.0])
+    stepper: Any = Stepper(scene)
+    assert np.array_equal(default.attitude, asked.attitude)
+    assert stepper.attitude.tolist() == list(scene.attitude or ())
+    turn: Any = lambda t, w, q: -q[1:]  # noqa: E731
+    turning = replace(case_scene(5), torque=turn)
     assert solve(turning, 1.0).attitude is not None
     assert "attitude" in plan(case_scene(5)).skipped
     assert "attitude" not in plan(scene).skipped

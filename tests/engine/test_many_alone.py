@@ -223,7 +223,7 @@ def test_the_bound_of_the_growth_is_above_the_growth() -> None:
             if growth > 0.0 and found.has_result[0]:
                 assert (found.ended[0] == "sensitive") == (growth > max(limit, 2.0**44))
             # With a matrix the initial omega counts as rounded.
-            rounded = {"inertia": np.diag(moments), "omega": start}
+            rounded: Any = {"inertia": np.diag(moments), "omega": start}
             found = solve_many(scene, t_end, tolerance=tolerance, **rounded)
             if growth > 0.0 and found.has_result[0]:
                 assert (found.ended[0] == "sensitive") == (growth > limit)

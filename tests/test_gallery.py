@@ -106,7 +106,7 @@ def test_command_of_the_wing_nut_runs(
     (tmp_path / "nut.toml").write_text(scene)
     run, _, file = command.partition(" --animate ")
     assert file == "nut.gif"
-    assert "rounding errors are amplified" in printed(run)
+    assert "error amplification" in printed(run)
     assert "--animate FILE" in printed("help run")
 
 

@@ -318,7 +318,8 @@ def test_an_opaque_torque_is_solved_once_for_rows_events_and_dense_output(end: f
     def brake(time: float, omega: Any) -> Any:
         nonlocal calls
         calls += 1
-        return np.clip(-0.8 * omega + np.sin(3.0 * time), -0.5, 0.5)
+        push = math.sin(3.0 * time)
+        return [min(0.5, max(-0.5, push - 0.8 * w)) for w in omega.tolist()]
 
     scene = Scene("brake", (1.0, 0.2, -0.7), moments=(1.0, 2.0, 2.5), torque=opaque(brake))
     found = solve(scene, end, tolerance=1e-4, dense_output=True, events=lambda t, w: w[2])

@@ -239,13 +239,10 @@ def test_numbers_of_readme_and_page_about_the_text_are_those_of_runs_and_cards()
     listings = (Listing.original("runge-kutta"), Listing.corrected("runge-kutta"))
     printed, mended = (run_program(scene, each) for each in listings)
     assert printed.stop is not None
-    truth = reference(scene, scene.times()).omega
-    errors = [np.abs(r.omega - truth[: r.steps]).max(axis=0) for r in (printed, mended)]
-    assert 0.5e6 < (errors[0] / errors[1]).min() < (errors[0] / errors[1]).max() < 2e6
+    assert mended.stop is None
     told = _document("README.md")
     assert f"stops at step {printed.stop.step} because a translational *velocity*" in told
     assert printed.stop.variable.startswith("V")
-    assert "errors of omega are a million times the corrected program's" in told
     # Those of the home page are held by tests/edition/test_story.py.
     assert f"after {MECHANISM['stopped']['step']} steps" in told
     cards = sum(len(deck(each).cards) for each in PROGRAMS)

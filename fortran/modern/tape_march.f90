@@ -102,7 +102,9 @@ contains
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
     logical :: is_guessed                     ! whether the size of an own state is
+    logical :: diverges                       ! whether the guess is one of its last terms
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
+    real(dp) :: sum_of_gaps(tape%n_unknowns)  ! changes between switches that are taken as one
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch that is a touch
     integer :: i, n, n_before, order, tries
@@ -126,6 +128,7 @@ contains
     solution%n_rows = 0
     solution%n_steps = 0
     sum_of_noise = 0.0_dp
+    sum_of_gaps = 0.0_dp
     s%a = 0.0_dp
     s%blocks(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1, :) = 0.0_dp
     call begin(n, transitions)
@@ -162,10 +165,10 @@ contains
         if (solution%status /= COMPLETE) exit
         cycle
       end if
-      if ((found%steps == 0 .or. from_rest .or. is_guessed) .and. tries < MOST_TRIES) then
+      if ((found%steps == 0 .or. from_rest .or. diverges) .and. tries < MOST_TRIES) then
         ! The omega that a body at rest is about to reach is a guess too. If the last term is the
         ! largest, it is also the guessed size of an own state, and the series may diverge.
-        if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), is_guessed)) then
+        if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), diverges)) then
           tries = tries + 1
           s%h = factor*s%h
           cycle
@@ -283,6 +286,7 @@ contains
     end where
     found%growth = growth_of(transposed(n, lanes), sizes, transitions)
     found%noise = norm2(weights*sqrt(sum_of_noise))
+    found%error = max(found%error, maxval(weights*sum_of_gaps))
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
     end do
@@ -413,17 +417,20 @@ contains
     subroutine weigh()
       !! Make errors of omega relative to the scale, those of the quaternion angles, and those of
       !! own states relative to their sizes, or to the sizes that they are about to reach.
-      real(dp) :: own_size
+      real(dp) :: own_size, before
       integer :: i
 
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
       weights(4:first_own - 1) = 2.0_dp
       is_guessed = .false.
+      diverges = .false.
       do i = first_own, n
         own_size = own_sizes(i)
         if (.not. own_size > 0.0_dp) then
           own_size = largest_terms(i, i, s%order)
           is_guessed = is_guessed .or. own_size > 0.0_dp
+          before = largest_terms(i, i, s%order - 2)
+          diverges = diverges .or. (before > 0.0_dp .and. own_size > before)
         end if
         weights(i) = 0.0_dp
         if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
@@ -627,6 +634,8 @@ contains
       switches%part = factor
       call settle(tape, t_next, y + y_low, s%h, switches, s, live, after)
       jump = after - rates
+      ! Switches that were changed together, although they are a little apart.
+      sum_of_gaps = sum_of_gaps + abs(jump*switches%gap*s%h)
       do block = 1, n_blocks
         do i = 1, SIDE_BY_SIDE
           associate (lane => lanes(i, :n, block))

@@ -33,6 +33,7 @@ module tape_switches
     ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
     integer :: first
     real(dp) :: slope
+    real(dp) :: gap       !! part of the step between the first crossing and those taken as one
     real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
     real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
     integer :: touching   !! its switch
@@ -255,11 +256,13 @@ contains
     root = minval(roots)
     if (root > factor) return
     verdict = CROSSES
+    switches%gap = 0.0_dp
     do i = 1, switches%n
       do level = LOWER, UPPER
         if (roots(level, i) <= root*(1.0_dp + TOGETHER)) then
           if (switches%first == 0) switches%first = i
           switches%crosses(i) = level
+          switches%gap = max(switches%gap, roots(level, i) - root)
         end if
       end do
     end do

@@ -40,6 +40,7 @@ from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, kind_of, known
 from pyharness.model.keywords import with_hints
+from pyharness.model.principal import in_double
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
@@ -233,8 +234,10 @@ def _solved(
     ready: dict[str, Any] = {}
     axes: Axes | None = None
     if isinstance(scene, Scene):
-        if kind and scene.changing is not None:  # the arrays give other bodies
-            scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
+        if kind:  # the arrays give other bodies
+            if scene.changing is not None:
+                scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
+            scene = in_double(scene)
         if is_solved_alone(scene, {name: own[name] for name in TORQUES if name in own}):
             _, asked = _chosen(method, tolerance)
             return solve_one_by_one(

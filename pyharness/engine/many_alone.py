@@ -24,6 +24,7 @@ from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spre
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import count_done, expect_bodies, for_each_piece
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
@@ -50,7 +51,8 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
             )
         return True
     is_in_space = scene.torque.in_space or (scene.torque.frame == "space" and bool(named))
-    return is_in_space or scene.changing is not None
+    # The kernel's moments are in double precision, those of a PrincipalScene in double-double.
+    return is_in_space or scene.changing is not None or isinstance(scene, PrincipalScene)
 
 
 def solve_one_by_one(

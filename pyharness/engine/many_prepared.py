@@ -21,7 +21,7 @@ from pyharness.model.codes import Methods, Places, Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, extension
-from pyharness.model.principal import axes_and_turn
+from pyharness.model.principal import PrincipalScene, axes_and_turn
 from pyharness.model.progress import for_each_piece
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
@@ -82,7 +82,7 @@ def many_states(
     check_rows("t_end", times, n)
     check_rows("attitude", turns, n)
     code = int(solver.packed[Places.METHOD])
-    if code in _SIDE_BY_SIDE and solver.scene.inertia is None:
+    if code in _SIDE_BY_SIDE and not isinstance(solver.plan.scene, PrincipalScene):
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
         own = {"omega": starts, "t_end": times, "attitude": turns}
         bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort, False)

@@ -237,7 +237,10 @@ def computes_attitude(scene: Scene, method: str, requested: bool | None) -> bool
     Raise InputError if it is requested, and the method can't propagate it.
     """
     if requested is None:
-        return scene.has_attitude and REGISTRY[method].attitude
+        able = REGISTRY[method].attitude
+        if method == "closed-form":
+            able = scene.coefficients is None and scene.torque.is_zero
+        return scene.has_attitude and able
     if boolean("attitude", requested):
         check_attitude(method)
     return bool(requested)

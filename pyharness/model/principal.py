@@ -1,6 +1,6 @@
 """Transformation of scenes to principal axes, and of results back."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -36,6 +36,13 @@ class PrincipalScene(Scene):
         """The coefficients A, B, C from `exact_moments`, each rounded once."""
         i1, i2, i3 = self.exact_moments
         return triple(map(nearest_float, ((i2 - i3) / i1, (i3 - i1) / i2, (i1 - i2) / i3)))
+
+
+def in_double(scene: Scene) -> Scene:
+    """Return a scene whose moments are in double precision."""
+    if not isinstance(scene, PrincipalScene):
+        return scene
+    return Scene(**{each.name: getattr(scene, each.name) for each in fields(Scene) if each.init})
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:

@@ -241,8 +241,9 @@ class Scene:
     def __repr__(self) -> str:
         """Return the fields as the arguments of a call."""
         shown = {each.name: getattr(self, each.name) for each in fields(self) if each.repr}
-        plain = Scene(omega=self.omega, moments=(1.0, 1.0, 1.0))
-        given = {x: v for x, v in shown.items() if x == "omega" or v != getattr(plain, x, None)}
+        usual = {each.name: each.default for each in fields(self)}
+        usual |= {x.name: x.default_factory() for x in fields(self) if callable(x.default_factory)}
+        given = {x: value for x, value in shown.items() if value != usual[x]}
         return f"Scene({', '.join(f'{x}={value!r}' for x, value in given.items())})"
 
     def _set(self, name: str, value: object) -> None:

@@ -75,6 +75,8 @@ def test_attitude_is_computed_by_default_if_the_scene_has_one() -> None:
     assert found.attitude is None
     assert found.omega.tolist() == bare.omega.tolist()
     assert solve(scene, [1.0], "gauss-4").attitude is None
+    other = Scene("", (1.0, 2.0, 3.0), coefficients=(0.5, -0.5, 0.2), attitude=TURNED)
+    assert solve(other, 1.0, "closed-form").attitude is None
     asked: Any = solve(scene, [1.0], attitude=True)
     default: Any = solve(scene, [1.0])
     stepper: Any = Stepper(scene)

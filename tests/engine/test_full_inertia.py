@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pyharness import InputError, Scene, TorqueLaw, principal, solve, solve_many
+from pyharness import InputError, Scene, TorqueLaw, prepare, principal, solve, solve_many
 from pyharness.engine.many_scenes import about_principal
 from pyharness.model.scene import Triple
 from pyharness.truth.reference import reference
@@ -194,3 +194,18 @@ def test_a_needle_beyond_double_double_in_an_array() -> None:
     assert found["coefficients"][0] == pytest.approx(scene.euler_coefficients, rel=4e-16)
     assert found["torque_constant"][0] * scene.moments == pytest.approx(scene.law.constant)
     assert own.axes[0] == pytest.approx(axes, rel=1e-15)
+
+
+def test_moments_in_double_double_are_kept_in_many() -> None:
+    matrix = [[1.0, 1e-14, 0.0], [1e-14, 1.0 + 1e-14, 2e-14], [0.0, 2e-14, 1.0]]
+    bare = principal(Scene("", (3.0, 1.0, 2.0), inertia=matrix))[0]
+    wanted = solve(bare, 1e13).omega[0]
+    turned = replace(bare, attitude=(1.0, 0.0, 0.0, 0.0))
+    found = [
+        solve_many([bare, bare], 1e13).omega[1],
+        solve_many(bare, 1e13, omega=[bare.omega]).omega[0],
+        prepare(turned, attitude=True).many([turned.omega], 1e13)[0][0],
+    ]
+    assert np.abs(np.array(found) - wanted).max() < 1e-14
+    other = solve_many(bare, 1.0, moments=[[3.0, 2.0, 1.0]]).omega[0]
+    assert other == pytest.approx(solve(Scene("", bare.omega, (3, 2, 1)), 1.0).omega[0], abs=1e-12)

@@ -274,6 +274,16 @@ def test_a_state_that_begins_at_zero_has_a_size(tolerance: float, start: float, 
     assert found.error < max(tolerance, 1e-12)
 
 
+@pytest.mark.parametrize("power", [25, 26, 27])
+def test_a_state_whose_first_terms_vanish_takes_few_steps(power: int) -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"late": t**power}
+
+    found = solve(Scene("", (0.1, 0.0, 0.0), MOMENTS, torque=law, states={"late": 0.0}), 1.0)
+    assert found.states["late"][0] * (power + 1) == pytest.approx(1.0, abs=1e-9)
+    assert found.steps < 40
+
+
 def test_a_larger_scale_is_a_looser_tolerance() -> None:
     def law(t: Any, omega: Any, states: Any) -> Any:
         return [0.0, 0.0, 0.0], {"fast": np.sin(40.0 * t)}

@@ -459,3 +459,28 @@ def test_switches_that_depend_on_others_or_rest_on_a_level(
 def test_a_state_that_rests_on_a_level_has_the_value_of_numpy() -> None:
     scene = _ball(lambda t, omega: [0, 0, np.where(omega[2] > 1, 5.0, 0.0)], (0.0, 0.0, 1.0))
     assert solve(scene, [10.0]).omega[0].tolist() == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-11, 3e-9])
+def test_switches_a_little_apart_have_an_error_if_they_are_taken_as_one(gap: float) -> None:
+    def torque(t: Any, w: Any) -> Any:
+        return [np.where(t > 1.0, 1.0, 0.0) + np.where(t > 1.0 + gap, 1.0, 0.0), 0.0, 0.0]
+
+    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
+    found: Any = solve(scene, 2.0, tolerance=1e-12)
+    error = abs(found.omega[0, 0] - (2.0 - gap)) / 2.0
+    assert error <= found.error + 1e-15
+    assert (found.ended == "sensitive") == (found.error > 1e-12)
+
+
+def test_switches_that_coincide_at_an_end_are_one() -> None:
+    for unit, tolerance in ((1e-2, 1e-9), (1e-2, 1e-6), (1e90, 1e-6), (1e-120, 1e-8)):
+
+        def torque(t: Any, w: Any, unit: float = unit) -> Any:
+            kick = np.where((t * unit) % 0.5 > 0.25, 1.0, -1.0) + np.log(3.0 + w[1] / unit)
+            last = math.log(unit) - np.log(w[2])
+            return unit * unit * np.array([kick, np.arctan(w[2] / unit), last])
+
+        omega = (0.3 * unit, 0.2 * unit, 0.9 * unit)
+        scene = Scene("", omega, moments=BRICK, torque=torque)
+        assert solve(scene, 5.0 / unit, tolerance=tolerance).ended == "complete"

@@ -27,6 +27,8 @@ def test_scene_needs_no_name_and_shows_its_body_alone() -> None:
     named = Scene("top", (0, 1, 1), (4, 4, 2), attitude=(1, 0, 0, 0), steps=5)
     assert eval(repr(named)) == named
     assert "forces" not in repr(named)
+    sphere = Scene(omega=(1, 2, 3), moments=(1, 1, 1))
+    assert eval(repr(sphere)) == sphere
 
 
 @pytest.mark.parametrize("method", ["RK45", "DOP853", "Radau", "LSODA", "Taylor", "AUTO"])

@@ -20,7 +20,7 @@ def digest(*found: object) -> str:
 
 # `repr` shows every drawn number to the last bit.
 @pytest.mark.parametrize(
-    ("seed", "recorded"), [("base", "6112b7ef489a69fb"), ("2026-W47", "d65dd1f8d5ec5155")]
+    ("seed", "recorded"), [("base", "64630c69cdde089e"), ("2026-W47", "f787324a4f96851d")]
 )
 def test_draws_are_as_they_were(seed: str, recorded: str) -> None:
     found = [draw(seed, number) for number in range(400)]
@@ -49,7 +49,7 @@ def test_scenes_with_times_are_as_they_were() -> None:
     found = [list(islice(timed_scenes(kind, [1982, 3]), 40)) for kind in timed_kinds.KINDS]
     # The last digits of powers depend on the processor.
     rounded = re.sub(r"-?\d+\.\d+(e[-+]\d+)?", lambda m: f"{float(m[0]):.12g}", repr(found))
-    assert digest(rounded) == "28f7ce072c1db9d6"
+    assert digest(rounded) == "1aed882b45d60aec"
 
 
 def test_other_motions_are_as_they_were() -> None:

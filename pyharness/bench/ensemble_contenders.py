@@ -23,7 +23,7 @@ _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, 
 
 
 def coefficients() -> list[float]:
-    """Return A, B and C of the bodies with the moments `MOMENTS`."""
+    """Return the coefficients A, B, C of Euler's equations for the moments `MOMENTS`."""
     return [float(each) for each in exact_coefficients(Scene("", (0.0, 0.0, 0.0), MOMENTS))]
 
 

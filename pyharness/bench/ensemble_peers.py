@@ -112,7 +112,7 @@ def _integrator(
     with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
     with_attitude: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a compiled batch integrator for `size` bodies: the benchmark's, or `scene`'s."""
+    """Return a compiled integrator of `size` bodies, of `scene` or of the benchmark."""
     import heyoka
 
     x, y, z = heyoka.make_vars("x", "y", "z")

@@ -13,7 +13,7 @@ OPTIONS = {
     "defects that change numbers).",
     "--all": "List all entries, also those that change no number (JSON always does).",
     "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
-    "(doubtful card) or conjecture (missing card) (default: all).",
+    "(doubtful card) or conjecture (missing card).",
     **shared.outputs(FORMATS, plot=""),
 }
 EXAMPLE = "defects stage-base"

@@ -39,9 +39,9 @@ OPTIONS = {
     **shared.LISTING,
     "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
-    "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: if the "
-    f"scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}; 3-1-3, 3-2-1: Euler "
-    "angles about these axes).",
+    "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: only "
+    f"if the scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}; 3-1-3, "
+    "3-2-1: Euler angles about these axes).",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
     "needs --method and an attitude.",
     "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "

@@ -20,12 +20,12 @@ OPTIONS = {
     "--only ID,...": f"Run only checks of these kinds: {', '.join(KINDS)}; or only those whose "
     "ids begin with this text, as in cells/two-term. Some kinds: cells (Fortran "
     "against Python), words (other floating-point formats), decks (the compiled cards), schemes "
-    "(single steps), stops (stopped runs), prepared (`prepare` of Python), golden (stored "
+    "(single steps), stops (stopped runs), prepared (solvers of `prepare`), golden (stored "
     "trajectories).",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes: for methods (default {DRAWS}), with --port for the "
-    "port (default 0), with --integrator of each kind (default 2).",
+    "--draws N": f"Number of random scenes (default: {DRAWS}; with --port 0, with --integrator 2 "
+    "of each kind).",
     "--external FILE": "Only compare our methods with the published results in this file "
     "(format: docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in "
@@ -44,16 +44,18 @@ OPTIONS = {
     "wave), as in wave-1 (default: all).",
     "--self-test": "Plant known faults one by one in the software, or in the answers of --port "
     "or --integrator, and report which checks detect each.",
-    "--update": "Compute and write the stored trajectories of the kind golden again, and report "
+    "--update": "Compute and write the stored trajectories (golden) again, and report "
     "what changed.",
-    "--record DIR": "Folder of these trajectories (default: tests/golden of the source checkout).",
+    "--record DIR": "Folder of the stored trajectories (default: tests/golden of the source "
+    "checkout).",
     **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
     **shared.ALSO,
 }
 GROUPS = {
     "all programs and methods": "only seed draws self-test update record",
-    "a program of yours": "port integrator order program case cell",
+    "a program of yours": "port integrator order",
     "data of yours": "external listing-output",
+    "a part of these": "program case cell",
 }
 EXAMPLE = "verify --only cells,methods"
 

@@ -76,10 +76,8 @@ class Solution:
             rates = np.concatenate([rates[:n], rates])
         after, value, *others = g(every, moved.reshape(-1, width), rates).reshape(-1, n)
         found = ROUNDING * np.abs(after - value) / _SHIFT
-        # A larger error would hide pairs of roots.
-        own = max(ROUNDING, min(self.tolerance, _COARSEST))
         for other in others:
-            found += own * np.abs(other - value) / _SHIFT
+            found += self.state_error * np.abs(other - value) / _SHIFT
         if rates is not None:
             rates = rates[:n]
             largest = np.abs(rates[:, :3]).max(axis=1)
@@ -88,6 +86,11 @@ class Solution:
                 changed[:, k] += _SHIFT * largest
                 found += ROUNDING * np.abs(g(times, states, changed) - value) / _SHIFT
         return np.asarray(found)
+
+    @property
+    def state_error(self) -> float:
+        """The error of the state, relative to its size; a larger one would hide pairs of roots."""
+        return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
     def _largest(self) -> Array:
@@ -263,11 +266,12 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     high = _refined(g, solution, high, later, np.maximum(2.0 * sizes[ends], noise[ends] / _SUDDEN))
     noise = noise[begins]
     earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
-    values = solution.values(g, np.concatenate([earlier, later])).reshape(2, -1)
-    before, after = np.where(np.abs(values) > _SUDDEN * noise, np.sign(values), 0.0)
-    for times in (earlier, later):
-        noise = np.maximum(noise, solution.noise(g, times))
-    return ZeroIntervals(low, high, noise, before, after)
+    both = np.concatenate([earlier, later])
+    values = solution.values(g, both).reshape(2, -1)
+    # The noise of the interval itself may be that of a jump at its end.
+    beside = solution.noise(g, both).reshape(2, -1)
+    before, after = np.where(np.abs(values) > _SUDDEN * beside, np.sign(values), 0.0)
+    return ZeroIntervals(low, high, np.maximum(noise, beside.max(axis=0)), before, after)
 
 
 def _refined(

@@ -135,7 +135,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
         | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
     )
     is_jump = (roots.change != 0) & (roots.slope == 0.0)
-    between = np.flatnonzero(is_jump[:-1] & is_jump[1:] & ~is_same)
+    between = np.flatnonzero(~is_same)
     is_same[between] = _have_any_sign(g, solution, (time[:-1] + 0.5 * gap)[between])
     group = np.concatenate([[0], np.cumsum(~is_same)])
     total = np.zeros(group[-1] + 1, dtype=int)
@@ -153,7 +153,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
-    """Return a mask of the times at which rounding of the state decides the sign."""
+    """Return a mask of the times at which the error of the state decides the sign."""
     found: Index = np.zeros(len(times), dtype=bool)
     if not times.size:
         return found
@@ -163,7 +163,7 @@ def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
     for k in range(states.shape[1]):
         for side in (-1.0, 1.0):
             moved = states.copy()
-            moved[:, k] += side * _STATE_ROUNDING * sizes[:, k]
+            moved[:, k] += side * max(_STATE_ROUNDING, solution.state_error) * sizes[:, k]
             found |= (solution.values(g, times, moved) < 0.0) != is_negative
     return found
 

@@ -423,3 +423,34 @@ def test_shell_completes_verbs_and_options(line: str, wanted: str, tmp_path: Pat
     command = [sys.executable, "-m", "pyharness"]
     subprocess.run(command, env={**os.environ, **environment}, check=True)
     assert found.read_text().replace("\v", " ").split() == [wanted]
+
+
+def test_old_names_of_options_stay_with_a_line(capsys: Capture) -> None:
+    for old, new in (("--omega0 1,2,3", "--omega=1,2,3"), ("--omega0=-1,2,3", "--omega -1,2,3")):
+        found = []
+        for option in (old, new):
+            assert main(f"run --case 5 --method auto --times 1 {option}".split()) == 0
+            found.append(capsys.readouterr())
+        assert found[0].out == found[1].out
+        assert found[0].err.count("--omega0 is now --omega") == 1
+        assert found[1].err == ""
+    # An old name of another verb is unknown.
+    assert main(["run", "--case", "5", "--methods", "auto", "--random", "3"]) == 2
+    assert "unknown option '--random'" in capsys.readouterr().err
+
+
+def test_a_scene_file_is_solved_by_auto_with_its_attitude(capsys: Capture, tmp_path: Path) -> None:
+    path = tmp_path / "turned.toml"
+    body = "[body]\nmoments = [40.0, 30.0, 20.0]\n[initial]\nomega = [0.0, 1.0, 1.0]\n"
+    path.write_text(f"{body}attitude = [1.0, 0.0, 0.0, 0.0]\n")
+    outputs = []
+    for more in ([], ["--attitude"], ["--method", "auto", "--attitude", "quaternion"]):
+        assert main(["run", "--scene", str(path), "--times", "1", *more]) == 0
+        outputs.append(capsys.readouterr().out)
+    assert "q0" in outputs[0]
+    assert outputs[0] == outputs[1] == outputs[2]
+    plans = []
+    for times in ("1", "1,2"):
+        assert main(["plan", "--case", "5", "--times", times]) == 0
+        plans.append(capsys.readouterr().out)
+    assert plans[0] != plans[1]

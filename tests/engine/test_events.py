@@ -202,7 +202,7 @@ def test_an_interval_of_zeros_is_one_event_wherever_the_integration_ends(directi
     ]
     functions = [with_attributes(function, False, direction) for function, _ in knots]
     for end in (0.5, 1.5, 2.0, 2.2, 2.9, 3.6, 4.0, 4.4, 9.0):
-        found = events_of(solve(scene, end, tolerance=1e-12, events=functions))[0]
+        found = events_of(solve(scene, end, events=functions))[0]
         for times, (_, events) in zip(found, knots, strict=True):
             expected = [t for t, change in events if t <= end and direction in (0, change)]
             assert times.tolist() == pytest.approx(expected, abs=1e-12), end
@@ -421,7 +421,7 @@ def test_jump_where_omega_is_slow_is_one_event(rate: float) -> None:
     jump.terminal = 2  # type: ignore[attr-defined]
     torque = TorqueLaw((rate, 0.0, 0.0))
     scene = Scene("ball", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found: Any = solve(scene, [5.0, 10.0], tolerance=1e-12, events=jump)
+    found: Any = solve(scene, [5.0, 10.0], events=jump)
     assert found.ended == "complete"
     assert found.t_events[0] == pytest.approx([3.3], abs=1e-8)
 

@@ -484,3 +484,20 @@ def test_switches_that_coincide_at_an_end_are_one() -> None:
         omega = (0.3 * unit, 0.2 * unit, 0.9 * unit)
         scene = Scene("", omega, moments=BRICK, torque=torque)
         assert solve(scene, 5.0 / unit, tolerance=tolerance).ended == "complete"
+
+
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-12, 1e-13])
+def test_switches_that_coincide_by_construction_are_one(tolerance: float) -> None:
+    """1 / M is clipped where M is 0.5, and the branch begins there too."""
+
+    def torque(t: Any, w: Any) -> Any:
+        m = np.maximum(0.3 * np.sin(1.26 * t), -0.414 * w[0] * w[2])
+        stairs = 0.1 * np.floor((w[0] - w[1] * 0.0567) * 3.0)
+        push = 0.4 * np.where(m > 0.5, 0.1 * np.clip(1.0 / m, -1.0, 2.0), stairs)
+        other = 0.3 * np.sin(1.88 * t) - 0.2 * w[1]
+        return [push + 0.827 - 0.2 * w[0], other, 0.114 * w[0] * w[2]]
+
+    scene = Scene("", (0.3, -0.2, 0.9), moments=BRICK, torque=torque)
+    found, truth = (solve(scene, [3.0, 5.0], tolerance=x) for x in (tolerance, 1e-11))
+    assert found.ended in ("complete", "sensitive")
+    assert np.abs(found.omega - truth.omega).max() < 3.0 * (tolerance + 1e-11)

@@ -209,3 +209,14 @@ def test_moments_in_double_double_are_kept_in_many() -> None:
     assert np.abs(np.array(found) - wanted).max() < 1e-14
     other = solve_many(bare, 1.0, moments=[[3.0, 2.0, 1.0]]).omega[0]
     assert other == pytest.approx(solve(Scene("", bare.omega, (3, 2, 1)), 1.0).omega[0], abs=1e-12)
+
+
+def test_estimates_of_many_count_the_rounding_of_a_matrix() -> None:
+    matrix = np.diag((3.0, 2.0, 1.2)).tolist()
+    scene = Scene("beside the middle axis", (1e-4, 2.0, 1e-4), inertia=matrix)
+    for time in (1.0, 30.0, 60.0):
+        one: Any = solve(scene, time)
+        many = solve_many([scene], time, estimates=True)
+        assert many.error is not None
+        assert many.error[0] == pytest.approx(one.error, rel=1e-6)
+        assert one.error > one.growth * 2.0**-53

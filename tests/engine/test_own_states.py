@@ -274,6 +274,20 @@ def test_a_state_that_begins_at_zero_has_a_size(tolerance: float, start: float, 
     assert found.error < max(tolerance, 1e-12)
 
 
+def test_a_guessed_size_does_not_shrink_with_rejected_steps() -> None:
+    """The rates after the switch are rounded, the more so the nearer the step is to it."""
+    start = 3.873697255942001
+
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        late = t - start
+        rate = 3.1e7 * np.where(late > 0.0, late**6 * np.sin(212.0 * late), 0.0)
+        return [0.0, 0.0, 3e-11 * states["x"]], {"x": rate}
+
+    scene = Scene("", (0.0, 0.0, 0.0126758), MOMENTS, torque=law, states={"x": 0.0})
+    for tolerance in (1e-12, 1e-13, 3e-14):
+        assert solve(scene, 5.559, tolerance=tolerance).ended in ("complete", "sensitive")
+
+
 @pytest.mark.parametrize("power", [25, 26, 27])
 def test_a_state_whose_first_terms_vanish_takes_few_steps(power: int) -> None:
     def law(t: Any, omega: Any, states: Any) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pyharness.engine.sensitivity as room
-from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, subset
+from pyharness import Scene, TorqueLaw, case_scene, prepare, run_program, solve, solve_many, subset
 from pyharness.engine import linearised, taylor
 from pyharness.engine import solver as solver_module
 from pyharness.engine.rescaled import scaled, unscaled
@@ -103,6 +103,22 @@ def test_error_of_a_closed_form_is_a_bound_near_its_errors(kind: str) -> None:
             assert found.ended == "complete"
             ratios += [error / found.error] if error else []
     assert np.quantile(ratios, 0.2) > 0.01
+
+
+@pytest.mark.parametrize("number", [2393, 2719, 4503])
+def test_error_of_a_closed_form_grows_where_its_double_double_is_not_enough(number: int) -> None:
+    moments, omega, _, time = free_motions.draw(Random(f"saturated {number}"), "near separatrix")
+    scene = Scene("", omega, moments)
+    found: Any = solve(scene, [time], "closed-form", 1e-13)
+    truth = np.array(torque_free(scene, time))
+    error = float(max(abs(truth - [Decimal(x) for x in found.omega[0].tolist()])))
+    error /= max(np.abs(found.omega).max(), np.abs(scene.omega).max())
+    assert 300.0 * ROUNDING < error <= found.error
+    assert found.ended == "sensitive"
+    many = solve_many([scene], time, tolerance=1e-13, estimates=True)
+    assert many.ended[0] == "sensitive"
+    assert many.error is not None
+    assert error <= many.error[0]
 
 
 def test_ending_is_sensitive_where_rounding_exceeds_the_tolerance() -> None:

@@ -10,6 +10,7 @@ _SUBMODULES = {
     "checks.compare.comparison": ("compare_methods", "compare_programs"),
     "checks.compare.findings": ("Comparison",),
     "engine.scene_reader": ("read_scene",),
+    "engine.table_terms": ("inertia_table",),
     "engine.trajectory_reader": ("load",),
     "model.changing": ("ChangingInertia", "ChangingMoments"),
     "model.dense_output": ("DenseOutput",),

@@ -13,6 +13,7 @@ from pyharness.engine.scene_reader import read_scene as read_scene
 from pyharness.engine.solve import solve as solve
 from pyharness.engine.solver import Solver as Solver
 from pyharness.engine.stepper import Stepper as Stepper
+from pyharness.engine.table_terms import inertia_table as inertia_table
 from pyharness.engine.taylor_ivp import Taylor as Taylor
 from pyharness.engine.trajectory_reader import load as load
 from pyharness.model.changing import ChangingInertia as ChangingInertia

@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
-from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.changing import Changing
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw, law_derivative, law_value, to_body
 from pyharness.model.values import Number, Numbers, finite, three
 
 
-def gravity_gradient(
-    inertia: Numbers | Iterable[Numbers] | ChangingMoments | ChangingInertia, rate: Number
-) -> StateTorque:
+def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Number) -> StateTorque:
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
     The unit vector r from the centre of attraction is (cos n t, sin n t, 0) along the axes of
@@ -23,7 +21,7 @@ def gravity_gradient(
 
     Parameters
     ----------
-    inertia : three numbers, three rows of three numbers, ChangingMoments, or ChangingInertia
+    inertia : three numbers, three rows of three numbers, or an inertia that changes
         The moments or the inertia matrix (kg m2), about the axes of the scene.
     rate : float
         The rate n of the orbit (rad/s).

@@ -4,8 +4,9 @@ import numpy as np
 
 from pyharness.engine.problem import normalized, normalized_in_space, remainders
 from pyharness.engine.recorded import kernel_tape, system
-from pyharness.engine.system import is_recorded, with_constant_body
+from pyharness.engine.system import is_recorded
 from pyharness.model.codes import Methods, Places
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape

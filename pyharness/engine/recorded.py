@@ -13,16 +13,8 @@ from pyharness.model.codes import Operations
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import (
-    N_INPUTS,
-    TIME,
-    Functions,
-    Linear,
-    Table,
-    Tape,
-    evaluate,
-    float_outputs,
-)
+from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape, evaluate, float_outputs
+from pyharness.model.tape_arrays import ARRAYS
 from pyharness.model.trajectory import Array
 
 _KINDS = {
@@ -41,21 +33,6 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
-
-
-def table_values(table: Table, times: Any) -> Array:
-    """Return the values of a table at an array of times (s)."""
-    piece = np.maximum(0, np.searchsorted(table.breaks, times, side="right") - 1)
-    c0, c1, c2, c3 = table.pieces[piece].T
-    s = times - table.breaks[piece]
-    found: Array = c0 + s * (c1 + s * (c2 + s * c3))
-    return found
-
-
-ARRAYS: Functions[Any] = Functions(
-    float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, table_values, np.log, np.arctan, np.arcsin,
-    lambda x: np.where(x > 0.0, 1.0, 0.0), np.floor, lambda h, x, y: np.where(h > 0.0, x, y),
-)  # fmt: skip
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:

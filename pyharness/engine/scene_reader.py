@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pyharness.engine.table_terms import inertia_table
 from pyharness.model.attitude import of_angles
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.expressions import parsed
+from pyharness.model.inertia_function import inertia_of_texts
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import (
     check_keys,
@@ -28,6 +30,7 @@ SCENE_TABLES = {
     "run": ("step_size", "steps"),
 }
 _STATE = ("start", "scale", "rate")
+_TABLE = ("times", "values", "interpolation")
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
@@ -99,8 +102,16 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
 
 
 def _body(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [body], with polynomials of time for nested lists of moments or inertia."""
+    """Return the table [body] with an inertia that changes in place of its description."""
     moments, inertia = table.get("moments"), table.get("inertia")
+    for place, given in (("moments", moments), ("inertia", inertia)):
+        if isinstance(given, dict):
+            check_keys(given, _TABLE, f"[body] {place}")
+            if not {"times", "values"} <= given.keys():
+                raise InputError(f"[body] {place}: a table needs times and values; give both")
+            return {**table, place: inertia_table(**given)}
+        if _has_texts(given):
+            return {**table, place: inertia_of_texts(place, given)}
     if isinstance(moments, list) and _has_lists(moments):
         return {**table, "moments": ChangingMoments(moments)}
     if isinstance(inertia, list) and any(map(_has_lists, inertia)):
@@ -121,6 +132,10 @@ def _states(table: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         states[name] = (values.get("start", 0.0), values.get("scale", 0.0))
         rates[name] = values["rate"]
     return states, rates
+
+
+def _has_texts(value: Any) -> bool:
+    return isinstance(value, str) or (isinstance(value, list) and any(map(_has_texts, value)))
 
 
 def _has_lists(value: Any) -> bool:

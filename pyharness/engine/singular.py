@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.recorded import ARRAYS
 from pyharness.model.errors import TimedError
 from pyharness.model.tape import OMEGA, Tape, live_slots, slot_values
+from pyharness.model.tape_arrays import ARRAYS
 
 # An operand vanishes if its ratios to its initial value and to its value before the last step,
 # which is very short, are at most these.

@@ -36,9 +36,9 @@ from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
 from pyharness.engine.steps import rates as rates_of
 from pyharness.engine.steps import transformed_steps
-from pyharness.engine.system import with_constant_body
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, TimedError, known
 from pyharness.model.keywords import with_hints

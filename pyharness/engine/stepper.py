@@ -12,10 +12,11 @@ from numpy.polynomial.polynomial import polyval
 
 from pyharness.engine.recorded import kernel_tape
 from pyharness.engine.singular import SingularError, undefined_operation
-from pyharness.engine.system import is_recorded, with_constant_body
+from pyharness.engine.system import is_recorded
 from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of

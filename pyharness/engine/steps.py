@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 
 from pyharness.engine.recorded import outputs_at
-from pyharness.engine.system import slopes_of, system_of, with_constant_body
+from pyharness.engine.system import slopes_of, system_of
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.dense_output import POINTS, DenseOutput, Pieces
 from pyharness.model.principal import principal
 from pyharness.model.scene import Scene

@@ -1,19 +1,13 @@
-"""The equations of motion of a scene with a recorded torque, as one tape.
-
-An inertia that changes becomes part of the torque.
-"""
+"""The equations of motion of a scene with a recorded torque, as one tape."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 from pyharness.model.attitude import IDENTITY, quaternion_rates
-from pyharness.model.changing import rates_of_changing
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque, of_law, replayed, torque_of
+from pyharness.model.state_torque import StateTorque, torque_of
 from pyharness.model.symbols import Recorder
 from pyharness.model.tape import N_INPUTS, Tape
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import Triple
 
 
@@ -46,35 +40,6 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
 def is_recorded(scene: Scene) -> bool:
     """Return whether the torque depends on the state, or the inertia changes."""
     return isinstance(scene.torque, StateTorque) or scene.changing is not None
-
-
-def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene with the same solution whose inertia does not change with time.
-
-    It has A = B = C = 0, and omega' as its torque. With the inertia I and the torque N, omega'
-    follows from I omega' = N - I' omega - omega x (I omega).
-    """
-    changing, torque = scene.changing, scene.torque
-    if changing is None:
-        return scene
-    if isinstance(torque, TorqueLaw):
-        torque = of_law(torque)
-    tape = torque.tape
-    if tape is not None:
-
-        def rates(time: Any, omega: Any, q: Any, *own: Any) -> list[Any]:
-            torque = torque_of(tape, time, omega, q, *own)
-            return [*rates_of_changing(changing, time, omega, torque[:3]), *torque[3:]]
-
-        found = replayed(rates, torque.own)
-    else:
-        found = replace(
-            torque,
-            function=lambda time, omega, q=IDENTITY: rates_of_changing(
-                changing, time, omega, torque.at(time, omega, q)
-            ),
-        )
-    return replace(scene, changing=None, coefficients=(0.0, 0.0, 0.0), torque=found)
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:

@@ -13,9 +13,10 @@ import numpy as np
 from pyharness.engine.term_input import ready_term
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, unknown
+from pyharness.model.inertia_function import InertiaFunction, inertia_of_tables
 from pyharness.model.state_torque import Function, StateTorque
-from pyharness.model.symbols import SYMBOLS
 from pyharness.model.tape import Table
+from pyharness.model.tape_arrays import value_of_table, without_equal_constants
 from pyharness.model.values import Numbers, Triple, converted, finite, number_list, three
 
 _MOST_TIMES, _MOST_PULSES = 1_000_000, 10_000
@@ -67,15 +68,74 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     """
     if not isinstance(interpolation, str) or interpolation not in _PIECES:
         raise unknown("interpolation", interpolation, _PIECES, "[torque] table")
-    found = _times("[torque] table times", times, 2, _MOST_TIMES)
-    if not (np.diff(found) > 0.0).all():
-        raise InputError("[torque] table times: not in ascending order; allowed: ascending times")
+    found = _ascending("[torque] table times", times)
     rows = _rows(_as_array(values), len(found))
     make = _PIECES[interpolation]
-    torque = _torque([make(found, axis) for axis in rows.T])
+    torque = _torque([make(found, axis, "[torque] table") for axis in rows.T])
     return ready_term(
         "table", torque, times=found, values=rows.tolist(), interpolation=interpolation
     )
+
+
+def inertia_table(
+    times: Numbers, values: Iterable[Any], interpolation: str = "cubic"
+) -> InertiaFunction:
+    """Return the inertia that a table of moments or matrices over time specifies.
+
+    The first holds before the first time, and the last after the last time.
+
+    Parameters
+    ----------
+    times : iterable of numbers, shape (n,)
+        The times (s), ascending, 2 to 1 000 000.
+    values : array, shape (n, 3) or (n, 3, 3)
+        The principal moments, or the inertia matrices about the body axes, at each time (kg m2).
+    interpolation : str
+        ``cubic``, the spline of `pyharness.torques.table`, or ``linear``.
+
+    Returns
+    -------
+    InertiaFunction
+        The inertia, for the argument `moments` or `inertia` of `Scene`.
+
+    Raises
+    ------
+    InputError
+        If the times do not ascend, the shapes differ, the interpolation is unknown, or a value is
+        no inertia.
+
+    Examples
+    --------
+    >>> from pyharness import Scene, inertia_table, solve
+    >>> boom = inertia_table([0.0, 10.0], [(4.0, 4.0, 2.0), (8.0, 8.0, 2.0)], "linear")
+    >>> solve(Scene(omega=(1.0, 0.0, 0.0), moments=boom), 10.0).omega
+    array([[0.5, 0. , 0. ]])
+    """
+    if interpolation not in ("linear", "cubic"):
+        raise unknown("interpolation", str(interpolation), ("linear", "cubic"), "[body] table")
+    found = _ascending("[body] table times", times)
+    try:
+        rows = np.array(_as_array(values), dtype=float)
+    except (TypeError, ValueError):
+        rows = np.zeros(0)
+    n = len(found)
+    if rows.shape not in ((n, 3), (n, 3, 3)) or not np.isfinite(rows).all():
+        raise InputError(
+            f"[body] table values: allowed: an array of finite numbers of shape ({n}, 3), moments, "
+            f"or ({n}, 3, 3), matrices, because there are {n} times"
+        )
+    place = "moments" if rows.ndim == 2 else "inertia"
+    make = _PIECES[interpolation]
+    columns = [make(found, axis, "[body] table") for axis in rows.reshape(n, -1).T]
+    written = tuple({"times": found.tolist(), "values": rows.tolist()}.items())
+    return inertia_of_tables(place, columns, (*written, ("interpolation", interpolation)))
+
+
+def _ascending(where: str, times: Any) -> Array:
+    found = _times(where, times, 2, _MOST_TIMES)
+    if not (np.diff(found) > 0.0).all():
+        raise InputError(f"{where}: not in ascending order; allowed: ascending times")
+    return found
 
 
 def _as_array(values: Any) -> Any:
@@ -176,7 +236,8 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
         x, y, z = each
         times += [begun, ends[n]]
         values += [(factor * x, factor * y, factor * z), (0.0, 0.0, 0.0)]
-    found = _torque([_held(np.array(times), axis) for axis in np.array(values).T])
+    held = [_held(np.array(times), axis, "[torque] pulses") for axis in np.array(values).T]
+    found = _torque(held)
     different = any(each != torques[0] for each in torques)
     return ready_term(
         "pulses",
@@ -226,21 +287,21 @@ def _before(first: float, second: float) -> float:
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
-def _held(times: Array, values: Array) -> Table:
+def _held(times: Array, values: Array, where: str) -> Table:
     pieces = np.zeros((len(values), 4))
     pieces[:, 0] = values
     return Table(times, pieces)
 
 
-def _linear(times: Array, values: Array) -> Table:
+def _linear(times: Array, values: Array, where: str) -> Table:
     pieces = np.zeros((len(values) - 1, 4))
     pieces[:, 0] = values[:-1]
     with np.errstate(all="ignore"):
         pieces[:, 1] = np.diff(values) / np.diff(times)
-    return _between(times, values, pieces)
+    return _between(times, values, pieces, where)
 
 
-def _cubic(times: Array, values: Array) -> Table:
+def _cubic(times: Array, values: Array, where: str) -> Table:
     # Imported late, because few scenes have a spline.
     from scipy.interpolate import CubicSpline
 
@@ -249,22 +310,22 @@ def _cubic(times: Array, values: Array) -> Table:
             pieces = CubicSpline(times, values).c[::-1].T
         except (ValueError, ArithmeticError, np.linalg.LinAlgError):
             pieces = np.full((len(times) - 1, 4), np.nan)
-    return _between(times, values, pieces)
+    return _between(times, values, pieces, where)
 
 
-def _between(times: Array, values: Array, pieces: Array) -> Table:
+def _between(times: Array, values: Array, pieces: Array, where: str) -> Table:
     """Return the table with `pieces`, and constants before and after them."""
     if not np.isfinite(pieces).all():
         raise InputError(
-            "[torque] table: a slope or a coefficient overflows; allowed: smaller values, or times "
-            "with a larger distance"
+            f"{where}: a slope or a coefficient overflows; allowed: smaller values, or times with "
+            "a larger distance"
         )
     first = _before(float(times[0]), float(times[1]))
-    ends = _held(times[[0, -1]], values[[0, -1]]).pieces
+    ends = _held(times[[0, -1]], values[[0, -1]], where).pieces
     return Table([first, *times.tolist()], np.concatenate((ends[:1], pieces, ends[1:])))
 
 
-_PIECES: dict[str, Callable[[Array, Array], Table]] = {
+_PIECES: dict[str, Callable[[Array, Array, str], Table]] = {
     "held": _held,
     "linear": _linear,
     "cubic": _cubic,
@@ -272,20 +333,5 @@ _PIECES: dict[str, Callable[[Array, Array], Table]] = {
 
 
 def _torque(axes: Sequence[Table]) -> Function:
-    reduced = [_reduced(each) for each in axes]
-
-    def torque(time: Any, omega: Any, attitude: Any) -> list[Any]:
-        return [
-            SYMBOLS.table(each, time) if len(each.breaks) > 1 else float(each.pieces[0, 0])
-            for each in reduced
-        ]
-
-    return torque
-
-
-def _reduced(each: Table) -> Table:
-    """Return the table without breaks between equal constants."""
-    # Equal neighbours are constants, because the table is continuous where pieces vary.
-    changes = (each.pieces[1:] != each.pieces[:-1]).any(axis=1)
-    kept = np.concatenate(([True], changes))
-    return Table(each.breaks[kept], each.pieces[kept])
+    reduced = [without_equal_constants(each) for each in axes]
+    return lambda time, omega, attitude: [value_of_table(each, time) for each in reduced]

@@ -20,6 +20,7 @@ import numpy as np
 from pyharness.engine.scene_reader import scene_of_file
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
+from pyharness.model.inertia_function import COUNTS, InertiaFunction, checked_function
 from pyharness.model.own_states import checked_states
 from pyharness.model.pipes import read_input
 from pyharness.model.principal import PrincipalScene
@@ -229,6 +230,8 @@ def _events(
 
 def _scene(text: str, record: dict[str, Any], where: str) -> Scene:
     scene = scene_of_file(text.encode(), "", where)
+    if "inertia" in record:
+        scene = replace(scene, moments=None, changing=_moments(record["inertia"]))
     if record["torque"] is not None:
         states = checked_states({name: pair for name, *pair in record.get("states", ())})
         tape = tape_of(record["torque"], len(states))
@@ -246,6 +249,9 @@ def _scene(text: str, record: dict[str, Any], where: str) -> Scene:
 def _moments(record: Any) -> Any:
     if isinstance(record, dict):
         ((place, values),) = record.items()
+        if isinstance(values, dict):
+            tape = tape_of(values, 0, COUNTS[place])
+            return checked_function(InertiaFunction(place, tape))
         return _CHANGING[place](values)
     return None if record is None else three_floats("moments", record)
 

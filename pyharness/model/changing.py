@@ -22,14 +22,23 @@ _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of th
 
 
 class Changing:
-    """The base class of inertias that are polynomials of time."""
+    """The base class of inertias that change; its own methods are those of polynomials."""
 
-    place: ClassVar[str]  # the key of a scene file
+    if TYPE_CHECKING:
+
+        @property
+        def place(self) -> str:
+            """The key of a scene file."""
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
         """The polynomials of the inertia matrix: three rows of three."""
         raise NotImplementedError
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether the principal axes are those of the body."""
+        return self.place == "moments"
 
     @property
     def is_constant(self) -> bool:
@@ -56,6 +65,10 @@ class Changing:
         degree = max(len(each) for row in elements for each in row) - 1
         known = list(accumulate(repeat(time, degree), mul, initial=1.0))
         return [[_value(each, known) for each in row] for row in elements]
+
+    def at(self, time: float) -> Triple | Matrix:
+        """Return the moments, or the matrix (kg m2), at `time` (s)."""
+        raise NotImplementedError
 
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
@@ -260,7 +273,7 @@ def _derivative(polynomial: Polynomial) -> Polynomial:
 def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) -> list[Any]:
     """Return the derivative of omega for an inertia that changes with time."""
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
-    if isinstance(changing, ChangingMoments):
+    if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))
         # Differences of nearly equal moments, unlike of products, have no rounding errors.
         products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
-from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.changing import Changing
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.torque_law import FRAMES, TorqueLaw
@@ -57,7 +57,7 @@ class Conversions:
     omega: Array
     attitude: Array | None
     own: Array | None
-    moments: Triple | ChangingMoments | ChangingInertia | None
+    moments: Triple | Changing | None
     axes: Array | None
     scene: "Scene | None"
     recorded_time: Array
@@ -209,7 +209,7 @@ class Conversions:
         momentum: Array = ((ordered @ axes) * np.array(moments)) @ axes.T
         return momentum
 
-    def _checked_moments(self) -> Triple | ChangingMoments | ChangingInertia:
+    def _checked_moments(self) -> Triple | Changing:
         if self.moments is None:
             raise InputError(
                 "the body is given by coefficients, and the result needs its moments; give moments"

@@ -90,6 +90,16 @@ def components(
     return [_component(text, names, place) for place, text in texts.items()]
 
 
+def text_components(values: Mapping[str, object], inputs: Sequence[Any]) -> list[Any]:
+    """Return numbers, and the values of expressions, by place, for eight symbols."""
+    found = []
+    for place, value in values.items():
+        if isinstance(value, str):
+            value = components({place: _checked_text(value, place)}, inputs, {})[0]
+        found.append(value if isinstance(value, Symbol) else finite(place, value))
+    return found
+
+
 def _checked_constants(constants: object) -> dict[str, float]:
     where = "[torque.constants]"
     if not isinstance(constants, Mapping):

@@ -21,7 +21,7 @@ def scene_record(scene: Scene) -> dict[str, Any]:
     return {
         "name": scene.name,
         "case": scene.case,
-        "body": {body: values},
+        "body": {body: "recorded" if values is None else values},
         "initial": {
             "omega": list(scene.omega),
             **({} if scene.attitude is None else {"attitude": list(scene.attitude)}),

@@ -9,7 +9,7 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from pyharness.model.attitude import Quaternion, Rotation, unit_quaternion
-from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
+from pyharness.model.changing import Changing
 from pyharness.model.errors import InputError, kind_of, printable
 from pyharness.model.facts import facts
 from pyharness.model.keywords import with_hints
@@ -98,9 +98,10 @@ class Scene:
         A title, "body" by default; shortened to one line of 60 printable characters.
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
-    moments : three numbers, or ChangingMoments, optional
+    moments : three numbers, ChangingMoments, or function of t, optional
         The principal moments of inertia (kg m2). If they change, this attribute is None, and
-        `changing` has them.
+        `changing` has them. A function of the time (s) is recorded, and must not jump;
+        `inertia_table` makes one from rows.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
@@ -109,9 +110,9 @@ class Scene:
         symbols; one that can't be recorded is passed as ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
-    inertia : three rows of three numbers, or ChangingInertia, optional
+    inertia : three rows of three numbers, ChangingInertia, or function of t, optional
         A symmetric inertia matrix about the body axes (kg m2); None if the inertia changes.
-    changing : ChangingMoments or ChangingInertia, optional
+    changing : ChangingMoments, ChangingInertia, or a recorded function, optional
         An inertia that changes with time.
     states : dict of str to float, or to pair of floats, optional
         States of the user's own, at most eight, in any unit: their values at time 0, by name. The
@@ -148,7 +149,7 @@ class Scene:
     torque: TorqueLaw | StateTorque = field(default_factory=TorqueLaw)
     attitude: Quaternion | None = None
     inertia: Matrix | None = None
-    changing: ChangingMoments | ChangingInertia | None = None
+    changing: Changing | None = None
     states: tuple[OwnState, ...] = ()
     _: KW_ONLY
     step_size: float = 0.01
@@ -165,12 +166,12 @@ class Scene:
             self,
             name: str = "body",
             omega: Numbers = ...,
-            moments: Numbers | ChangingMoments | None = None,
+            moments: Numbers | Changing | Callable[[Any], Any] | None = None,
             coefficients: Numbers | None = None,
             torque: TorqueLaw | StateTorque | Numbers | Callable[..., Any] = ...,
             attitude: Numbers | Rotation | None = None,
-            inertia: Iterable[Numbers] | ChangingInertia | None = None,
-            changing: ChangingMoments | None = None,
+            inertia: Iterable[Numbers] | Changing | Callable[[Any], Any] | None = None,
+            changing: Changing | None = None,
             states: Mapping[str, Number | Sequence[Number]] | tuple[OwnState, ...] = (),
             *,
             step_size: Number = 0.01,
@@ -251,10 +252,18 @@ class Scene:
 
     def _set_changing(self) -> None:
         # A changing inertia is moved, so that code for a constant inertia does not use it.
-        for kind in (ChangingMoments, ChangingInertia):
-            if isinstance(getattr(self, kind.place), kind) and self.changing is None:
-                self._set("changing", getattr(self, kind.place))
-                self._set(kind.place, None)
+        for place in ("moments", "inertia"):
+            given = getattr(self, place)
+            if callable(given):
+                # Imported only here, because the programs need no recorded functions.
+                from pyharness.model.inertia_function import inertia_function
+
+                given = inertia_function(place, given)
+            if isinstance(given, Changing) and self.changing is None:
+                if given.place != place:
+                    raise InputError(f"[body] {place}: this is {given.place}; write {given.place}=")
+                self._set("changing", given)
+                self._set(place, None)
         if self.changing is None:
             return
         if not isinstance(self.changing, Changing):
@@ -312,10 +321,9 @@ class Scene:
         largest).
         """
         moments, inertia = self.moments, self.inertia
-        if isinstance(self.changing, ChangingMoments):
-            moments = self.changing.at(0.0)
-        elif self.changing is not None:
-            inertia = self.changing.at(0.0)
+        if self.changing is not None:
+            at_start: Any = self.changing.at(0.0)
+            moments, inertia = (at_start, None) if self.changing.is_diagonal else (None, at_start)
         if inertia is not None:
             from pyharness.model.inertia import principal_frame
 

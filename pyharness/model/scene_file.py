@@ -8,9 +8,10 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any, SupportsIndex
 
-from pyharness.model.changing import Changing, ChangingMoments
+from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.facts import facts
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.pipes import read_input
 from pyharness.model.scene import Scene
 from pyharness.model.schema import SCHEMAS, check_schema
@@ -106,7 +107,12 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     lines = [f"# {line}" for line in comments]
     lines.append(f"schema = {SCHEMAS['scene file']}")
     lines += [f"name = {json.dumps(scene.name, ensure_ascii=False)}", "[body]"]
-    lines += [f"{body} = {values}"]
+    if values is None:
+        raise InputError(
+            f"[body] {body}: a function of time can't be written to a file; allowed: expressions, "
+            "inertia_table, ChangingMoments or ChangingInertia"
+        )
+    lines += [f"{body} = {_toml(values) if isinstance(values, dict) else values}"]
     lines += ["[initial]", f"omega = {list(scene.omega)}"]
     if scene.attitude is not None:
         lines.append(f"attitude = {list(scene.attitude)}")
@@ -184,6 +190,8 @@ def _toml(value: Any) -> str:
     if isinstance(value, TorqueLaw):
         lines = _law_lines(value)
         return f"{{ {', '.join(line for line in lines if not line.startswith('frame'))} }}"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_toml(each)}' for key, each in value.items())} }}"
     if isinstance(value, tuple):
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, str):
@@ -191,13 +199,15 @@ def _toml(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def body_of(scene: Scene) -> tuple[str, list[Any]]:
-    """Return key ("moments", "coefficients" or "inertia") and list of a scene file's body."""
+def body_of(scene: Scene) -> tuple[str, Any]:
+    """Return key ("moments", "coefficients" or "inertia") and value of a scene file's body."""
     if scene.inertia is not None:
         return "inertia", [list(row) for row in scene.inertia]
+    if isinstance(scene.changing, InertiaFunction):
+        return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):
         return "moments", [list(each) for each in scene.changing.polynomials]
-    if scene.changing is not None:
+    if isinstance(scene.changing, ChangingInertia):
         return "inertia", [[list(row) for row in each] for each in scene.changing.matrices]
     if scene.moments is not None:
         return "moments", list(scene.moments)

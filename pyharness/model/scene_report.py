@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from pyharness.model.assumptions import MARK, assumed, legend
 from pyharness.model.changing import ChangingMoments
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.listing import Listing
 from pyharness.model.report import counted, short
 from pyharness.model.scene import Scene
@@ -22,6 +23,8 @@ def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
     """Return lines that describe a scene, with a mark on what is assumed in runs of `listings`."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
+    elif isinstance(scene.changing, InertiaFunction):
+        body = f"I = {scene.changing.phrase}, in kg m2"
     elif isinstance(scene.changing, ChangingMoments):
         body = f"I = {_polynomials(scene.changing.polynomials)} kg m2"
     elif scene.changing is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array as Array
-from pyharness.model.changing import ChangingInertia, ChangingMoments
+from pyharness.model.changing import Changing
 from pyharness.model.conversions import Conversions
 from pyharness.model.conversions import turned_to_space as turned_to_space
 from pyharness.model.extension import ENDS
@@ -173,7 +173,7 @@ class Trajectory(Conversions):
     reason: str | None = field(default=None, repr=False)
     attitude: Array | None = None
     own: Array | None = None
-    moments: tuple[float, float, float] | ChangingMoments | ChangingInertia | None = None
+    moments: tuple[float, float, float] | Changing | None = None
     axes: Array | None = None
     exact: NDArray[np.object_] | None = None
     tolerance: float | None = None

@@ -22,6 +22,7 @@ import numpy as np
 
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import scene_text
@@ -159,6 +160,8 @@ def _moments_record(moments: Any) -> Any:
         return {moments.place: moments.polynomials}
     if isinstance(moments, ChangingInertia):
         return {moments.place: moments.matrices}
+    if isinstance(moments, InertiaFunction):
+        return {moments.place: _tape_record(moments.tape)}
     assert not isinstance(moments, Changing)
     return moments
 
@@ -173,6 +176,9 @@ def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
         "torque": None,
     }
     torque = scene.torque
+    if isinstance(scene.changing, InertiaFunction) and scene.changing.values() is None:
+        record["inertia"] = _moments_record(scene.changing)
+        scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
     if is_opaque(torque):
         raise InputError(
             "[torque]: an opaque function can't be written to a file; allowed: a torque that can "
@@ -199,7 +205,7 @@ def _tape_record(tape: Tape) -> dict[str, Any]:
     return {"operations": operations, "outputs": tape.outputs}
 
 
-def tape_of(record: Any, n_own: int = 0) -> Tape:
+def tape_of(record: Any, n_own: int = 0, n_outputs: int = 3) -> Tape:
     """Return the tape that a dictionary from JSON describes, with `n_own` own states.
 
     Raise ValueError, TypeError, KeyError or OverflowError if it describes no tape.
@@ -210,8 +216,8 @@ def tape_of(record: Any, n_own: int = 0) -> Tape:
     inputs = N_INPUTS + n_own
     known = tuple(_operation(each, inputs + n) for n, each in enumerate(operations))
     outputs = tuple(_linear(each, inputs + len(known)) for each in record["outputs"])
-    if len(outputs) != 3 + n_own:
-        raise ValueError("not an output for each component of the torque and rate of a state")
+    if len(outputs) != n_outputs + n_own:
+        raise ValueError("not an output for each component and rate of a state")
     return Tape(known, outputs, inputs)
 
 

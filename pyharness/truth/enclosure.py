@@ -8,7 +8,9 @@ first and the last need python-flint.
 from collections.abc import Sequence
 from importlib.util import find_spec
 
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.values import integer
@@ -53,6 +55,8 @@ def enclose(
     check_order(times, "prove")
     if scene.changing is not None:
         scene.changing.check(times)
+        if isinstance(scene.changing, InertiaFunction):
+            scene = with_constant_body(scene)
     free = scene.torque.is_zero and _is_bounded(scene) and not (velocity or transition)
     if free and _has_flint():
         found = _in_closed_form(scene, times, digits)

@@ -14,7 +14,9 @@ from decimal import Decimal
 
 import numpy as np
 
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
+from pyharness.model.inertia_function import InertiaFunction
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
 from pyharness.model.torque_law import TorqueLaw
@@ -82,6 +84,8 @@ def reference(
     """
     if scene.changing is not None:
         scene.changing.check(times)
+        if isinstance(scene.changing, InertiaFunction):
+            scene = with_constant_body(scene)
         # The tape of a law rounds the sum of amplitudes with one frequency to binary64.
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))

@@ -42,7 +42,7 @@ def matrices_of(scene: Scene) -> list[Any]:
     """Return the coefficients of the inertia of a scene, matrices of shape (3, 3)."""
     if isinstance(scene.changing, ChangingInertia):
         return [np.array(each) for each in scene.changing.matrices]
-    assert scene.changing is not None
+    assert isinstance(scene.changing, ChangingMoments)
     most = max(map(len, scene.changing.polynomials))
     return [
         np.diag([each[n] if n < len(each) else 0.0 for each in scene.changing.polynomials])

@@ -13,13 +13,14 @@ import numpy as np
 
 from pyharness.checks.theory.conditioning import Conditioning, conditioning, of_flow, sampled
 from pyharness.engine.linearised import transitions
-from pyharness.engine.recorded import inputs_of, outputs_at, system, table_values
+from pyharness.engine.recorded import inputs_of, outputs_at, system
 from pyharness.engine.solve import solve
 from pyharness.model.dual import with_derivatives
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import ATTITUDE, OMEGA, Functions, Tape, evaluate
+from pyharness.model.tape_arrays import table_values
 from pyharness.model.trajectory import Array
 
 _FEWEST_NODES = 100

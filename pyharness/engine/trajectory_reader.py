@@ -1,45 +1,34 @@
 """Reading of the files that `Trajectory.save` writes.
 
-Files may come from anyone. Therefore nothing is executed or unpickled, no array is larger than the
-file, and every value is checked.
+Files may come from anyone. Therefore every value is checked.
 """
 
-import hashlib
-import io
 import itertools
-import json
 import math
 import os
-import zipfile
-from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from pyharness.engine.scene_reader import scene_of_file
+from pyharness.model.archive import checked_path, read_archive, text_of
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError
 from pyharness.model.inertia_function import COUNTS, InertiaFunction, checked_function
 from pyharness.model.own_states import checked_states
-from pyharness.model.pipes import read_input
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
-from pyharness.model.schema import check_schema
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ENDINGS, STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.model.trajectory_file import (
     AXES,
-    DIGEST,
     EVENTS,
     KIND,
     MOST_FUNCTIONS,
     OWN,
     ROWS,
     SENSITIVITIES,
-    TEXTS,
-    add_entry,
-    checked_path,
     tape_of,
 )
 from pyharness.model.values import three_floats
@@ -77,29 +66,10 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     >>> load("case-1.npz").omega[-1]  # doctest: +SKIP
     array([6., 6., 6.])
     """
-    name = checked_path(path)
+    name = checked_path("trajectory file", path)
     where = f"trajectory file '{name}'"
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    content = read_input(name, where, memory // 4, _WRITTEN)
-    damaged = InputError(f"{where}: not a trajectory, or damaged; give {_WRITTEN}")
-    try:
-        header = json.loads(_text(_arrays(content, ["header"])[0], "header"))
-        if header["kind"] != KIND:
-            raise ValueError("another kind of file")
-    except Exception:  # zipfile, json and NumPy raise errors of many types
-        raise damaged from None
-    # Checked before the arrays, which may be others in another version.
-    check_schema(where, "trajectory file", header.get("schema"), "take a version that reads it")
-    try:
-        arrays, digest = _arrays(content)
-        is_intact = DIGEST in arrays and _text(arrays, DIGEST) == digest
-    except Exception:
-        raise damaged from None
-    if not is_intact:
-        raise InputError(
-            f"{where}: was changed after it was written, or has no digest (SHA-256) of its "
-            f"content; give {_WRITTEN}"
-        )
+    names = {"scene", *ROWS, OWN, AXES, *EVENTS, SENSITIVITIES}
+    arrays, header = read_archive(where, name, (KIND, "trajectory"), names, _WRITTEN)
     try:
         return _trajectory(arrays, header, where)
     except InputError as error:
@@ -107,43 +77,6 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         raise InputError(shown if shown.startswith(where) else f"{where}: {shown}") from None
     except Exception:
         raise InputError(f"{where}: a value is missing or damaged; give {_WRITTEN}") from None
-
-
-def _arrays(content: bytes, names: Sequence[str] = ()) -> tuple[dict[str, Any], str]:
-    """Return the arrays with these names, by default all, and their digest without `DIGEST`."""
-    found, digest = {}, hashlib.sha256()
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        allowed = {f"{name}.npy" for name in (*TEXTS, *ROWS, OWN, AXES, *EVENTS, SENSITIVITIES)}
-        entries = [archive.getinfo(f"{name}.npy") for name in names] or archive.infolist()
-        for each in entries:
-            allowed.remove(each.filename)  # an error if the name is unknown, or occurs twice
-            if each.compress_type != zipfile.ZIP_STORED or each.file_size > len(content):
-                raise ValueError("an entry is compressed")
-            data = archive.read(each)
-            name = each.filename.removesuffix(".npy")
-            if name != DIGEST:
-                add_entry(digest, each.filename, data)
-            found[name] = _array(data)
-    return found, digest.hexdigest()
-
-
-def _array(data: bytes) -> Any:
-    stream = io.BytesIO(data)
-    if np.lib.format.read_magic(stream) != (1, 0):
-        raise ValueError("another version of NumPy's format")
-    shape, by_columns, dtype = np.lib.format.read_array_header_1_0(stream)
-    begin = stream.tell()
-    if dtype.kind not in "fiU" or math.prod(shape) * dtype.itemsize != len(data) - begin:
-        raise ValueError("another type, or another size")
-    flat = np.frombuffer(data, dtype, offset=begin).astype(dtype.newbyteorder("="))
-    return flat.reshape(shape, order="F" if by_columns else "C")
-
-
-def _text(arrays: dict[str, Any], name: str) -> str:
-    array = arrays[name]
-    if array.shape != () or array.dtype.kind != "U":
-        raise ValueError("no text")
-    return str(array)
 
 
 def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> Trajectory:
@@ -163,7 +96,7 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         raise ValueError("an unknown ending")
     scene = None
     if header["scene"] is not None:
-        scene = _scene(_text(arrays, "scene"), header["scene"], where)
+        scene = _scene(text_of(arrays, "scene"), header["scene"], where)
     own = arrays.get(OWN)
     n_own = 0 if own is None else own.shape[1]
     if own is not None and (own.dtype, own.shape) != ("f8", (count, n_own)):

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.changing import Changing
-from pyharness.model.distribution import check_package, install_command
-from pyharness.model.errors import InputError, kind_of, unknown
+from pyharness.model.distribution import check_package, checked_axes
+from pyharness.model.errors import InputError, unknown
 from pyharness.model.torque_law import FRAMES, TorqueLaw
 from pyharness.model.values import Triple
 
@@ -337,15 +337,7 @@ class Conversions:
         >>> ax.get_ylabel()  # doctest: +SKIP
         'angular velocity (rad/s)'
         """
-        check_package("matplotlib", "plot", install_command("plots"))
-        from matplotlib.axes import Axes
-
-        if ax is None:
-            from matplotlib import pyplot
-
-            _, ax = pyplot.subplots()
-        elif not isinstance(ax, Axes):
-            raise InputError(f"plot: ax is {kind_of(ax)}; allowed: an Axes of matplotlib, or none")
+        ax = checked_axes(ax)
         order = np.argsort(self.time, kind="stable")
         times, omega = self.time[order], self.omega[order]
         if self.sol is not None:

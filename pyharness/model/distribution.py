@@ -1,6 +1,11 @@
-"""The name and version of the distribution, which is not called `pyharness`."""
+"""The name and version of the distribution, and optional packages."""
 
-from pyharness.model.errors import InputError
+from typing import TYPE_CHECKING
+
+from pyharness.model.errors import InputError, kind_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # On the package index, the name `pyharness` belongs to another package.
 DISTRIBUTION = "rigid-body-harness"
@@ -26,3 +31,17 @@ def check_package(name: str, what: str, command: str) -> None:
         import_module(name)
     except ImportError:
         raise InputError(f"{what} needs {name}: {command}") from None
+
+
+def checked_axes(ax: object) -> "Axes":
+    """Return a diagram of matplotlib, a new one for None; or raise InputError."""
+    check_package("matplotlib", "plot", install_command("plots"))
+    from matplotlib.axes import Axes
+
+    if ax is None:
+        from matplotlib import pyplot
+
+        return pyplot.subplots()[1]
+    if not isinstance(ax, Axes):
+        raise InputError(f"plot: ax is {kind_of(ax)}; allowed: an Axes of matplotlib, or none")
+    return ax

@@ -1,17 +1,19 @@
 """The result of `solve_many`: final states of many bodies."""
 
+import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.arrays import buffer_of, check_rows, only_one, rows_of, spread
-from pyharness.model.distribution import check_package
+from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.torque_law import FRAMES
 from pyharness.model.trajectory import Array, BatchResult, turned_to_space
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pandas import DataFrame
     from xarray import Dataset
 
@@ -210,6 +212,92 @@ class Ensemble(BatchResult):
             variables["error"] = (rows, self.estimates[..., 0].copy())
             variables["growth"] = (rows, self.estimates[..., 1].copy())
         return Dataset(variables, coordinates)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the three components of omega of all bodies with matplotlib.
+
+        Over `times`, the median and the band of the middle 90 % of the bodies are drawn; else the
+        distribution of the final values: for each value, the fraction of bodies below it.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            The diagram in which to draw. The default is a new one.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The diagram, with legend and units.
+
+        Raises
+        ------
+        InputError
+            If matplotlib is not installed, `ax` is no Axes, or no body has a result.
+        """
+        ax = checked_axes(ax)
+        omega = self.omega[self.has_result.reshape(len(self.omega), -1).all(axis=1)]
+        if not len(omega):
+            raise InputError("plot: no body has a result; allowed: an Ensemble with results")
+        unit = "angular velocity (rad/s)"
+        if self.times is None:
+            for axis, values in enumerate(np.sort(omega, axis=0).T, 1):
+                fractions = np.arange(1, len(values) + 1) / len(values)
+                ax.step(values, fractions, where="post", label=rf"$\omega_{axis}$")
+            ax.set(xlabel=unit, ylabel="fraction of the bodies")
+        else:
+            low, middle, high = np.quantile(omega, (0.05, 0.5, 0.95), axis=0)
+            for axis in range(3):
+                (line,) = ax.plot(self.times, middle[:, axis], label=rf"$\omega_{axis + 1}$")
+                ax.fill_between(
+                    self.times, low[:, axis], high[:, axis], alpha=0.25, color=line.get_color()
+                )
+            ax.set(xlabel="time (s)", ylabel=f"{unit}: median, 5 to 95 %")
+        ax.legend()
+        return ax
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the ensemble to a file, from which `Ensemble.load` restores it bit for bit.
+
+        The format is that of `numpy.savez`, with an array for each attribute.
+
+        Parameters
+        ----------
+        path : str or path
+            The path of the file; a new one without an ending gets ``.npz``. An existing file is
+            replaced.
+
+        Raises
+        ------
+        InputError
+            If the file can't be written, or its name has the ending of a text file.
+        """
+        from pyharness.model.ensemble_file import save_ensemble
+
+        save_ensemble(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> "Ensemble":
+        """Return the ensemble that `Ensemble.save` wrote to a file.
+
+        Parameters
+        ----------
+        path : str or path
+            The path of the file.
+
+        Returns
+        -------
+        Ensemble
+            The ensemble.
+
+        Raises
+        ------
+        InputError
+            If the file can't be read, was not written by `Ensemble.save`, has another version, was
+            changed or damaged, or is larger than a quarter of this machine's memory.
+        """
+        from pyharness.model.ensemble_file import load_ensemble
+
+        return Ensemble(**load_ensemble(path))
 
     def estimates_of(self, piece: slice) -> Array:
         """Return the estimates of m bodies, shape (2, m), or (2, 0) if not requested."""

@@ -7,6 +7,7 @@ SCHEMAS = {
     "sweep file": 1,
     "scene file": 1,
     "trajectory file": 1,
+    "ensemble file": 1,
     "external file": 1,
     "vector file": 1,
     "golden record": 1,

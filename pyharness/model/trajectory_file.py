@@ -1,29 +1,25 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
-They are archives of `numpy.savez`. The array `header` is JSON with other attributes and the schema
-number, `scene` is the text of a scene file, and `sha256` is a digest of all other arrays.
-
-The header may have a tape. A linear combination is a list of its constant and pairs of slot and
+Of the archive, `header` has other attributes, and `scene` is the text of a scene file. The header
+may have a tape. A linear combination is a list of its constant and pairs of slot and
 coefficient. An operation is a list of its kind, and its operands, linear combination, or breaks and
 pieces.
 """
 
-import hashlib
-import io
 import json
 import math
 import os
-import zipfile
 from dataclasses import asdict, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.model.archive import archive_of, checked_file
 from pyharness.model.changing import Changing, ChangingInertia, ChangingMoments
-from pyharness.model.errors import InputError, kind_of
+from pyharness.model.errors import InputError
 from pyharness.model.inertia_function import InertiaFunction
-from pyharness.model.output_files import check_writable, write_files
+from pyharness.model.output_files import write_files
 from pyharness.model.scene import Scene
 from pyharness.model.scene_file import scene_text
 from pyharness.model.schema import SCHEMAS
@@ -36,8 +32,6 @@ if TYPE_CHECKING:
     from pyharness.model.trajectory import Trajectory
 
 KIND = "pyharness trajectory"  # in the header of each file
-DIGEST = "sha256"  # the last array
-TEXTS = ("header", "scene", DIGEST)
 # By array: type of the numbers, and shape of a row.
 ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "time": ("f8", ()),
@@ -52,7 +46,6 @@ AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
 EVENTS = ("event_counts", "event_times", "event_states")
 SENSITIVITIES = "sensitivities"  # columns of all parameters; the header has names and widths
-_OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 MOST_FUNCTIONS = 10_000  # of events; each has arrays of its own
 _TAPED = "The torque was recorded from a function. Its operations are in the header."
 # The number of operands by kind of operation.
@@ -66,25 +59,9 @@ _OPERANDS = {each.name: 1 for each in fields(Functions) if each.name not in ("nu
 }
 
 
-def checked_path(path: object) -> str:
-    """Return the path as text, a new one without an ending with .npz; or raise InputError."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f"trajectory file: {kind_of(path)}; allowed: a path, as text or a Path")
-    name = os.fsdecode(path)
-    stem, ending = os.path.splitext(os.path.basename(name))
-    return name if not stem or ending or os.path.exists(name) else f"{name}.npz"
-
-
 def save(found: "Trajectory", path: str | os.PathLike[str]) -> None:
     """Write a trajectory to the file `path`, as `Trajectory.save` describes."""
-    name = checked_path(path)
-    ending = os.path.splitext(name)[1].lower()
-    if ending in _OTHERS:
-        raise InputError(
-            f"trajectory file '{name}': the file is an archive of NumPy; allowed: a name that ends "
-            "in .npz; for text, use np.savetxt or to_pandas"
-        )
-    check_writable(name, "trajectory file")
+    name = checked_file("trajectory file", path)
     write_files({name: file_content(found)}, "trajectory file")
 
 
@@ -132,27 +109,6 @@ def file_content(found: "Trajectory") -> bytes:
         arrays[SENSITIVITIES] = np.concatenate([none, *columns.values()], axis=2)
     arrays["header"] = json.dumps(header)
     return archive_of(arrays)
-
-
-def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return the bytes of an archive of arrays with a digest."""
-    buffer, digest = io.BytesIO(), hashlib.sha256()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name in [*(each for each in arrays if each != DIGEST), DIGEST]:
-            array = digest.hexdigest() if name == DIGEST else arrays[name]
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
-            add_entry(digest, f"{name}.npy", entry.getbuffer())
-            # `ZipInfo` has no date, which would change the bytes with every run.
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
-                file.write(entry.getbuffer())
-    return buffer.getvalue()
-
-
-def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
-    """Add name, length and bytes of an entry to a digest."""
-    digest.update(f"{name} {len(data)}\n".encode())
-    digest.update(data)
 
 
 def _moments_record(moments: Any) -> Any:

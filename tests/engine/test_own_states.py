@@ -17,11 +17,11 @@ from pyharness import (
     read_scene,
     solve,
 )  # fmt: skip
+from pyharness.model.archive import archive_of
 from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import turned_to_space
-from pyharness.model.trajectory_file import archive_of
 from pyharness.torques import damping, recorded
 
 MOMENTS = (2.0, 3.0, 4.0)

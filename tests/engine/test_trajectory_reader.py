@@ -33,12 +33,13 @@ from pyharness import (
     subset,
 )
 from pyharness.events import crosses, flip
+from pyharness.model.archive import archive_of
 from pyharness.model.scene_file import scene_text
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.symbols import MOST_OPERATIONS
 from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.trajectory_file import archive_of, file_content
+from pyharness.model.trajectory_file import file_content
 from pyharness.torques import damping, gravity_gradient, recorded
 from tests.engine.test_terms import INERTIA
 from tests.engine.test_work import GENTLE, TIMES, TORQUES, scene_with, switched, written

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pyharness import load, solve
+from pyharness import Ensemble, load, solve, solve_many
 from pyharness.checks.external_file import read_problem
 from pyharness.checks.golden import read_record
 from pyharness.checks.integrators import protocol
@@ -87,6 +87,12 @@ def trajectory_file(folder: Path) -> Reader:
     return _Archive(path, lambda: load(path))
 
 
+def ensemble_file(folder: Path) -> Reader:
+    path = folder / "found.npz"
+    solve_many(case_scene(3), 1.0, omega=[[0.0, 1.0, 1.0]]).save(path)
+    return _Archive(path, lambda: Ensemble.load(path))
+
+
 def vector_file(folder: Path) -> Reader:
     path = Path(shutil.copy(OURS, folder / "vectors.json"))
     return Reader(path, lambda: answers(path))
@@ -137,6 +143,7 @@ FILES: dict[str, Callable[[Path], Reader]] = {
     "sweep file": in_toml("schema = 1\n" + text(TILT), read_sweep),
     "scene file": in_toml(scene_text(case_scene(3)), read_scene),
     "trajectory file": trajectory_file,
+    "ensemble file": ensemble_file,
     "external file": in_toml("schema = 1\n" + EXTERNAL.read_text(), read_problem),
     "vector file": vector_file, "golden record": golden_record,
     "edition": listed("edition", MARK, "--out"),

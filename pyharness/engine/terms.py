@@ -1,15 +1,19 @@
 """Torque terms for damping, control and wheels, with components about the body axes."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from pyharness.engine.term_input import law_of_vector, matrix_of, ready_term
+from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY, product, unit_quaternion
 from pyharness.model.errors import InputError
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.numpy_calls import symbol_array
+from pyharness.model.own_states import OwnState
+from pyharness.model.state_torque import StateTorque, count_arguments, recorded
 from pyharness.model.torque_law import TorqueLaw, law_integral, law_value
 from pyharness.model.values import Number, Numbers, number_list, three
 
@@ -208,7 +212,9 @@ def attitude_control(
     return ready_term("attitude_control", torque, stiffness=spring, gain=brake, target=unit)
 
 
-def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> StateTorque:
+def wheels(
+    momentum: Numbers, motor: TorqueLaw | Numbers | Callable[..., Any] | None = None
+) -> StateTorque:
     """Return the torque -omega x h - u on a body by its wheels, which store the momentum h.
 
     The motors exert u on the wheels: h' = u. Without motors, h is constant, and the body is a
@@ -222,8 +228,9 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
     ----------
     momentum : three numbers
         The momentum h at time 0, about the body axes (N m s).
-    motor : TorqueLaw or three numbers, optional
-        The torque u (N m), about the body axes.
+    motor : TorqueLaw, three numbers, or function of (t, omega[, attitude], h), optional
+        The torque u (N m), about the body axes. Under a function, h is an unknown: a scene with
+        this torque gets the states ``wheel1`` to ``wheel3`` (N m s), unless it has them.
 
     Returns
     -------
@@ -250,6 +257,8 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
     (-9.0, 3.0, 2.5)
     """
     start = np.array(three("[torque] wheels momentum", momentum))
+    if callable(motor):
+        return _wheels_under_a_law(start, motor)
     law = TorqueLaw() if motor is None else law_of_vector("[torque] wheels motor", motor, "body")
 
     def torque(time: Any, omega: Any, attitude: Any) -> Any:
@@ -258,3 +267,17 @@ def wheels(momentum: Numbers, motor: TorqueLaw | Numbers | None = None) -> State
 
     motors = {} if motor is None else {"motor": law}
     return ready_term("wheels", torque, momentum=start, **motors)
+
+
+def _wheels_under_a_law(start: Array, motor: Callable[..., Any]) -> StateTorque:
+    names = [f"wheel{axis}" for axis in (1, 2, 3)]
+    allowed = "a function of (t, omega, h) or (t, omega, attitude, h)"
+    takes_attitude = count_arguments(motor, "[torque] wheels motor", allowed) == 4
+
+    def law(t: Any, omega: Any, attitude: Any, states: Any) -> Any:
+        h = symbol_array([states[name] for name in names])
+        push = np.asarray(motor(t, omega, *([attitude] if takes_attitude else []), h), dtype=object)
+        return -np.cross(omega, h) - push, dict(zip(names, np.broadcast_to(push, 3), strict=True))
+
+    torque = recorded(law, names)
+    return replace(torque, starts=tuple(map(OwnState, names, start.tolist())))

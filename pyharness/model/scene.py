@@ -209,7 +209,9 @@ class Scene:
             unit, length = unit_quaternion("[initial] attitude", self.attitude)
             self._set("attitude", unit)
             self._set("attitude_length", length)
-        self._set("states", checked_states(self.states))
+        # A torque may bring its states, such as the momentum of wheels.
+        brought = self.torque.starts if isinstance(self.torque, StateTorque) else ()
+        self._set("states", checked_states(self.states or brought))
         names = tuple(each.name for each in self.states)
         self._set("torque", checked_torque(self.torque, names))
         if self.torque.in_space and self.coefficients is not None:

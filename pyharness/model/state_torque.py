@@ -13,6 +13,7 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes
 from pyharness.model.errors import InputError, kind_of
 from pyharness.model.numpy_calls import called_once, symbol_array
+from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
 from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
@@ -54,6 +55,8 @@ class StateTorque:
     own : tuple of str
         The names of the scene's own states, which are further inputs of the tape; their rates are
         further outputs.
+    starts : tuple of OwnState
+        States that a scene with this torque gets if it has none.
     parts : tuple
         The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
@@ -69,6 +72,7 @@ class StateTorque:
     parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
     varied: Tape | None = field(default=None, repr=False)
     own: tuple[str, ...] = ()
+    starts: tuple[OwnState, ...] = field(default=(), compare=False, repr=False)
     parts: "tuple[StateTorque | TorqueLaw, ...]" = field(default=(), compare=False, repr=False)
     # Attributes in common with a torque law.
     is_zero: bool = field(default=False, init=False, repr=False)
@@ -236,7 +240,7 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
 
 def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
     """Return a torque recorded from a function that also returns the rates of own states."""
-    takes_attitude = _count_arguments(function) == 4
+    takes_attitude = count_arguments(function, "[torque]", _WITH_STATES) == 4
 
     def record(recorder: Recorder) -> Tape:
         time, *state = recorder.inputs()
@@ -277,16 +281,17 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
-def _count_arguments(function: Function) -> int:
+def count_arguments(function: Function, where: str, allowed: str) -> int:
+    """Return the number of arguments of a function that reads states, 3 or 4."""
     try:
         parameters = signature(function).parameters.values()
     except (TypeError, ValueError):
         raise InputError(
-            f"[torque]: the function's arguments are unknown; allowed: {_WITH_STATES}"
+            f"{where}: the function's arguments are unknown; allowed: {allowed}"
         ) from None
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
-        raise InputError(f"[torque]: the function has {count} arguments; allowed: {_WITH_STATES}")
+        raise InputError(f"{where}: the function has {count} arguments; allowed: {allowed}")
     return count
 
 
@@ -457,7 +462,8 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
         values += [body_torque(law, time, attitude) for law in laws]
         return [*sum(values[1:], values[0]), *rates]
 
-    found = replace(replayed(total, owners[0].own if owners else ()), parts=tuple(parts))
+    names, starts = (owners[0].own, owners[0].starts) if owners else ((), ())
+    found = replace(replayed(total, names), parts=tuple(parts), starts=starts)
     expressions = [each for each in torques if each.expression]
     terms = [term for each in torques for term in each.terms]
     if len(terms) + len(expressions) < len(torques) or len(expressions) + len(laws) > 1:

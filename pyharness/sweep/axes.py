@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.parameters import INERTIA_ELEMENTS
 from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.scene_file import check_keys
 from pyharness.model.values import finite, integer
@@ -45,6 +46,9 @@ class Field:
 # Prefix of fields that are constants of a torque's expressions, as in `torque.constants.k`. Their
 # units depend on the expressions.
 CONSTANTS = "torque.constants."
+INERTIA = "body.inertia."
+# The elements of an inertia matrix by row and column; those below the diagonal follow.
+ELEMENTS = {f"{i + 1}{j + 1}": (i, j) for i, j in INERTIA_ELEMENTS}
 ATTITUDE = tuple(f"attitude.{number}" for number in range(4))
 
 
@@ -70,6 +74,7 @@ NUMBERS = {
     ),
     "longitude": Field("rad", "its angle about the third axis, from the first"),
     **_three("body.moments", "kg m2", "moments", *_ABOVE_ZERO),
+    **{f"{INERTIA}{name}": Field("kg m2", "element of the inertia matrix") for name in ELEMENTS},
     **_three("body.coefficients", "1", "coefficients A, B, C"),
     "body.ratio.1": Field("1", "I1 over I3", *_ABOVE_ZERO),
     "body.ratio.2": Field("1", "I2 over I3", *_ABOVE_ZERO),

@@ -16,7 +16,7 @@ from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
-from pyharness.sweep.axes import CHOICES, CONSTANTS, number_field
+from pyharness.sweep.axes import CHOICES, CONSTANTS, ELEMENTS, INERTIA, number_field
 from pyharness.sweep.reductions import empty, needs_attitudes, reduced
 from pyharness.sweep.state_torques import follows_body, with_numbers
 from pyharness.sweep.sweep import Arrays, Indices, Sweep, groups, points, value_columns
@@ -103,9 +103,9 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         if name.startswith(CONSTANTS)
     }
     if constants or bodies:
-        moments = values[0].tolist() if bodies and values is not None else None
+        changed = values[0].tolist() if bodies and values is not None else None
         try:
-            scene = with_numbers(scene, constants, moments)
+            scene = with_numbers(scene, constants, changed)
         except InputError:
             # Until the time NaN, all methods fail, and each scene reports it.
             own["t_end"] = np.full(n, np.nan)
@@ -141,9 +141,11 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments" (kg m2) or "coefficients", and their values (n, 3), None if not varied."""
+    """Return "moments", "inertia" (kg m2) or "coefficients", and n values, None if not varied."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
+    if scene.inertia is not None:
+        return "inertia", _inertia(np.array(scene.inertia), own, n)
     assert scene.moments is not None
     first, second, third = scene.moments
     if "body.ratio.1" in own or "body.ratio.2" in own:
@@ -159,6 +161,18 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)
     return "moments", _components("body.moments", scene.moments, own, n)
+
+
+def _inertia(base: Array, own: Columns, n: int) -> Array | None:
+    varied = {
+        place: own[f"{INERTIA}{x}"] for x, place in ELEMENTS.items() if f"{INERTIA}{x}" in own
+    }
+    if not varied:
+        return None
+    found = np.tile(base, (n, 1, 1))
+    for (i, j), values in varied.items():
+        found[:, i, j] = found[:, j, i] = values
+    return found
 
 
 def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:

@@ -11,7 +11,7 @@ from pyharness.engine.registry import check_torque
 from pyharness.engine.scene_reader import scene_of
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import STATE_TORQUE, Scene
-from pyharness.model.scene_file import scene_text
+from pyharness.model.scene_file import body_of, scene_text
 from pyharness.model.state_torque import StateTorque
 from pyharness.sweep.axes import CONSTANTS
 
@@ -63,15 +63,15 @@ def follows_body(scene: Scene) -> bool:
 
 
 def with_numbers(
-    scene: Scene, constants: Mapping[str, float], moments: Sequence[float] | None
+    scene: Scene, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other constants of expressions, or other moments (kg m2)."""
+    """Return the scene with other constants of expressions, or other values of its body."""
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:
         data["torque"]["constants"].update(constants)
-    if moments is not None:
+    if values is not None:
         assert isinstance(scene.torque, StateTorque)
-        data["body"] = {"moments": list(moments)}
+        data["body"] = {body_of(scene)[0]: list(values)}
         for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
             if _is_of_body(dict(term), scene):
                 # Without it, the reader takes the inertia of the table [body].
@@ -84,4 +84,5 @@ def _terms(torque: StateTorque) -> list[tuple[tuple[str, Any], ...]]:
 
 
 def _is_of_body(term: Mapping[str, Any], scene: Scene) -> bool:
-    return bool(term["kind"] == "gravity_gradient" and term["inertia"] == scene.moments)
+    own = scene.moments or scene.inertia
+    return bool(term["kind"] == "gravity_gradient" and term["inertia"] == own)

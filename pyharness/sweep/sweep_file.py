@@ -19,6 +19,7 @@ from pyharness.model.errors import InputError, kind_of, unknown
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.scene_file import (
+    body_of,
     case_scene,
     check_keys,
     check_written_schema,
@@ -109,11 +110,11 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         content = read_file(beside, named)
         # The zero byte separates the files in the SHA-256.
         return checked_scene(
-            scene_of_file(content, beside.stem, named), any_state=True
+            scene_of_file(content, beside.stem, named), any_axes=True, any_state=True
         ), b"\0" + content
     if not table:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene_of(table, path.stem), any_state=True), b""
+    return checked_scene(scene_of(table, path.stem), any_axes=True, any_state=True), b""
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
@@ -221,12 +222,12 @@ def _check_axes(axes: tuple[Axis, ...], scene: Scene, solver: Solver) -> None:
             raise InputError(f"{one[0]} and {two[0]} are both given; give one of them")
     for field in fields:
         check_state_axis(scene, field)
-        by_coefficients = scene.coefficients is not None
-        if field.startswith("body.") and by_coefficients != ("coefficients" in field):
-            has = "coefficients" if by_coefficients else "moments"
+        has = body_of(scene)[0]
+        needs = next((x for x in ("coefficients", "inertia") if x in field), "moments")
+        if field.startswith("body.") and needs != has:
             raise InputError(f"axis {field}: the scene's body is given by {has}")
         if field in ("tilt", "azimuth") and scene.moments is None:
-            raise InputError(f"axis {field}: the body is given by coefficients; give moments")
+            raise InputError(f"axis {field}: the body is given by {has}; give moments")
         has_direction = any(name in fields for name in ("tilt", "height", "longitude"))
         if field == "omega.magnitude" and not any(scene.omega) and not has_direction:
             raise InputError(
@@ -323,6 +324,8 @@ def _check_solvers(sweep: Sweep) -> None:
         [name for name in (*own, *filter(None, against)) if name in REGISTRY],
         bool(programs),
     )
+    if any(programs):
+        checked_scene(sweep.scene, any_state=True)
     for program in programs:
         check_name("program", program, PROGRAMS)
     for chosen in _chosen_together(sweep.axes):

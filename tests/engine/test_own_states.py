@@ -22,7 +22,7 @@ from pyharness.model.attitude import quaternion_rates
 from pyharness.model.errors import InputError
 from pyharness.model.scene_file import scene_text
 from pyharness.model.trajectory import turned_to_space
-from pyharness.torques import damping, recorded
+from pyharness.torques import damping, recorded, wheels
 
 MOMENTS = (2.0, 3.0, 4.0)
 TOLERANCES = (1e-4, 1e-8, 1e-12)
@@ -653,3 +653,39 @@ def test_a_file_without_its_states_is_refused(tmp_path: Any) -> None:
     (tmp_path / "part.npz").write_bytes(archive_of(arrays))
     with pytest.raises(InputError, match="missing or damaged"):
         load(tmp_path / "part.npz")
+
+
+def test_wheels_under_a_law_keep_the_total_momentum() -> None:
+    def motor(t: Any, omega: Any, attitude: Any, h: Any) -> Any:
+        return 0.5 * omega + 0.3 * attitude[1:] - 0.01 * h
+
+    moments = (4.0, 3.0, 2.0)
+    scene = Scene(
+        omega=(0.1, 0.2, -0.1), moments=moments, attitude=(1, 0.2, 0.1, 0),
+        torque=wheels((0.0, 0.0, 0.5), motor),
+    )  # fmt: skip
+    assert [(each.name, each.start) for each in scene.states] == [
+        ("wheel1", 0.0), ("wheel2", 0.0), ("wheel3", 0.5),
+    ]  # fmt: skip
+    found: Any = solve(scene, [0.0, 5.0, 60.0], tolerance=1e-12)
+    h = np.stack([found.states[f"wheel{axis}"] for axis in (1, 2, 3)], axis=1)
+    total = found.rotation().apply(found.omega * moments + h)
+    assert np.ptp(total, axis=0).max() < 3e-13
+    assert np.abs(found.omega[-1]).max() < 0.01
+    # A constant law is that of a constant torque of the motors.
+    constant = [
+        solve(Scene(omega=(0.1, 0.2, -0.1), moments=moments, torque=each), 9.0).omega[0]
+        for each in (
+            wheels((0, 0, 0.5), lambda t, omega, h: (0.0, 0.0, 0.1)) + damping(0.1),
+            wheels((0, 0, 0.5), (0.0, 0.0, 0.1)) + damping(0.1),
+        )
+    ]
+    assert constant[0] == pytest.approx(constant[1], abs=1e-12)
+    own = Scene(
+        omega=(0.1, 0.2, -0.1), moments=moments, attitude=(1, 0, 0, 0),
+        torque=wheels((0, 0, 0.5), motor),
+        states={"wheel1": 0.2, "wheel2": 0.0, "wheel3": (0.0, 1.0)},
+    )  # fmt: skip
+    assert own.states[0].start == 0.2
+    with pytest.raises(InputError, match="wheels motor: the function has 2 arguments"):
+        wheels((0, 0, 1), lambda t, omega: omega)

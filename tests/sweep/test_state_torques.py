@@ -197,3 +197,39 @@ def test_forecast_keeps_constants_that_every_scene_has_of_its_own(tmp_path: Path
     sweep = read_sweep(written(tmp_path, text(grid, many)))
     places, _ = places_of_a_chunk(sweep, spread(sweep, 100))
     assert len({*places.tolist()}) == 5
+
+
+INERTIA = SCENE.replace(
+    "moments = [4.0, 3.0, 2.0]", "inertia = [[4, 0.1, 0], [0.1, 3, 0.2], [0, 0.2, 2]]"
+)
+
+
+@pytest.mark.parametrize("terms", ["", TERMS])
+@pytest.mark.parametrize("torque", ["", "expression"])
+def test_elements_of_an_inertia_matrix_vary(terms: str, torque: str, tmp_path: Path) -> None:
+    scene = INERTIA + terms
+    if not torque:
+        scene = scene.replace("expression = ", "#").replace("constants = ", "#")
+    given = text(
+        axis("body.inertia.12", [0.0, 0.3]), axis("body.inertia.33", [2.0, 2.2]), scene=scene
+    )
+    found = ends(read_sweep(written(tmp_path, given))).reshape(2, 2, 3)
+    for i, off in enumerate((0.0, 0.3)):
+        for j, last in enumerate((2.0, 2.2)):
+            row = f"inertia = [[4, {off}, 0], [{off}, 3, 0.2], [0, 0.2, {last}]]"
+            own = scene.replace("inertia = [[4, 0.1, 0], [0.1, 3, 0.2], [0, 0.2, 2]]", row)
+            path = written(tmp_path, own.replace("scene.", ""), "own.toml")
+            wanted = solve(read_scene(path), 2.0).omega[0]
+            assert found[i, j] == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize(("field", "more", "message"), [
+    ("body.moments.1", "", "given by inertia"), ("tilt", "", "give moments"),
+    ("body.inertia.21", "", "unknown field"), ("omega.1", 'program = "two-term"', "inertia"),
+])  # fmt: skip
+def test_fields_of_other_bodies_are_refused(
+    field: str, more: str, message: str, tmp_path: Path
+) -> None:
+    scene = INERTIA.replace("expression = ", "#").replace("constants = ", "#")
+    with pytest.raises(InputError, match=message):
+        read_sweep(written(tmp_path, text(axis(field, [0.5, 0.6]), scene=scene, solver=more)))

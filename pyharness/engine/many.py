@@ -28,6 +28,7 @@ from pyharness.engine.many_scenes import (
     from_scenes,
     rows_of_scene,
 )
+from pyharness.engine.many_states import solve_with_states
 from pyharness.engine.parameters import check_values
 from pyharness.engine.plan import FINEST
 from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
@@ -65,6 +66,7 @@ def solve_many(
     sines: Any = None,
     cosines: Any = None,
     parameters: Mapping[str, Any] | None = None,
+    states: Mapping[str, Any] | None = None,
     method: str = "auto",
     tolerance: Number | None = None,
     step: Number | None = None,
@@ -105,6 +107,9 @@ def solve_many(
     parameters : dict of arrays, shape (n,), or of float
         Values of keyword arguments of the torque's function, or of constants of its expressions, by
         name. Bodies that differ in them, in moments and in starts are solved side by side.
+    states : dict of arrays, shape (n,), or of float
+        Values at time 0 of the scene's own states, by name; the scene's by default. Such bodies are
+        solved one by one, without events, sensitivities and `out`.
     method : str
         A name in `pyharness.engine.solver.PREPARED`. `auto` uses closed forms or the Taylor
         series.
@@ -172,6 +177,17 @@ def solve_many(
     if parameters is not None:
         scene, own = _with_parameters(scene, parameters)
         arrays |= own
+    if isinstance(scene, Scene) and scene.states:
+        refused = {"events": events, "sensitivities": sensitivities, "out": out}
+        tolerance = requested_tolerance(method, tolerance)
+        with bar_of_bodies(boolean("progress", progress)):
+            return solve_with_states(
+                scene, t_end, rows, arrays, states, refused=refused, method=method,
+                tolerance=tolerance, effort=effort, estimates=boolean("estimates", estimates),
+                threads=threads,
+            )  # fmt: skip
+    if states is not None:
+        raise InputError("states: the scene has no states of its own; allowed: a scene with some")
     if scene and (events is not None or sensitivities is not None):
         details = Details(
             scene, t_end if rows is None else rows, arrays, method=method, tolerance=tolerance,

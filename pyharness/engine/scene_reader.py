@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pyharness.engine.table_terms import inertia_table
 from pyharness.model.attitude import of_angles
 from pyharness.model.changing import ChangingInertia, ChangingMoments
 from pyharness.model.errors import InputError, kind_of
@@ -109,6 +108,9 @@ def _body(table: dict[str, Any]) -> dict[str, Any]:
             check_keys(given, _TABLE, f"[body] {place}")
             if not {"times", "values"} <= given.keys():
                 raise InputError(f"[body] {place}: a table needs times and values; give both")
+            # Imported only here, as ready terms are: most scenes have none.
+            from pyharness.engine.table_terms import inertia_table
+
             return {**table, place: inertia_table(**given)}
         if _has_texts(given):
             return {**table, place: inertia_of_texts(place, given)}

@@ -43,6 +43,8 @@ class Ensemble(BatchResult):
         shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
+    own, names : ndarray, shape (n, k), or None, and tuple of str
+        The values and names of the scene's own states, which `states` has by name.
     times : ndarray, shape (m,), or None
         The times (s) of the rows of all bodies. All arrays then have an axis of length m after the
         first, such as `omega` the shape (n, m, 3).
@@ -65,6 +67,17 @@ class Ensemble(BatchResult):
     sensitivities: dict[str, Array] | None = field(default=None, repr=False)
     refusals: dict[int, str] | None = field(default=None, repr=False)
     times: Array | None = None
+    own: Array | None = field(default=None, repr=False)
+    names: tuple[str, ...] = ()
+
+    @property
+    def states(self) -> dict[str, Array]:
+        """The scenes' own states by name, shape (n,) or (n, m); empty if they have none."""
+        return {} if self.own is None else dict(zip(self.names, self._last(self.own), strict=True))
+
+    @staticmethod
+    def _last(array: Array) -> Array:
+        return np.moveaxis(array, -1, 0)
 
     @property
     def error(self) -> Array | None:
@@ -145,7 +158,7 @@ class Ensemble(BatchResult):
         -------
         pandas.DataFrame
             Its index is `body`, from 0, or `body` and `time` (s). Its columns are `omega1` to
-            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error` and `growth`.
+            `omega3` (rad/s), `ended`, and, if present, `q0` to `q3`, `error`, `growth`, own states.
             ``attrs["units"]`` has the units.
 
         Raises
@@ -158,7 +171,7 @@ class Ensemble(BatchResult):
 
         columns = {
             name: array.reshape(-1) for _, names, array in self._columns()
-            for name, array in zip(names, np.moveaxis(array, -1, 0), strict=True)
+            for name, array in zip(names, self._last(array), strict=True)
         }  # fmt: skip
         bodies = RangeIndex(len(self.omega), name="body")
         index = (
@@ -176,6 +189,7 @@ class Ensemble(BatchResult):
             ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
             ("1", ("q0", "q1", "q2", "q3"), self.attitude),
             ("1", ("error", "growth"), self.estimates),
+            ("", self.names, self.own),
         )
         return [(unit, names, array) for unit, names, array in given if array is not None]
 
@@ -186,8 +200,8 @@ class Ensemble(BatchResult):
         -------
         xarray.Dataset
             Its variables are `omega` (dimensions `body`, `time` if there are `times`, and `axis`),
-            `ended`, and, if present, `attitude` (`component` in place of `axis`), `error` and
-            `growth`.
+            `ended`, and, if present, `attitude` (`component` in place of `axis`), `error`,
+            `growth` and own states.
 
         Raises
         ------
@@ -211,6 +225,7 @@ class Ensemble(BatchResult):
         if self.estimates is not None:
             variables["error"] = (rows, self.estimates[..., 0].copy())
             variables["growth"] = (rows, self.estimates[..., 1].copy())
+        variables |= {name: (rows, values.copy()) for name, values in self.states.items()}
         return Dataset(variables, coordinates)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":

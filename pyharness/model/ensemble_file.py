@@ -22,7 +22,7 @@ _FILE = "ensemble file"
 _WRITTEN = "a file that Ensemble.save wrote"
 # The length of an omega, an attitude and so on, by attribute.
 _WIDTHS = {"omega": 3, "attitude": 4, "estimates": 2}
-_ARRAYS = (*_WIDTHS, "status", "times")
+_ARRAYS = (*_WIDTHS, "own", "status", "times")
 # Counts of events, -1 without a result, (functions, bodies); times, then states, of all events.
 _EVENTS = ("event_counts", "t_events", "y_events")
 _SENSITIVITY = "sensitivity_"
@@ -46,6 +46,7 @@ def save_ensemble(found: "Ensemble", path: str | os.PathLike[str]) -> None:
         "schema": SCHEMAS[_FILE],
         "refusals": None if found.refusals is None else list(found.refusals.items()),
         "sensitivities": None if found.sensitivities is None else names,
+        "names": found.names,
     }
     name = checked_file(_FILE, path)
     write_files({name: archive_of({**arrays, "header": json.dumps(header)})}, _FILE)
@@ -66,7 +67,8 @@ def load_ensemble(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any]:
     given: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     rows = given["status"].shape
-    for name, width in _WIDTHS.items():
+    given["names"] = tuple(map(str, header["names"]))
+    for name, width in {**_WIDTHS, "own": len(given["names"])}.items():
         array = given[name]
         if array is not None and (array.dtype, array.shape) != ("f8", (*rows, width)):
             raise ValueError("an array of another type or shape")

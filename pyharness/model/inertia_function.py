@@ -13,7 +13,6 @@ from pyharness.model.changing import Changing
 from pyharness.model.dual import with_derivatives
 from pyharness.model.errors import InputError
 from pyharness.model.expressions import text_components
-from pyharness.model.inertia import checked_inertia
 from pyharness.model.numpy_calls import called_once
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Table, Tape, evaluate, float_outputs, slots_of
@@ -181,6 +180,9 @@ def inertia_of_tables(
 
 def checked_function(found: InertiaFunction) -> InertiaFunction:
     """Return an inertia; raise InputError if it jumps, or is no inertia at time 0."""
+    # Imported only here, because most scenes need no exact numbers.
+    from pyharness.model.inertia import checked_inertia
+
     where = f"[body] {found.place}"
     _check_continuous(found.tape, where)
     start = found.at(0.0)

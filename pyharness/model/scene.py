@@ -59,8 +59,8 @@ CHANGING = (
     "inertia: solve, prepare, solve_many, Stepper, and the verbs prove and run --method"
 )
 OWN_STATES = (
-    "the scene has states of its own, which this can't integrate; allowed: solve and the verb run "
-    "with the methods auto and taylor, and Stepper"
+    "the scene has states of its own, which this can't integrate; allowed: solve, solve_many with "
+    "one scene, and the verb run, with the methods auto and taylor, and Stepper"
 )
 SPACE_TORQUE = (
     "the torque is about the axes of space, and this takes one about those of the body; allowed: "

@@ -1,0 +1,110 @@
+"""Tests of many bodies with states of their own."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Ensemble, InputError, Scene, prepare, solve, solve_many
+from pyharness.torques import wheels
+
+MOMENTS = (4.0, 3.0, 2.0)
+
+
+def motor(t: Any, omega: Any, attitude: Any, h: Any) -> Any:
+    return 0.5 * omega + 0.3 * attitude[1:]
+
+
+SCENE = Scene(
+    omega=(0.1, 0.2, -0.1), moments=MOMENTS, attitude=(1, 0.2, 0.1, 0),
+    torque=wheels((0.0, 0.0, 0.5), motor),
+)  # fmt: skip
+STARTS = np.array([[0.1, 0.0, 0.1], [0.0, -0.2, 0.1], [0.2, 0.1, 0.0]])
+
+
+def one(i: int, times: Any, **own: Any) -> Any:
+    scene = Scene(
+        omega=STARTS[i], attitude=SCENE.attitude, torque=SCENE.torque, **{"moments": MOMENTS, **own}
+    )
+    return solve(scene, times, tolerance=1e-10)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_bodies_are_those_of_single_calls(threads: int) -> None:
+    wheel = [0.5, 0.0, -0.4]
+    found = solve_many(
+        SCENE, [3.0, 20.0, -2.0], omega=STARTS, states={"wheel3": wheel}, tolerance=1e-10,
+        estimates=True, threads=threads,
+    )  # fmt: skip
+    assert list(found.states) == ["wheel1", "wheel2", "wheel3"]
+    for i, time in enumerate((3.0, 20.0, -2.0)):
+        states = {"wheel1": 0.0, "wheel2": 0.0, "wheel3": wheel[i]}
+        wanted = one(i, time, states=states)
+        assert (found.omega[i] == wanted.omega[0]).all()
+        assert found.attitude is not None
+        assert (found.attitude[i] == wanted.attitude[0]).all()
+        assert [each[i] for each in found.states.values()] == wanted.own[0].tolist()
+        assert found.error is not None
+        assert found.error[i] == wanted.error
+        assert found.ended[i] == "complete"
+
+
+def test_rows_over_time_and_other_bodies(tmp_path: Path) -> None:
+    bodies = np.array([MOMENTS, (3.0, 3.0, 2.0), (5.0, 4.0, 2.0)])
+    found = solve_many(SCENE, times=[1.0, 5.0, 9.0], omega=STARTS, moments=bodies, tolerance=1e-10)
+    for i in range(3):
+        wanted = one(i, [1.0, 5.0, 9.0], moments=bodies[i])
+        assert (found.omega[i] == wanted.omega).all()
+        assert found.own is not None
+        assert (found.own[i] == wanted.own).all()
+    frame = found.to_pandas()
+    assert frame.loc[(1, 5.0), "wheel2"] == found.states["wheel2"][1, 1]
+    assert (found.to_xarray()["wheel3"].values == found.states["wheel3"]).all()
+    found.save(tmp_path / "bodies.npz")
+    again = Ensemble.load(tmp_path / "bodies.npz")
+    assert again.names == found.names
+    assert again.own is not None
+    assert (again.own == found.own).all()
+
+
+def test_bodies_that_fail_have_a_status() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": states["x"] ** 2}
+
+    scene = Scene(omega=(0.1, 0.2, 0.3), moments=MOMENTS, torque=law, states={"x": 1.0})
+    starts = {"x": [0.1, 1.0, np.nan]}
+    found = solve_many(scene, 2.0, states=starts)
+    assert found.ended[0] == "complete"
+    assert found.states["x"][0] == pytest.approx(0.125, abs=1e-8)
+    assert found.ended[1] in ("overflow", "singular", "gave up")
+    assert found.ended[2] == "refused"
+    assert np.isnan(found.omega[1:]).all()
+    rows = solve_many(scene, times=[0.5, 0.9, 2.0], states=starts)
+    assert rows.ended[1, :2].tolist() == ["complete", "complete"]
+    assert rows.ended[1, 2] == found.ended[1]
+    assert rows.states["x"][1, :2] == pytest.approx([2.0, 10.0], rel=1e-6)
+    assert np.isnan(rows.omega[1, 2]).all()
+    tired = solve_many(scene, 1e7, states={"x": [-1.0]}, effort=1e-6)
+    assert tired.ended.tolist() == ["gave up"]
+
+
+@pytest.mark.parametrize(("given", "message"), [
+    ({"states": {"wheel4": 1.0}}, "wheel1, wheel2, wheel3"), ({"states": [1.0]}, "a dict"),
+    ({"events": lambda t, y: y[0]}, "events"), ({"sensitivities": ["omega"]}, "sensitivities"),
+    ({"method": "gauss-2"}, "allowed"), ({"out": np.zeros((1, 3))}, "out"),
+    ({"states": {"wheel1": [1.0, 2.0]}, "omega": STARTS}, "3, the number of bodies"),
+    ({"torque_constant": [0, 0, 1]}, "torque_constant"),
+])  # fmt: skip
+def test_what_can_not_be_solved_is_refused(given: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        solve_many(SCENE, 1.0, **given)
+
+
+def test_states_belong_to_scenes_that_have_them() -> None:
+    with pytest.raises(InputError, match="no states of its own"):
+        solve_many(Scene(omega=(1, 0, 0), moments=MOMENTS), 1.0, states={"x": 1.0})
+    with pytest.raises(InputError, match="states of its own"):
+        prepare(SCENE)
+    with pytest.raises(InputError, match="states of its own"):
+        solve_many([SCENE, SCENE], 1.0)

@@ -69,9 +69,7 @@ class _Motion(NamedTuple):
     corners: Array  # of the brick, about the body axes, (8, 3)
 
 
-def check_animation(
-    path: object, moments: Triple | Changing | None
-) -> str:
+def check_animation(path: object, moments: Triple | Changing | None) -> str:
     """Return `path` as text; raise InputError unless a brick with `moments` can be drawn there."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"animate: {kind_of(path)}; allowed: a path, as text or a Path")

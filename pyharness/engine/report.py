@@ -143,7 +143,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
     note = f"x: {ending(trajectory)}" if not trajectory.has_all_rows else ""
     left: Any = figure
     if has_attitude:
-        from pyharness.engine.attitude_picture import draw_sphere
+        from pyharness.model.attitude_picture import draw_sphere
 
         parts: Any = figure.subfigures(1, 2, width_ratios=(7.0, 5.5))
         left, right = parts

@@ -47,7 +47,7 @@ from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, boolean, number, number_list
+from pyharness.model.values import Number, Numbers, boolean, number, number_list, unit_of
 from pyharness.model.waves import with_merged_waves
 
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
@@ -286,6 +286,8 @@ def _integrate(
 
 def ascending_times(times: object) -> tuple[list[float], bool]:
     """Return ascending times (s), and whether they were descending; or raise InputError."""
+    if unit_of(times):
+        number("times", times)
     if _are_ascending_floats(times):
         return times.tolist(), False  # type: ignore[attr-defined]
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():

@@ -18,6 +18,7 @@ from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
+from pyharness.model.keywords import with_hints
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque, of_law, torque_of
 from pyharness.model.symbols import MOST_OPERATIONS, Recorder
@@ -93,6 +94,7 @@ class Stepper:
         "_scene", "_state", "_steps", "_tape", "_time", "_tolerance", "_trial",
     )  # fmt: skip
 
+    @with_hints
     def __init__(
         self, scene: Scene, tolerance: float = _DEFAULT, *, attitude: bool | None = None
     ) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError, kind_of
-from pyharness.model.values import integer, number
+from pyharness.model.values import integer, number, unit_of
 
 _MOST_THREADS = 1024
 _REAL = "iuf"
@@ -49,6 +49,8 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 def numbers_of(where: str, values: object) -> Array:
     """Return real numbers of any type and shape as float64, or raise InputError."""
+    if unit_of(values):  # NumPy would drop it
+        number(where, values)
     try:
         found = np.asarray(values)
     except Exception as error:  # rows of different lengths, or a user-defined class
@@ -79,6 +81,9 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
     counts = {len(each) for each in rows.values()}
     n = 0 if 0 in counts else max(counts, default=1)
     if not counts <= {1, n}:
+        # Final times do not determine the number of bodies, if another array does.
+        others = [len(each) for name, each in rows.items() if name != "t_end"]
+        n = max(others) if n else 0
         for name, each in rows.items():
             check_rows(name, each, n)
     return n
@@ -87,7 +92,11 @@ def count_bodies(rows: Mapping[str, Array]) -> int:
 def check_rows(name: str, array: Array, n: int) -> None:
     """Raise InputError unless the array `name` has one row or `n`."""
     if len(array) not in (1, n):
-        raise InputError(f"{name}: {len(array)} rows; allowed: 1, or {n}, the number of bodies")
+        several = "; for several times of each body use times= of solve_many"
+        raise InputError(
+            f"{name}: {len(array)} rows; allowed: 1, or {n}, the number of bodies"
+            f"{several if name == 't_end' else ''}"
+        )
 
 
 def row_of(array: Array, i: int) -> Any:

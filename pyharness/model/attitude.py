@@ -177,3 +177,10 @@ def turned_back(attitudes: Array, turn: Any) -> Array:
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))
     return np.stack(parts, axis=-1)
+
+
+def turned_to_space(attitude: Array, vectors: Array) -> Array:
+    """Return vectors, (n, 3), rotated from body to space."""
+    scalar, vector = attitude[:, :1], attitude[:, 1:]
+    twice = 2.0 * np.cross(vector, vectors)
+    return vectors + scalar * twice + np.cross(vector, twice)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
+from pyharness.model.attitude import turned_to_space
 from pyharness.model.changing import Changing
 from pyharness.model.distribution import check_package, checked_axes
 from pyharness.model.errors import InputError, unknown
@@ -351,6 +352,37 @@ class Conversions:
         ax.legend()
         return ax
 
+    def animate(self, path: str | os.PathLike[str]) -> None:
+        """Write an animation of a brick that has the body's moments, and moves as the body.
+
+        Nothing is solved again. With dense output, the frames are 0.05 s apart; a motion shorter
+        than 2 s is stretched to 2 s, and one longer than 10 s is compressed to 10 s. Without dense
+        output, each of these frames shows the nearest row.
+
+        Parameters
+        ----------
+        path : str or path
+            The path of the file, which ends in ``.gif`` or ``.html`` (a page with buttons and a
+            slider). An existing file is replaced.
+
+        Raises
+        ------
+        InputError
+            If the trajectory has no attitude, or is at one time only; if the body has no constant
+            moments, or no brick has these moments; if the file has another ending or can't be
+            written; or if matplotlib is not installed.
+
+        Examples
+        --------
+        >>> from pyharness import Scene, solve
+        >>> nut = Scene("nut", (0.02, 6, 0), moments=(0.9, 1.6, 2.3), attitude=(1, 0, 0, 0))
+        >>> solve(nut, 10.0, dense_output=True).animate("nut.gif")  # doctest: +SKIP
+        """
+        from pyharness.model.attitude_picture import animate
+
+        self._attitudes()
+        animate(cast("Trajectory", self), path)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
@@ -393,10 +425,3 @@ class Conversions:
         return found + [
             _Quantity(name, "state of the scene's own", "", (name,), each) for name, each in own
         ]
-
-
-def turned_to_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors, (n, 3), rotated from body to space."""
-    scalar, vector = attitude[:, :1], attitude[:, 1:]
-    twice = 2.0 * np.cross(vector, vectors)
-    return vectors + scalar * twice + np.cross(vector, twice)

@@ -336,6 +336,9 @@ def called_once(
             missing = re.search(r"no callable (\w+) method", str(error))
             if missing:
                 raise recorder.refusal(f"{missing[1]} of the state") from None
+            if _OF_NUMBERS.search(str(error)):
+                reason = f"{type(error).__name__}: {printable(str(error))}"
+                raise recorder.refusal_of_numbers(reason) from error
             raise InputError(
                 f"{recorder.place}: the function raised {type(error).__name__}: "
                 f"{printable(str(error))}; allowed: {allowed}"
@@ -343,6 +346,8 @@ def called_once(
     raise AssertionError
 
 
+# What a function that accepts numbers only says of symbols.
+_OF_NUMBERS = re.compile(r"[Oo]bject\b|dtype\('O'\)|input types|Symbol")
 _WRAPPED = (
     "array", "asarray", "cross", "dot", "inner", "outer", "matmul", "einsum", "stack",
     "concatenate", "hstack", "vstack", "column_stack", "roll", "diff", "ravel", "reshape",

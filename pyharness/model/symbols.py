@@ -85,6 +85,13 @@ class Recorder:
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
+    def refusal_of_numbers(self, reason: str) -> InputError:
+        """Return the exception for a function that accepts no symbols; `reason` is its own."""
+        return InputError(
+            f"{self.place}: the function accepts numbers only, not the symbols that record it "
+            f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
+        )
+
     def impure(self) -> InputError:
         """Return the exception for a function that depends on more than its arguments."""
         return InputError(f"{self.place}: {HAS_MEMORY}")

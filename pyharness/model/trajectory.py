@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array as Array
+from pyharness.model.attitude import turned_to_space as turned_to_space
 from pyharness.model.changing import Changing
 from pyharness.model.conversions import Conversions
-from pyharness.model.conversions import turned_to_space as turned_to_space
 from pyharness.model.extension import ENDS
 from pyharness.model.report import counted, short
 

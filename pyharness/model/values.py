@@ -38,7 +38,15 @@ def number(where: str, value: object) -> float:
         return found
     if found == _TOO_LARGE:
         raise InputError(f"{where}: {found}")
+    if unit := unit_of(value):
+        raise InputError(f"{where}: a number in {unit}; give its value in SI units, without a unit")
     raise InputError(f"{where}: {found} where a number belongs")
+
+
+def unit_of(value: object) -> str:
+    """Return the unit of a quantity, as of astropy or pint, or an empty text."""
+    unit = getattr(value, "unit", None) or getattr(value, "units", None)
+    return str(unit) if unit is not None and hasattr(value, "to") else ""
 
 
 def converted(value: object) -> float | str:
@@ -121,6 +129,8 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
             return iter(values)  # type: ignore[call-overload, no-any-return]
         except TypeError:
             pass
+    if unit_of(values):
+        number(where, values)
     raise InputError(f"{where}: {kind_of(values)}; {allowed}")
 
 

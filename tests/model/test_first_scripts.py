@@ -17,6 +17,7 @@ Scene: Any = pyharness.Scene
 prepare: Any = pyharness.prepare
 solve: Any = pyharness.solve
 solve_many: Any = pyharness.solve_many
+Stepper: Any = pyharness.Stepper
 BODY: Any = {"moments": [40, 30, 20], "omega": [0, 1, 1]}
 TIMES = np.linspace(0.0, 10.0, 11)
 
@@ -71,6 +72,7 @@ def test_events_dense_output_and_attitudes_are_as_in_scipy() -> None:
         (lambda: prepare(Scene(**BODY), rtol=1e-9), "tolerance"),
         (lambda: solve_many(Scene(**BODY), 1.0, tol=1e-9), "tolerance"),
         (lambda: solve_many(Scene(**BODY), 1.0, omega0=[[1, 2, 3]]), "omega"),
+        (lambda: Stepper(Scene(**BODY), tol=1e-9), "tolerance"),
         (lambda: Scene(I=[40, 30, 20], omega=[0, 1, 1]), "moments"),
         (lambda: Scene(moments=[40, 30, 20], w0=[0, 1, 1]), "omega"),
         (lambda: Scene(**BODY, q0=[1, 0, 0, 0]), "attitude"),
@@ -88,6 +90,61 @@ def test_scene_without_omega_or_with_omega_first_is_refused() -> None:
         Scene(moments=[40, 30, 20])
     with pytest.raises(InputError, match="omega=, moments="):
         Scene([0, 1, 1], [40, 30, 20])
+
+
+class Quantity:
+    """Numbers with a unit, as of astropy: NumPy drops the unit, and float() raises."""
+
+    unit = "deg / s"
+
+    def __init__(self, values: Any) -> None:
+        self.values = values
+        self.to = values
+
+    def __iter__(self) -> Any:
+        """Return the quantities of an array; a single one raises TypeError."""
+        return map(Quantity, self.values)
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        """Return the numbers without their unit."""
+        return np.array(self.values)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: Scene(moments=BODY["moments"], omega=Quantity([0.0, 57.0, 57.0])),
+        lambda: solve_many(Scene(**BODY), 1.0, omega=Quantity([0.0, 57.0, 57.0])),
+        lambda: solve(Scene(**BODY), Quantity(1.0)),
+        lambda: solve(Scene(**BODY), Quantity([0.0, 1.0])),
+    ],
+)
+def test_numbers_with_a_unit_are_refused_rather_than_taken_for_those_of_si(call: Any) -> None:
+    with pytest.raises(InputError, match=r"a number in deg / s; give its value in SI units"):
+        call()
+
+
+def test_torque_that_accepts_numbers_only_is_told_of_opaque() -> None:
+    def torque(t: Any, omega: Any, attitude: Any) -> Any:
+        return -Rotation.from_quat(attitude).as_rotvec() - omega
+
+    with pytest.raises(InputError, match=r"accepts numbers only, .*opaque\(function\)"):
+        Scene(**BODY, attitude=(1, 0, 0, 0), torque=torque)
+
+    def mistaken(t: Any, omega: Any) -> Any:
+        return omega[3]
+
+    with pytest.raises(InputError, match=r"the function raised IndexError"):
+        Scene(**BODY, torque=mistaken)
+
+
+def test_several_times_for_many_bodies_are_told_of_their_argument() -> None:
+    starts = np.ones((3, 3))
+    several = r"t_end: \d+ rows; allowed: 1, or 3, .*times="
+    with pytest.raises(InputError, match=several):
+        solve_many(Scene(**BODY), TIMES, omega=starts)
+    with pytest.raises(InputError, match=several):
+        solve_many([Scene(**BODY)] * 3, [1.0, 2.0])
 
 
 def test_file_gets_an_ending(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from pyharness.model.assumptions import mark
 from pyharness.model.attitude import FORMS
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.model.output_files import check_writable, write_files
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.programs import (
@@ -183,22 +182,28 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     if options.times is not None:
         times = shared.numbers(options.times, "--times")
     shared.check_outputs(options)
+    attitude = None if options.attitude is None else True
     if options.animate is not None:
-        from pyharness.engine.attitude_picture import animation, check_animation
-        from pyharness.views.pictures import check_matplotlib
+        from pyharness.model.attitude_picture import check_animation
+        from pyharness.model.principal import principal
 
         if options.attitude is None and not scene.has_attitude:
             raise InputError(
                 "--animate needs an attitude; request one, as in --attitude quaternion"
             )
-        check_animation(options.animate, scene)
-        check_matplotlib("--animate")
-        check_writable(options.animate, "--animate")
-    effort, attitude = shared.chosen_effort(options), None if options.attitude is None else True
-    trajectory = solve(scene, times, name, tolerance, effort=effort, attitude=attitude)
+        check_animation(options.animate, scene.changing or principal(scene)[0].moments)
+        attitude = True
+    trajectory = solve(
+        scene,
+        times,
+        name,
+        tolerance,
+        effort=shared.chosen_effort(options),
+        attitude=attitude,
+        dense_output=options.animate is not None,
+    )
     if options.animate is not None:
-        moving = animation(scene, name, tolerance, max(times, key=abs), options.animate)
-        write_files({options.animate: moving}, "--animate")
+        trajectory.animate(options.animate)
     title = f"method {name}: {METHODS[name].title}"
     if trajectory.tolerance is not None:
         title += f", tolerance {trajectory.tolerance:g}"

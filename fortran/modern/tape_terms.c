@@ -60,8 +60,8 @@ struct work {
   int n_pairs, n_slots;
   struct pairs *pairs;
   abreast *sums;
-  row *tangents; /* of each slot: derivatives by the unknowns */
-  double *middle; /* of each slot: value amid the step */
+  row (*tangents)[NODES]; /* of each slot at each node: derivatives by the unknowns */
+  abreast *middle; /* of each slot: values at the nodes */
 };
 
 static inline size_t rounded_up(size_t bytes) { return (bytes + 63) / 64 * 64; }
@@ -70,7 +70,7 @@ static inline size_t rounded_up(size_t bytes) { return (bytes + 63) / 64 * 64; }
 int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_slots)
 {
   const size_t groups = (2 * (size_t)n_operations + ABREAST - 1) / ABREAST;
-  const size_t of_slots = n_slots * (sizeof(row) + sizeof(double));
+  const size_t of_slots = n_slots * (NODES * sizeof(row) + sizeof(abreast));
   return (rounded_up(sizeof(struct work)) + rounded_up(groups * sizeof(struct pairs))
           + rounded_up(groups * sizeof(abreast)) + rounded_up(of_slots)) / sizeof(double);
 }
@@ -97,8 +97,8 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
   at += rounded_up(groups * sizeof(struct pairs));
   work->sums = (abreast *)at;
   at += rounded_up(groups * sizeof(abreast));
-  work->tangents = (row *)at;
-  work->middle = (double *)(work->tangents + n_slots);
+  work->tangents = (row(*)[NODES])at;
+  work->middle = (abreast *)(work->tangents + n_slots);
   memset(work->pairs, 0, groups * sizeof(struct pairs));
   for (int n = 0; n < tape->n_operations; n++) {
     const int *operation = tape->operations[n];
@@ -375,83 +375,82 @@ static inline double largest(const struct tape *tape, int k, const double *weigh
       most = (reg)(((reg_bits)x & is_larger) | ((reg_bits)most & ~is_larger));
     }
     most *= *(const reg_anywhere *)(units + p);
-    for (int lane = 0; lane < IN_REGISTER; lane++)
-      if (most[lane] > found) found = most[lane];
+    /* A unit of 0 makes an infinite term NaN, which does not count. */
+    double lanes[IN_REGISTER];
+    const reg_bits counts = most > (reg){0.0};
+    *(reg_anywhere *)lanes = (reg)((reg_bits)most & counts);
+    for (int half = IN_REGISTER / 2; half > 0; half /= 2)
+      for (int lane = 0; lane < half; lane++)
+        if (lanes[lane + half] > lanes[lane]) lanes[lane] = lanes[lane + half];
+    if (lanes[0] > found) found = lanes[0];
   }
   return found;
 }
 
-/* Compute the derivatives of the rates by some unknowns, from `first_column` on, at the time `part` of
-   the step, times the step: element [i][j] is that of rate i by unknown j. */
-static ALWAYS_INLINE void set_columns(const struct tape *tape, const int first_column,
-                                      const int columns, double h, double part, row *jacobian)
+/* Compute the derivatives of the rates by some unknowns, from `first_column` on, at so many `nodes`, the
+   `parts` of the step, times the step: element [i][j] of each matrix is that of rate i by unknown j. */
+static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, const int first_column,
+                                      const int columns, double h, abreast parts, row *jacobian[])
 {
   const series *const a = tape->a;
   const struct work *work = tape->work;
-  double *const m = work->middle;
-  row *const v = work->tangents;
+  abreast *const m = work->middle;
+  row(*const v)[NODES] = work->tangents;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
 
   for (int n = 0; n < work->n_slots; n++) {
-    double sum = a[n][TERMS_AMID - 1];
-    for (int k = TERMS_AMID - 2; k >= 0; k--) sum = a[n][k] + part * sum;
+    abreast sum = (abreast){0.0} + a[n][TERMS_AMID - 1];
+    for (int k = TERMS_AMID - 2; k >= 0; k--) sum = a[n][k] + parts * sum;
     m[n] = sum;
   }
   memset(v, 0, (FIRST_UNKNOWN + tape->n_unknowns) * sizeof *v);
   for (int j = 0; j < columns && first_column + j < tape->n_unknowns; j++)
-    v[FIRST_UNKNOWN + first_column + j][j] = 1.0;
+    for (int d = 0; d < nodes; d++) v[FIRST_UNKNOWN + first_column + j][d][j] = 1.0;
   for (int n = 0; n < tape->n_operations + tape->n_unknowns; n++) {
     const int is_rate = n >= tape->n_operations;
     const int *operation = tape->operations[is_rate ? 0 : n];
     const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
     if (is_rate || operation[0] == LINEAR) {
       const int c = is_rate ? derivatives + n - tape->n_operations : first;
-      double *to = is_rate ? jacobian[n - tape->n_operations] : v[out];
       for (int p = 0; p < columns; p += IN_REGISTER) {
-        reg sum = {0.0};
+        reg sums[NODES] = {{0.0}};
         for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++)
-          sum += tape->coefficients[i] * *(reg *)(v[tape->slots[i] - 1] + p);
-        *(reg *)(to + p) = is_rate ? h * sum : sum;
+          for (int d = 0; d < nodes; d++)
+            sums[d] += tape->coefficients[i] * *(reg *)(v[tape->slots[i] - 1][d] + p);
+        for (int d = 0; d < nodes; d++)
+          *(reg *)((is_rate ? jacobian[d][n - tape->n_operations] : v[out][d]) + p) =
+              is_rate ? h * sums[d] : sums[d];
       }
       continue;
     }
     /* The derivatives of the first slot by the operands, and of the second by the first operand. */
-    double by_first = 0.0, by_second = 0.0, of_second = 0.0;
-    int from = first, other = 0;
+    abreast by_first = {0.0}, by_second = {0.0}, of_second = {0.0};
+    int from = first, other = 0, has_second = 0;
     switch (operation[0]) {
     case PRODUCT: by_first = m[second], by_second = m[first], other = second; break;
     case QUOTIENT:
       by_first = 1.0 / m[second], by_second = -m[out] * by_first, other = second;
       break;
-    case SQRT: by_first = m[out] ? 0.5 / m[out] : 0.0; break;
+    case SQRT:
+      for (int d = 0; d < nodes; d++) by_first[d] = m[out][d] ? 0.5 / m[out][d] : 0.0;
+      break;
     case EXP: by_first = m[out]; break;
-    case SINE_COSINE: by_first = m[out + 1], of_second = -m[out]; break;
-    case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first; break;
+    case SINE_COSINE: by_first = m[out + 1], of_second = -m[out], has_second = 1; break;
+    case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first, has_second = 1; break;
     case LOG:
     case ATAN:
     case ASIN: by_first = m[second]; break;
-    case SELECT: by_first = 1.0, from = chosen(tape, operation); break;
+    case SELECT: by_first = (abreast){0.0} + 1.0, from = chosen(tape, operation); break;
     default: from = 0; break; /* a table depends on the time alone, and a switch is constant */
     }
-    for (int p = 0; p < columns; p += IN_REGISTER) {
-      const reg x = *(reg *)(v[from] + p);
-      *(reg *)(v[out] + p) = by_first * x + by_second * *(reg *)(v[other] + p);
-      if (of_second) *(reg *)(v[out + 1] + p) = of_second * x;
+    for (int d = 0; d < nodes; d++) {
+      for (int p = 0; p < columns; p += IN_REGISTER) {
+        const reg x = *(reg *)(v[from][d] + p);
+        *(reg *)(v[out][d] + p) = by_first[d] * x + by_second[d] * *(reg *)(v[other][d] + p);
+        if (has_second) *(reg *)(v[out + 1][d] + p) = of_second[d] * x;
+      }
     }
   }
-}
-
-static void set_later_columns(const struct tape *tape, double h, double part, matrix jacobian)
-{
-  for (int j = SIDE_BY_SIDE; j < tape->n_unknowns; j += SIDE_BY_SIDE)
-    set_columns(tape, j, SIDE_BY_SIDE, h, part, jacobian[j / SIDE_BY_SIDE]);
-}
-
-static ALWAYS_INLINE void set_jacobian(const struct tape *tape, const int columns, double h,
-                                       double part, matrix jacobian)
-{
-  set_columns(tape, 0, columns, h, part, jacobian[0]);
-  if (tape->n_unknowns > SIDE_BY_SIDE) set_later_columns(tape, h, part, jacobian);
 }
 
 /* Compute the derivatives of term 0 of a slot by the unknowns. */
@@ -459,10 +458,11 @@ void OF_LEVEL(slot_gradient, LEVEL)(const struct tape *tape, int slot, double *g
 {
   const struct work *work = tape->work;
   row jacobian[MOST_UNKNOWNS] __attribute__((aligned(64)));
+  row *only[] = {jacobian};
   for (int j = 0; j < tape->n_unknowns; j++) {
     const int column = j % SIDE_BY_SIDE;
-    if (column == 0) set_columns(tape, j, SIDE_BY_SIDE, 1.0, 0.0, jacobian);
-    gradient[j] = work->tangents[slot - 1][column];
+    if (column == 0) set_columns(tape, 1, j, SIDE_BY_SIDE, 1.0, (abreast){0.0}, only);
+    gradient[j] = work->tangents[slot - 1][0][column];
   }
 }
 
@@ -486,27 +486,33 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbat
   }
 }
 
-/* Compute the coefficients of the Jacobian as a polynomial of the part of the step, through its
+/* Compute one block of columns of the Jacobian as a polynomial of the part of the step, through its
    values at the nodes of Gauss: the error of the perturbations is of order 2 NODES + 1. */
-static ALWAYS_INLINE void set_jacobians(const struct tape *tape, const int columns, double h,
-                                        double factor, matrix *jacobian)
+static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, const int columns,
+                                    double h, double factor, matrix *jacobian)
 {
   const double distance = 0.38729833462074170 * factor, middle = 0.5 * factor;
-  set_jacobian(tape, columns, h, middle - distance, jacobian[0]);
-  set_jacobian(tape, columns, h, middle, jacobian[1]);
-  set_jacobian(tape, columns, h, middle + distance, jacobian[2]);
+  const double per_slope = 0.5 / distance, per_curve = 0.5 / (distance * distance);
+  const abreast parts = {middle - distance, middle, middle + distance};
+  row *to[NODES] = {jacobian[0][block], jacobian[1][block], jacobian[2][block]};
+  set_columns(tape, NODES, block * SIDE_BY_SIDE, columns, h, parts, to);
   for (int i = 0; i < tape->n_unknowns; i++) {
-    for (int j = 0; j < tape->n_unknowns; j++) {
-      const int block = j / SIDE_BY_SIDE, column = j % SIDE_BY_SIDE;
-      const double before = jacobian[0][block][i][column], at = jacobian[1][block][i][column];
-      const double after = jacobian[2][block][i][column];
-      const double slope = (after - before) / (2.0 * distance);
-      const double curve = ((after - at) + (before - at)) / (2.0 * distance * distance);
-      jacobian[0][block][i][column] = at - middle * (slope - middle * curve);
-      jacobian[1][block][i][column] = slope - 2.0 * middle * curve;
-      jacobian[2][block][i][column] = curve;
+    for (int p = 0; p < columns; p += IN_REGISTER) {
+      reg *const before = (reg *)(to[0][i] + p), *const amid = (reg *)(to[1][i] + p);
+      reg *const after = (reg *)(to[2][i] + p);
+      const reg slope = per_slope * (*after - *before);
+      const reg curve = per_curve * ((*after - *amid) + (*before - *amid));
+      *before = *amid - middle * (slope - middle * curve);
+      *amid = slope - 2.0 * middle * curve;
+      *after = curve;
     }
   }
+}
+
+static void set_later_blocks(const struct tape *tape, double h, double factor, matrix *jacobian)
+{
+  for (int block = 1; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
+    set_block(tape, block, SIDE_BY_SIDE, h, factor, jacobian);
 }
 
 /* Expand eight perturbations, from number `number` on, whose values are terms 0 of the unknowns, to as
@@ -532,8 +538,9 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   const double first = largest(tape, 0, weights, units, count);
   double before = first, power = 1.0;
   int k = 0;
-  if (n == 3) set_jacobians(tape, 4, h, factor, jacobian);
-  else set_jacobians(tape, SIDE_BY_SIDE, h, factor, jacobian);
+  if (n == 3) set_block(tape, 0, 4, h, factor, jacobian);
+  else set_block(tape, 0, SIDE_BY_SIDE, h, factor, jacobian);
+  if (n > SIDE_BY_SIDE) set_later_blocks(tape, h, factor, jacobian);
   do {
     if (n == 3) perturb_with(3, 4, v, jacobian, k++);
     else if (n == WITH_ATTITUDE) perturb_with(WITH_ATTITUDE, SIDE_BY_SIDE, v, jacobian, k++);

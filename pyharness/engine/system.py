@@ -1,6 +1,7 @@
 """The equations of motion of a scene with a recorded torque, as one tape."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from pyharness.model.attitude import IDENTITY, quaternion_rates
@@ -19,19 +20,27 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
+    body = scene.euler_coefficients, _divisors(scene)
+    return _system(scene.torque.tape, *body, attitude, len(scene.states))
+
+
+# Recording takes longer than most solutions; a loop over initial states has one system.
+@lru_cache(maxsize=64)
+def _system(
+    tape: Tape, coefficients: Triple, divisors: Triple, attitude: bool, n_states: int
+) -> Tape:
     own = 7 if attitude else 3
-    recorder = Recorder(n_inputs=max(N_INPUTS, 1 + own + len(scene.states)))
+    recorder = Recorder(n_inputs=max(N_INPUTS, 1 + own + n_states))
     time, *unknowns = recorder.inputs()
-    x, y, z, *q = unknowns[: own if scene.states else 7]
-    states = unknowns[own : own + len(scene.states)]
-    torque = torque_of(scene.torque.tape, time, (x, y, z), q or IDENTITY, *states)
+    x, y, z, *q = unknowns[: own if n_states else 7]
+    states = unknowns[own : own + n_states]
+    torque = torque_of(tape, time, (x, y, z), q or IDENTITY, *states)
     rates: list[Any] = [
         coefficient * product + component / moment
         for coefficient, product, component, moment in zip(
-            scene.euler_coefficients, (y * z, z * x, x * y), torque[:3], _divisors(scene),
-            strict=True,
+            coefficients, (y * z, z * x, x * y), torque[:3], divisors, strict=True
         )
-    ]  # fmt: skip
+    ]
     if attitude:
         rates += quaternion_rates((x, y, z), q)
     return recorder.tape([*rates, *torque[3:]])

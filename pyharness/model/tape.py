@@ -101,6 +101,18 @@ class Tape:
         return not self.inputs.isdisjoint(ATTITUDE)
 
     @cached_property
+    def _hash(self) -> int:  # caches have tapes as keys
+        return hash((self.operations, self.outputs, self.n_inputs))
+
+    def __hash__(self) -> int:
+        """Return the hash of the fields."""
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle holds; another process has other hashes."""
+        return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+    @cached_property
     def has_branches(self) -> bool:
         """Whether there is a "select", whose other operand may be singular."""
         return any(each.kind == "select" for each in self.operations)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+import pyharness.engine.system as system_module
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import draw
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.taylor import taylor
 from pyharness.model.codes import Operations
-from pyharness.model.state_torque import replayed
+from pyharness.model.state_torque import recorded, replayed
 
 MOMENTS = (1.0, 2.0, 2.5)
 SPHERE = (2.0, 2.0, 2.0)
@@ -303,3 +304,25 @@ def test_phase_of_a_fast_wave_is_not_rounded() -> None:
     found = solve(scene, 3.0, tolerance=1e-9)
     wanted = 1e4 / frequency * (2.0 * math.sin(0.5 * frequency * 3.0) ** 2)
     assert found.omega[0, 0] == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_loop_over_starts_records_the_equations_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene("", (0.1, 1.0, 0.3), (3.0, 2.0, 1.0), torque=lambda t, w: -0.1 * w)
+    first = solve(scene, 5.0)
+    calls: list[object] = []
+    monkeypatch.setattr(system_module, "torque_of", lambda *given: calls.append(given))
+    assert (solve(scene, 5.0).omega == first.omega).all()
+    solve(replace(scene, omega=(1.0, 0.2, 0.1)), 5.0)
+    assert not calls
+    with pytest.raises(TypeError):
+        solve(replace(scene, moments=(3.0, 2.0, 1.5)), 5.0)
+    assert len(calls) == 1
+
+
+def test_a_pickled_tape_has_no_hash_of_another_process() -> None:
+    tape = recorded(lambda t, w: -0.1 * w).tape
+    assert tape is not None
+    hash(tape)
+    again = pickle.loads(pickle.dumps(tape))
+    assert "_hash" not in vars(again)
+    assert (again, hash(again)) == (tape, hash(tape))

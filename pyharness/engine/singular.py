@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pyharness.model.errors import TimedError
-from pyharness.model.tape import OMEGA, Tape, live_slots, slot_values
+from pyharness.model.tape import OMEGA, WITH_DERIVATIVE, Tape, live_slots, slot_values
 from pyharness.model.tape_arrays import ARRAYS
 
 # An operand vanishes if its ratios to its initial value and to its value before the last step,
@@ -57,15 +57,18 @@ def undefined_operation(
         return not abs(values[slot]) > min(_NEARLY_ZERO * size, _SHRUNK * step)
 
     live = live_slots(tape, lambda slot: None, lambda slot: bool(values[slot]))
+    derivatives = {each.operands[1] for each in tape.operations if each.kind in WITH_DERIVATIVE}
     # What is undefined may be a branch that begins here.
     for slot in [*live, *range(tape.n_inputs, tape.n_inputs + len(tape.operations))]:
         kind, operands, *_ = tape.operations[slot - tape.n_inputs]
+        if slot in derivatives:
+            continue
         if kind == "quotient" and begin != end and values[operands[0]] == earlier[operands[0]] == 0:
             continue
-        if kind == "log" and not values[operands[0]] > 0.0:
+        if kind == "log" and (not values[operands[0]] > 0.0 or vanishes(operands[0])):
             return (
                 "the logarithm or power of a number that becomes 0 or negative; write a smooth "
-                "function, or use a method of SciPy"
+                "function, such as (x**2 + e**2)**(p/2) for abs(x)**p"
             )
         if kind == "sqrt" and (values[operands[0]] < 0.0 or vanishes(operands[0])):
             return (

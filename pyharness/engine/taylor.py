@@ -18,11 +18,10 @@ from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
-from pyharness.model.errors import InputError, TimedError
+from pyharness.model.errors import SLIDING, InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
-from pyharness.model.tape import SLIDING
 from pyharness.model.trajectory import Array, Trajectory
 
 _NO_STATES = np.zeros((1, 1))

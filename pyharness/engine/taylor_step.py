@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 from pyharness.model.codes import Statuses
-from pyharness.model.errors import TimedError
+from pyharness.model.errors import SLIDING, TimedError
 from pyharness.model.extension import COMPLETE, extension
-from pyharness.model.tape import SLIDING
 from pyharness.model.trajectory import Array
 
 # The largest order in fortran/modern/tape_series.f90, plus 1.

@@ -32,6 +32,14 @@ class InputError(ValueError):
         super().__init__(line)
 
 
+# Why an integration ends at a switch.
+SLIDING = (
+    "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
+    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
+    "hold the torque between steps of a Stepper"
+)
+
+
 class TimedError(InputError):
     """An InputError with a time (s), which `slower` converts from rescaled time."""
 

@@ -25,12 +25,8 @@ ATTITUDE = (4, 5, 6, 7)
 N_INPUTS = 8
 # The kinds of operations whose results are constant but where a root of the operand is crossed.
 SWITCHES = ("switch", "floor")
-# Why an integration ends at a switch.
-SLIDING = (
-    "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
-    "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
-    "hold the torque between steps of a Stepper"
-)
+# The kinds whose second operand is their derivative, which series alone need.
+WITH_DERIVATIVE = ("log", "atan", "asin")
 
 
 class Linear(NamedTuple):
@@ -201,12 +197,14 @@ def _result(operation: Operation, values: Sequence[Any], functions: Functions[An
 
 
 def live_slots(
-    tape: Tape, compute: Callable[[int], object], is_true: Callable[[int], bool]
-) -> list[int]:
+    tape: Tape, compute: Callable[[int], object], is_true: Callable[[int], bool],
+    for_series: bool = True,
+) -> list[int]:  # fmt: skip
     """Compute the operations on which the outputs depend, operands first, and return their slots.
 
     Of a "select" they depend on the chosen operand alone; the other may be singular. `compute` is
-    called for each slot, `is_true` for a condition that was computed.
+    called for each slot, `is_true` for a condition that was computed. Only series need the
+    derivatives of `WITH_DERIVATIVE`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -216,7 +214,9 @@ def live_slots(
         if slot not in known:
             operation = tape.operations[slot - tape.n_inputs]
             operands = slots_of(operation)
-            if operation.kind == "select":
+            if operation.kind in WITH_DERIVATIVE and not for_series:
+                operands = operands[:1]
+            elif operation.kind == "select":
                 condition, first, second = operands
                 operands = (condition,)
                 if condition in known:
@@ -300,12 +300,12 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     try:
         found = evaluate(tape, inputs, FLOATS)
     except ZeroDivisionError:
-        if not tape.has_branches:
+        if not any(each.kind in (*WITH_DERIVATIVE, "select") for each in tape.operations):
             raise
     if found and all(map(math.isfinite, found)):
         return found
-    if tape.has_branches:
-        # A branch that is not chosen may be singular.
+    if tape.has_branches or not found:
+        # A branch that is not chosen may be singular, and so may a derivative, as of abs(x)**1.3.
         tape = _without_branches(tape, inputs)
         found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
@@ -331,7 +331,7 @@ def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
     def compute(slot: int) -> None:
         values[slot] = _result(tape.operations[slot - tape.n_inputs], values, FLOATS)
 
-    live = set(live_slots(tape, compute, lambda slot: bool(values[slot])))
+    live = set(live_slots(tape, compute, lambda slot: bool(values[slot]), for_series=False))
     nothing = Operation("linear", (), Linear(0.0, ()))
     kept = enumerate(tape.operations, tape.n_inputs)
     return replace(tape, operations=tuple(each if slot in live else nothing for slot, each in kept))

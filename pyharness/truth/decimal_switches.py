@@ -4,8 +4,7 @@ from decimal import Decimal, getcontext
 
 import numpy as np
 
-from pyharness.model.errors import TimedError
-from pyharness.model.tape import SLIDING
+from pyharness.model.errors import SLIDING, TimedError
 from pyharness.truth.decimal_functions import Row, value_at
 from pyharness.truth.tape_series import TapeSeries
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyharness import InputError, Scene, Stepper, Taylor, prepare, solve, solve_many
+from pyharness import InputError, Scene, Stepper, Taylor, opaque, prepare, solve, solve_many
 from pyharness.model.state_torque import recorded
 from pyharness.truth.reference import reference
 
@@ -501,3 +501,27 @@ def test_switches_that_coincide_by_construction_are_one(tolerance: float) -> Non
     found, truth = (solve(scene, [3.0, 5.0], tolerance=x) for x in (tolerance, 1e-11))
     assert found.ended in ("complete", "sensitive")
     assert np.abs(found.omega - truth.omega).max() < 3.0 * (tolerance + 1e-11)
+
+
+@pytest.mark.parametrize("omega", [(0.2, 0.1, 0.3), (0.2, 0.0, 0.0)])
+def test_broken_powers_at_zero_are_named_and_solved_by_scipy(omega: Any) -> None:
+    def law(t: Any, w: Any) -> Any:
+        return 0.05 * np.cos(t) * np.array([1, 0, 0]) - 0.1 * np.abs(w) ** 1.3 * np.sign(w)
+
+    scene = Scene("", omega, (3.0, 2.0, 1.0), torque=law)
+    found = solve(scene, [1.0, 10.0])
+    assert found.ended == "singular"
+    assert "power of a number that becomes 0" in str(found.reason)
+    assert "(x**2 + e**2)**(p/2)" in str(found.reason)
+    bare = solve(replace(scene, torque=opaque(law)), 10.0)
+    for method in ("dop853", "lsoda"):
+        other = solve(scene, 10.0, method)
+        assert other.ended == "unchecked"
+        assert other.omega == pytest.approx(bare.omega, abs=1e-6)
+    smooth = Scene(
+        "", omega, (3.0, 2.0, 1.0),
+        torque=lambda t, w: (
+            0.05 * np.cos(t) * np.array([1, 0, 0]) - 0.1 * (w**2 + 1e-8) ** 0.65 * np.tanh(w / 1e-4)
+        ),
+    )  # fmt: skip
+    assert solve(smooth, 10.0).omega == pytest.approx(bare.omega, abs=1e-5)

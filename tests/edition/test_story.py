@@ -15,6 +15,7 @@ from pyharness.edition.ledger import assumption
 from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED
+from pyharness.history.figures import TERMS
 from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
@@ -108,7 +109,7 @@ def test_the_points_leave_the_step(slots: Slots) -> None:
     assert (run.ended, run.steps) == ("overflow", step - 1)
     assert slots["points-steps"] == run.steps
     assert slots["points-error"] == _error(6, "two-term", "original", slice(0, 1))
-    for program, terms in story.TERMS.items():
+    for program, terms in TERMS.items():
         fractions = [n / (terms + 1) for n in range(1, terms + 1)]
         assert story.data()["fractions"][program] == fractions
         cards = {card.text.strip() for card in deck(program).cards.values()}

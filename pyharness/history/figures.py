@@ -12,6 +12,7 @@ import numpy as np
 
 from pyharness.history.ablation import case_truth
 from pyharness.history.limits import limit_solution
+from pyharness.model.assumptions import assumption_records, case_mark, legend, mark
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.records import build_record
@@ -99,7 +100,12 @@ class Curve:
     @property
     def label(self) -> str:
         """Return the curve's label in a legend: the program, and any early end."""
-        return self.listing.program + (f" ({self.ending})" if self.ending else "")
+        return self.listing.program + self.end_note
+
+    @property
+    def end_note(self) -> str:
+        """Return the early end in parentheses, or ""."""
+        return f" ({self.ending})" if self.ending else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,13 +155,25 @@ def figures_report(findings: Sequence[FigureFinding]) -> Report:
     """Return the report on the drawn files, with a line for each figure."""
     rows = []
     for each in findings:
-        curves = ", ".join(curve.label for curve in each.curves)
-        rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", each.plan.case, curves])
+        curves = ", ".join(
+            f"{curve.listing.program}{mark(each.scene, curve.listing)}{curve.end_note}"
+            for curve in each.curves
+        )
+        case = f"{each.plan.case}{case_mark(each.plan.case)}"
+        rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", case, curves])
     return Report(
         "figures",
-        text=[[Table(words("files case curves"), rows)]],
-        record=lambda: {"figures": list(map(_record, findings)), "build": build_record()},
+        text=[[Table(words("files case curves"), rows)], legend(list(map(_runs, findings)))],
+        record=lambda: {
+            "figures": list(map(_record, findings)),
+            "build": build_record(),
+            "assumptions": assumption_records(map(_runs, findings)),
+        },
     )
+
+
+def _runs(finding: FigureFinding) -> tuple[Scene, list[Listing]]:
+    return finding.scene, [curve.listing for curve in finding.curves]
 
 
 def _record(finding: FigureFinding) -> dict[str, Any]:

@@ -135,5 +135,5 @@ def test_the_legend_of_several_cases_names_those_of_each_assumption() -> None:
 
 
 def test_the_sign_is_printed_by_every_terminal() -> None:
-    assert ASSUMED == f"{MARK} assumed"
+    assert f"{MARK} assumed" == ASSUMED
     assert ASSUMED.isascii()

@@ -100,12 +100,7 @@ class Curve:
     @property
     def label(self) -> str:
         """Return the curve's label in a legend: the program, and any early end."""
-        return self.listing.program + self.end_note
-
-    @property
-    def end_note(self) -> str:
-        """Return the early end in parentheses, or ""."""
-        return f" ({self.ending})" if self.ending else ""
+        return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +150,9 @@ def figures_report(findings: Sequence[FigureFinding]) -> Report:
     """Return the report on the drawn files, with a line for each figure."""
     rows = []
     for each in findings:
-        curves = ", ".join(
-            f"{curve.listing.program}{mark(each.scene, curve.listing)}{curve.end_note}"
-            for curve in each.curves
-        )
-        case = f"{each.plan.case}{case_mark(each.plan.case)}"
+        curves = ", ".join(curve.label for curve in each.curves)
+        on_cards = (mark(each.scene, curve.listing) for curve in each.curves)
+        case = f"{each.plan.case}{max(case_mark(each.plan.case), *on_cards)}"
         rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", case, curves])
     return Report(
         "figures",

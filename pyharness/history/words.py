@@ -171,7 +171,7 @@ def words_report(cells: Sequence[WordCell]) -> Report:
             _errors(cells),
         ],
     ]
-    notes: list[str] = []
+    notes = legend(_scenes(cells))
     if all(cell.find_run(p, rule) for cell in cells for _, p, rule in _MACHINE):
         heads = (
             "fields: numbers on the printed page, in binary64. cdc48, rounded: how many of them "
@@ -179,8 +179,8 @@ def words_report(cells: Sequence[WordCell]) -> Report:
             "which the run ended. error: largest error of w (rad/s):"
         )
         tables.insert(0, [heads, _machine(cells)])
-        notes = _changes(cells)
-    tables += [legend(_scenes(cells)), notes]
+        notes += _changes(cells)
+    tables.append(notes)
 
     return Report(
         "words",

@@ -190,7 +190,11 @@ def test_list_of_files(capsys: Capture, tmp_path: Path, monkeypatch: pytest.Monk
     assert main(["figures", "--out", str(tmp_path)]) == 0
     captured = capsys.readouterr()
     lines = captured.out.splitlines()
-    assert (captured.err, len(lines)) == ("", 1 + len(ALL))
+    assert (captured.err, lines.index("")) == ("", 1 + len(ALL))
+    cases = [line.split()[1] for line in lines[1 : 1 + len(ALL)]]
+    assert cases[:8] == ["1*", "2*", "3*", "4*", "5*", "5", "6*", "7*"]
+    assert cases[8:] == ["1*", "2", "3*", "4*", "5", "5", "6*", "7*"]
+    assert lines[2 + len(ALL)].startswith("* assumed: omega(0), ours (Case 1)")
     assert max(map(len, lines)) <= 100
     assert "runge-kutta (stopped at step 25 by V2)" in lines[2]
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)

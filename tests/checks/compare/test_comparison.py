@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
+from pyharness.checks.compare import candidates
 from pyharness.checks.compare import comparison as room
 from pyharness.checks.compare import report as report_module
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
@@ -60,7 +61,7 @@ def test_methods_run_only_where_they_are_shown(
     case_2: Comparison, printed: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran: list[str] = []
-    candidate = room.method_candidate
+    candidate = candidates.method_candidate
 
     def recorded(name: str, *rest: Any) -> Any:
         ran.append(name)

@@ -206,7 +206,7 @@ def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
     """Return marks on the curves of omega1 over time, at other steps on each curve."""
     return [
         _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
-        for first, (name, run) in zip((9, 4, 14), runs.items(), strict=True)
+        for first, (name, run) in zip((7, 4, 12), runs.items(), strict=True)
     ]
 
 

@@ -232,3 +232,13 @@ def test_the_name_of_the_edition_is_everywhere(built_site: dict[str, bytes]) -> 
     loaded = {path for element, path, _ in targets if element != "a"}
     assert "assets/story.js" in loaded
     assert sum(len(built_site[path]) for path in {"index.html", *loaded}) < 150e3
+
+
+def test_marks_on_curves_are_whole() -> None:
+    """A mark has a radius of 4.5 units, and what is outside of the plot is not drawn."""
+    left, _, right, _ = story.BOX
+    marks = story.context()["charts"]["claim"].marks
+    assert len(marks) == len(story.LETTERS)
+    for each in marks:
+        across = [float(point.split(",")[0]) for point in each.points.split()]
+        assert left + 4.5 <= min(across) < max(across) <= right - 4.5

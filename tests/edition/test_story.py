@@ -16,6 +16,7 @@ from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED
 from pyharness.history.figures import TERMS
+from pyharness.model import assumptions
 from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
@@ -136,6 +137,13 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
         told = " ".join(html.unescape(built_site[f"{page}.html"].decode()).split())
         assert told.count("* assumed") >= 2, page
         assert text in told
+    assert assumption(2, ["runge-kutta"]).startswith("I after the DO loop")
+    assert assumption(2, ["runge-kutta"], "corrected") == ""
+    for scene in ("claim", "half-speed", "blind", "points", "corrected"):
+        part = (
+            built_site["index.html"].decode().partition(f'<section class="scene" id="{scene}"')[2]
+        )
+        assert "* assumed" in part.partition("</section>")[0], scene
     # From both starts that the thesis shows, Case 1 ends before.
     home = " ".join(built_site["index.html"].decode().split())
     steps = []
@@ -144,9 +152,18 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
         steps.append(run.steps)
     assert f"at steps {steps[0]} and {steps[1]}." in home
     figures = built_site["figures.html"].decode().split("<figcaption>")[1:]
-    for caption in figures:
-        (case,) = set(re.findall(r"laboratory.html#case=(\d)", caption.partition("</fig")[0]))
-        assert ("* assumed" in caption.partition("</fig")[0]) == (int(case) in assumed)
+    for part in figures:
+        caption = part.partition("</fig")[0]
+        address = r"laboratory.html#case=(\d)&amp;program=([\w-]+)&amp;listing=(\w+)"
+        runs = re.findall(address, caption)
+        on = {
+            each["on"]
+            for case, program, base in runs
+            for each in assumptions.assumed(case_scene(int(case)), [subset(program, base)])
+        }
+        assert ("* assumed" in caption) == bool(on & {"omega", "listing"})
+        # A start that we supply is told as such.
+        assert ("its initial omega" in caption) == (int(runs[0][0]) in assumed)
     claims = built_site["claims.html"].decode()
     for each in judgements():
         line = claims.partition(f'id="{each.claim["id"]}"')[2].partition("</summary>")[0]

@@ -162,7 +162,7 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
             for each in assumptions.assumed(case_scene(int(case)), [subset(program, base)])
         }
         assert ("* assumed" in caption) == bool(on & {"omega", "listing"})
-        # A start that we supply is told as such.
+        # The caption names a start that we supply.
         assert ("its initial omega" in caption) == (int(runs[0][0]) in assumed)
     claims = built_site["claims.html"].decode()
     for each in judgements():

@@ -130,11 +130,12 @@ def test_links_and_pictures_are_there() -> None:
 def test_pictures_of_the_report_are_current() -> None:
     """The stored numbers beside each picture are those of today, digit for digit."""
     stored = sorted((ROOT / "docs/figures").glob("figure-*.csv"))
-    assert len(stored) == 4
+    assert len(stored) == 5
     found = {each.plan.stem: each for each in figures.findings()}
     numbers = {name: figures.curve_numbers(each) for name, each in found.items()}
     together = figures.together_picture(found["figure-07"], found["figure-07-corrected"])
     numbers["figure-07-together"] = together.numbers
+    numbers["figure-points"] = figures.points_picture().numbers
     for path in stored:
         assert csv_text(numbers[path.stem]) == path.read_text(), path.name
         assert path.with_suffix(".svg").exists()

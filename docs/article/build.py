@@ -1,8 +1,9 @@
 """The article: its template, filled with computed values.
 
 ``python -m docs.article.build``, in a checkout, writes `article.md` and `metadata.yaml` beside this
-file. The texts are in the templates `article.md.in` and `metadata.yaml.in`, the values come from
-`values.py`, and the references from `bibliography.bib`.
+file, and the picture of the collocation points to the folder `docs/figures`. The texts are in the
+templates `article.md.in` and `metadata.yaml.in`, the values come from `values.py`, and the
+references from `bibliography.bib`.
 """
 
 import re
@@ -14,9 +15,11 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from docs.article.values import values
+from pyharness.history.figures import points_picture
+from pyharness.views.pictures import saved
 
 HERE = Path(__file__).parent
-ARTICLE, METADATA = "article.md", "metadata.yaml"
+ARTICLE, METADATA, POINTS = "article.md", "metadata.yaml", "figure-points.svg"
 _WIDTH = 120
 # A blank within code, a formula or a link must not become the end of a line.
 _WHOLE = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^]]*\]\([^)]*\)")
@@ -97,7 +100,9 @@ def _template(name: str) -> str:
 
 
 def main() -> None:
-    """Write the article and its metadata."""
+    """Write the article, its metadata and the picture of the collocation points."""
+    for name, file in saved(points_picture(), POINTS).items():
+        (HERE.parent / "figures" / name).write_bytes(file)
     for name, text in built(values()).items():
         (HERE / name).write_text(text, encoding="utf-8")
 

@@ -56,6 +56,7 @@ def values() -> dict[str, Any]:
             "step_size": prose(cases["deck"]["step_size"]),
             "small_step": prose(cases["deck"]["step_size"] / _FINER),
             "constant": prose(cases["deck"]["lipschitz"]),
+            "product": prose(cases["deck"]["step_size"] * max(_norms(range(2, 6))), 2),
         },
         "cards": _cards(),
         "entries": _certainties(),
@@ -159,7 +160,6 @@ def _switched() -> list[dict[str, Any]]:
 def _faults() -> dict[str, Any]:
     named = {
         each["id"].replace("-", "_"): {
-            "cards": "; ".join(f"{program} {cards}" for program, cards in each["cards"].items()),
             "numbers": "; ".join(each["cards"].values()),
             "original": each["original"],
             "corrected": each["corrected"],
@@ -272,11 +272,7 @@ def _share_of_largest(case: int) -> str:
 
 def _stop_test() -> dict[str, str]:
     bound = "case *: largest quotient over *"
-    lab = Laboratory(True)
-    *most, last = (
-        prose(np.linalg.norm(jacobians(lab.scene(n), lab.truth(n).omega), 2, axis=(1, 2)).max())
-        for n in range(2, 7)
-    )
+    *most, last = map(prose, _norms(range(2, 7)))
     return {
         "original": _number("ii5-divergence", "original", bound),
         "corrected": _number("ii5-divergence", "corrected", bound),
@@ -284,6 +280,13 @@ def _stop_test() -> dict[str, str]:
         "stopped": _number("iv3-guard", "original", "bounded runs stopped"),
         "needed": _number("iv3-constant-500", "corrected", "case *: constant needed (1/s)"),
     }
+
+
+def _norms(cases: Iterable[int]) -> list[float]:
+    """Return the largest norm of the Jacobian along the solution of each case (1/s)."""
+    lab = Laboratory(True)
+    found = (jacobians(lab.scene(n), lab.truth(n).omega) for n in cases)
+    return [float(np.linalg.norm(each, 2, axis=(1, 2)).max()) for each in found]
 
 
 def _machine() -> dict[str, str]:
@@ -341,27 +344,36 @@ def _faults_table() -> str:
         found = list(effects_of(each["id"]))
         for program in each["programs"]:
             of_program = [effects for effects in found if effects.program == program]
-            rows.append(_effects_row(f"`{each['id']}`", program, of_program))
+            rows.append(
+                _effects_row(f"`{each['id']}`", program, of_program, each["cards"][program])
+            )
     every = list(effects_of("three-masses"))  # a fault that all programs have
     for program in PROGRAMS:
         of_program = [effects for effects in every if effects.program == program]
-        rows.append(_effects_row("none", program, of_program, corrected=True))
+        rows.append(_effects_row("none", program, of_program))
     heads = (
-        "fault", "program", f"omega, Case {FAULTS_CASE} (rad/s)",
+        "fault", "program", "cards", f"omega, Case {FAULTS_CASE} (rad/s)",
         f"velocity, Case {FAULTS_CASE} (m/s)", "cases that stop",
     )  # fmt: skip
     return _table(heads, rows)
 
 
 def _effects_row(
-    fault: str, program: str, found: Sequence[CaseEffects], corrected: bool = False
+    fault: str, program: str, found: Sequence[CaseEffects], cards: str = ""
 ) -> list[Any]:
-    outcomes = {each.case: each.corrected if corrected else each.kept_alone for each in found}
+    outcomes = {each.case: each.kept_alone if cards else each.corrected for each in found}
     shown = outcomes[FAULTS_CASE]
     stopped = sum(each.stop is not None for each in outcomes.values())
     can_stop = program == "runge-kutta"
     count = f"{stopped} of {len(outcomes)}" if can_stop else "-"
-    return [fault, TITLES[program], prose(shown.omega, 2), prose(shown.velocity, 2), count]
+    return [
+        fault,
+        TITLES[program],
+        cards or "-",
+        prose(shown.omega, 2),
+        prose(shown.velocity, 2),
+        count,
+    ]
 
 
 def _errors_table() -> str:

@@ -35,6 +35,8 @@ def errors(case: object, quantity: str) -> dict[tuple[str, str], float]:
 
 runs = {(row["case"], row["program"], row["listing"]): row for row in table("runs/runs.csv")}
 
+entries = json.loads((package / "apparatus.json").read_bytes())["entries"]
+cards_of = {entry["id"]: entry["cards"] for entry in entries}
 omega, velocity = errors(5, "omega"), errors(5, "velocity")
 listings = [run for run in omega if run[1] not in ("original", "corrected")]
 for program, listing in listings + [(program, "corrected") for program in programs]:
@@ -45,8 +47,9 @@ for program, listing in listings + [(program, "corrected") for program in progra
     ]
     stops = f"{ends.count('stopped')} of {len(ends)}" if program == "runge-kutta" else "-"
     fault = "none" if listing == "corrected" else listing
+    cards = cards_of[listing][program] if listing in cards_of else "-"
     errors_5 = f"{omega[program, listing]:.2g} | {velocity[program, listing]:.2g}"
-    print(f"B | {fault} | {program} | {errors_5} | {stops}")
+    print(f"B | {fault} | {program} | {cards} | {errors_5} | {stops}")
 
 for case in "1234567":
     omega, cells = errors(case, "omega"), []

@@ -10,7 +10,7 @@ import numpy as np
 
 from pyharness.checks.port_protocol import requested_scene
 from pyharness.edition.ledger import assumption
-from pyharness.model.assumptions import MARK
+from pyharness.model.assumptions import MARK, assumed
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, flagged, switches
 from pyharness.model.report import short
@@ -61,6 +61,17 @@ def data() -> dict[str, Any]:
     return {
         "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
         "assumed": {number: assumption(number) for number in case_numbers()},
+        "assumedInRuns": {
+            number: {
+                program: [
+                    {"entry": each["entry"], "active": each["active"], "what": each["what"]}
+                    for each in assumed(case_scene(number), [Listing.original(program)])
+                    if each["on"] == "listing"
+                ]
+                for program in PROGRAMS
+            }
+            for number in case_numbers()
+        },
         "headings": {number: _described(case_scene(number)) for number in case_numbers()},
         "programs": list(PROGRAMS),
         "flags": [

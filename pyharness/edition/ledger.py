@@ -6,7 +6,7 @@ and corrected programs; `judged` has the judgements of all claims, `told` those 
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
@@ -18,8 +18,8 @@ from pyharness.history.claims.ledger import Judgement
 from pyharness.history.claims.report import KINDS
 from pyharness.history.claims.stories import Sentence, Story, sentences, story
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
-from pyharness.history.figures import FigureFinding, figure_picture, together_picture
-from pyharness.model.assumptions import open_starts
+from pyharness.history.figures import SETS, FigureFinding, figure_picture, together_picture
+from pyharness.model.assumptions import assumed, open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
 from pyharness.model.report import Column, Table
@@ -79,10 +79,13 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
     return [("", original if judgement.claim["kind"] == "design" else corrected)]
 
 
-def assumption(case: int) -> str:
-    """Return what we supply in a case of Table 1, or an empty text."""
+def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
+    """Return what we supply in a case of Table 1 and in runs of programs, or an empty text."""
     found = ["its initial omega"] if case in open_starts() else []
-    return " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
+    start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
+    among = assumed(case_scene(case), map(SETS[listing], programs))
+    on_cards = [each["what"] for each in among if each["on"] == "listing"]
+    return "; ".join([*filter(None, [start]), *on_cards])
 
 
 def counted(judged: Sequence[Judgement]) -> str:

@@ -37,6 +37,7 @@ from pyharness.history.identifiers import DATA, data_identifier, text_digest
 from pyharness.history.origins import disagreements
 from pyharness.history.tei import tei_document
 from pyharness.history.timeline import timeline
+from pyharness.model.assumptions import ASSUMED
 from pyharness.model.facts import facts, shipped
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
@@ -271,5 +272,6 @@ def _templates() -> Environment:
     templates.globals["inline"] = inline
     templates.globals["verdicts"] = ledger.verdicts
     templates.globals["assumption"] = ledger.assumption
+    templates.globals["ASSUMED"] = ASSUMED
     templates.globals["supplied"] = ledger.account()["supplied"]
     return templates

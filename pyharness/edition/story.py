@@ -17,6 +17,7 @@ from pyharness.edition.decks import TITLES
 from pyharness.history.ablation import case_truth
 from pyharness.history.claims.laboratory import starts
 from pyharness.history.claims.stories import power_of_ten
+from pyharness.history.figures import TERMS
 from pyharness.history.limits import limit_solution
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, switches
@@ -30,9 +31,7 @@ BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # The plot area of every chart in its units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-# The terms of the trial functions, and the step that is shown at first: the two-term program
-# overflows in it.
-TERMS = {"two-term": 2, "four-term": 4}
+# The step that is shown at first: the two-term program overflows in it.
 POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
@@ -207,7 +206,7 @@ def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
     """Return marks on the curves of omega1 over time, at other steps on each curve."""
     return [
         _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
-        for first, (name, run) in zip((9, 4, 14), runs.items(), strict=True)
+        for first, (name, run) in zip((7, 4, 12), runs.items(), strict=True)
     ]
 
 

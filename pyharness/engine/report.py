@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
@@ -101,6 +102,7 @@ def trajectory_report(
             **({} if bound is None else {"reference_bound": bound.record()}),
             **records.ending_record(trajectory),
             "build": records.build_record(),
+            "assumptions": assumption_records([(scene, [listing] if listing else [])]),
         }
 
     return Report(
@@ -178,7 +180,8 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
 
         decisions = [asdict(each) for each in plan.decisions]
         found = {"method": plan.method, "closed_form": plan.closed_form, "decisions": decisions}
-        return {"scene": scene_record(scene), "plan": found}
+        supplied = assumption_records([(scene, [])])
+        return {"scene": scene_record(scene), "plan": found, "assumptions": supplied}
 
     head = [*heading(scene), f"method: {plan.method}"]
     return Report("plan", text=[head, [table]], record=record, data=table)

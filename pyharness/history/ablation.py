@@ -11,7 +11,7 @@ from typing import Any
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.history.cards_report import HALF, beside
-from pyharness.model.assumptions import MARK, open_starts
+from pyharness.model.assumptions import ASSUMED, assumption_records, case_mark
 from pyharness.model.effort import check_steps
 from pyharness.model.errors import unknown
 from pyharness.model.facts import facts
@@ -212,6 +212,10 @@ def entry_report(
                 | {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
                 for each in effects
             ],
+            "assumptions": assumption_records(
+                (case_scene(each.case), [getattr(each, name).listing for name in _LISTINGS])
+                for each in effects
+            ),
         },
     )
 
@@ -225,14 +229,14 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
         [
             "Effect, measured now over 100 steps. w: largest error of the angular velocity "
             "(rad/s) up to the end of the run; V: of the velocity (m/s); stop: variable and step "
-            f"that ended the run; {MARK}: omega(0) of the case is assumed.",
+            f"that ended the run; {ASSUMED}: omega(0) of the case.",
             ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
         ]
     ]
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
         for each in (each for each in effects if each.program == program):
-            row: list[Any] = [f"{each.case}{MARK if each.case in open_starts() else ''}"]
+            row: list[Any] = [f"{each.case}{case_mark(each.case)}"]
             for found in (getattr(each, name) for name in _LISTINGS):
                 row += [found.omega, found.velocity, _stop(found)]
             rows.append(row)
@@ -278,6 +282,9 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
         record=lambda: {
             "scene": scene_record(scene),
             "lattice": {name: list(map(_subset_record, each)) for name, each in found.items()},
+            "assumptions": assumption_records(
+                [(scene, [effect.listing for each in found.values() for effect in each])]
+            ),
         },
         data=numbers(
             "program active error_w error_v steps ended stop_variable common_error_w "

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from pyharness.checks.theory.tableau import basis, grid, tableau
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record, scene_record
@@ -352,6 +353,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
             ],
             "unexpected": _unexpected(found),
             "build": build_record(),
+            "assumptions": assumption_records([(scene, [])]),
         },
         data=numbers("weighting points terms corrections predicted measured settled error", data),
         page=page,

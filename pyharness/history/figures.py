@@ -12,6 +12,7 @@ import numpy as np
 
 from pyharness.history.ablation import case_truth
 from pyharness.history.limits import limit_solution
+from pyharness.model.assumptions import assumption_records, case_mark, legend, mark
 from pyharness.model.facts import facts
 from pyharness.model.listing import Listing
 from pyharness.model.records import build_record
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 SETS = {"original": Listing.original, "corrected": Listing.corrected}
 ENDINGS = ("svg", "png", "csv")
+# The collocation programs, with the terms after x(0) of their trial functions.
+TERMS = {"two-term": 2, "four-term": 4}
+_POINTS_STEPS = 10
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
 # Dash, width, marker and marker position distinguish the curves without colour.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
@@ -147,12 +151,22 @@ def figures_report(findings: Sequence[FigureFinding]) -> Report:
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
-        rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", each.plan.case, curves])
+        on_cards = (mark(each.scene, curve.listing) for curve in each.curves)
+        case = f"{each.plan.case}{max(case_mark(each.plan.case), *on_cards)}"
+        rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", case, curves])
     return Report(
         "figures",
-        text=[[Table(words("files case curves"), rows)]],
-        record=lambda: {"figures": list(map(_record, findings)), "build": build_record()},
+        text=[[Table(words("files case curves"), rows)], legend(list(map(_runs, findings)))],
+        record=lambda: {
+            "figures": list(map(_record, findings)),
+            "build": build_record(),
+            "assumptions": assumption_records(map(_runs, findings)),
+        },
     )
+
+
+def _runs(finding: FigureFinding) -> tuple[Scene, list[Listing]]:
+    return finding.scene, [curve.listing for curve in finding.curves]
 
 
 def _record(finding: FigureFinding) -> dict[str, Any]:
@@ -249,6 +263,36 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
     own = [row for row in curve_numbers(second).rows if row[1]]
     return Picture(figure, numbers(_NUMBERS, [*curve_numbers(first).rows, *own]))
+
+
+def points_picture() -> Picture:
+    """Return a picture of the collocation points of each printed program in the first steps.
+
+    A row is a step; a grey band is the step itself. Times are in s after its beginning.
+    """
+    from matplotlib.figure import Figure
+
+    scene = case_scene(2)  # the points are the same in every case
+    figure = Figure(figsize=(7.2, 3.2), dpi=110, layout="constrained")
+    both = figure.subplots(1, len(TERMS), sharex=True, sharey=True)
+    rows: list[list[Any]] = []
+    for axes, (program, terms) in zip(both, TERMS.items(), strict=True):
+        run = run_program(scene, Listing.original(program))
+        # What DT is in each step, because TIME=TIME+DT.
+        dt = np.diff(_from_zero(run.recorded_time[:_POINTS_STEPS]))
+        color, _, _, marker, _ = _STYLES[program]
+        axes.axvspan(0.0, scene.step_size, color="#d8d8d8", linewidth=0.0)
+        for step, length in enumerate(dt.tolist(), 1):
+            points = [n * length / (terms + 1) for n in range(1, terms + 1)]
+            axes.plot(points, [step] * terms, color=color, marker=marker, linewidth=0.5, **_MARKERS)
+            rows += [[program, step, n, point] for n, point in enumerate(points, 1)]
+        axes.set_title(program, fontsize=10)
+        axes.set_xlabel("time after the beginning of the step (s)")
+        axes.set_yticks(range(1, _POINTS_STEPS + 1))
+    both[0].set_xlim(0.0, 1.03 * max(point for *_, point in rows))
+    both[0].set_ylabel("step")
+    both[0].invert_yaxis()
+    return Picture(figure, numbers("program step point time", rows))
 
 
 def _draw_known(axes: "Axes", finding: FigureFinding, row: int) -> None:

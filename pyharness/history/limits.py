@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
@@ -259,6 +260,9 @@ def limits_report(
             "scene": scene_record(scene),
             "limits": [asdict(each) for each in found],
             "invisible": {name: list(each) for name, each in invisible.items()},
+            "assumptions": assumption_records(
+                [(scene, [Listing.original(each.program) for each in found])]
+            ),
         },
         data=Table((Column("program"), *_COLUMNS), data),
     )

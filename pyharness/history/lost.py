@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import polynomial
 
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.facts import facts
 from pyharness.model.functions import is_finite
 from pyharness.model.report import Column, Report, Section, Table, short, words
@@ -226,6 +227,9 @@ def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
     return Report(
         "family",
         text,
-        record=lambda: {"lost": [asdict(each) for each in found]},
+        record=lambda: {
+            "lost": [asdict(each) for each in found],
+            "assumptions": assumption_records((case_scene(case), []) for case in CASES),
+        },
         data=Table(_TABLE, rows),
     )

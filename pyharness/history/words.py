@@ -11,6 +11,7 @@ from itertools import product, takewhile, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.checks.compare.agreement import accuracy
+from pyharness.model.assumptions import assumption_records, case_mark, legend, mark
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
@@ -25,6 +26,7 @@ from pyharness.model.report import (
     short,
     words,
 )
+from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis import in_word
@@ -169,22 +171,23 @@ def words_report(cells: Sequence[WordCell]) -> Report:
             _errors(cells),
         ],
     ]
-    notes: list[str] = []
+    notes = legend(_scenes(cells))
     if all(cell.find_run(p, rule) for cell in cells for _, p, rule in _MACHINE):
-        legend = (
+        heads = (
             "fields: numbers on the printed page, in binary64. cdc48, rounded: how many of them "
             "differ in the CDC's arithmetic, unrounded and rounded. stop: variable and step at "
             "which the run ended. error: largest error of w (rad/s):"
         )
-        tables.insert(0, [legend, _machine(cells)])
-        notes = _changes(cells)
+        tables.insert(0, [heads, _machine(cells)])
+        notes += _changes(cells)
+    tables.append(notes)
 
     return Report(
         "words",
-        text=[*tables, notes],
-        record=lambda: {"runs": [run._asdict() for run in runs], "build": build_record()},
+        text=tables,
+        record=lambda: _record(runs, cells),
         data=data,
-        page=[*tables, notes],
+        page=tables,
         pictures={"words": partial(_picture, cells, data)},
     )
 
@@ -205,12 +208,31 @@ def machine_report(cells: Sequence[WordCell]) -> Report:
         f"errors above {short(_VISIBLE)} rad/s change by at most {short(largest)} of themselves; "
         "--lengths shows each run",
     ]
-    record = {"runs": [run._asdict() for _, run in runs], "build": build_record()}
-    return Report("words", [told], lambda: record)
+    return Report("words", [told], lambda: _record([run for _, run in runs], cells))
+
+
+def _record(runs: Sequence[WordRun], cells: Sequence[WordCell]) -> dict[str, Any]:
+    return {
+        "runs": [run._asdict() for run in runs],
+        "build": build_record(),
+        "assumptions": assumption_records(_scenes(cells)),
+    }
+
+
+def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
+    return [(case_scene(cell.double.case), [_listing(cell)]) for cell in cells]
+
+
+def _listing(cell: WordCell) -> Listing:
+    is_original = cell.double.listing == "original"
+    return (Listing.original if is_original else Listing.corrected)(cell.double.program)
 
 
 def _head(cell: WordCell) -> list[Any]:
-    return [cell.double.case, cell.double.program, cell.double.listing]
+    """Return case, program and listing, with marks on what is assumed."""
+    case, program, listing, *_ = cell.double
+    on_cards = mark(case_scene(case), _listing(cell))
+    return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]
 
 
 def _machine(cells: Sequence[WordCell]) -> Table:

@@ -8,7 +8,13 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 
 MARK = "*"
-"""The sign on a number that is assumed."""
+"""The sign on a number that is assumed, in commands and pages; every terminal has it."""
+
+ASSUMED = f"{MARK} assumed"
+"""The sign with its word."""
+
+Runs = Iterable[tuple[Scene, Iterable[Listing]]]
+"""Scenes, each with the listings that ran in it."""
 
 
 def assumptions() -> list[dict[str, Any]]:
@@ -57,8 +63,39 @@ def mark(scene: Scene, listing: Listing) -> str:
     return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
 
 
-def legend(scene: Scene, found: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the line that explains the marks; none without an assumption."""
-    start = open_starts().get(scene.case or 0, "")
-    told = "; ".join(each["what"].format(start=start) for each in found)
-    return [f"{MARK} assumed: {told}"] if told else []
+def case_mark(case: int) -> str:
+    """Return `MARK` if omega(0) of a case is assumed, else ""."""
+    return MARK if case in open_starts() else ""
+
+
+def assumption_records(runs: Runs) -> list[dict[str, Any]]:
+    """Return for JSON the assumptions on which runs depend, each with the runs' cases."""
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for scene, listings in runs:
+        for each in assumed(scene, listings):
+            what = each["what"].format(start=open_starts().get(scene.case or 0, ""))
+            cases = found.setdefault((each["id"], what), _record(each, what))["cases"]
+            if scene.case not in cases:
+                cases.append(scene.case)
+    order = [each["id"] for each in assumptions()]
+    return sorted(found.values(), key=lambda each: order.index(each["id"]))
+
+
+def claim_records() -> list[dict[str, Any]]:
+    """Return for JSON the assumptions of claims alone, without a case."""
+    return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
+
+
+def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
+    return {"id": each["id"], "what": what, "cases": [], "source": each["source"]}
+
+
+def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
+    """Return the line that explains the marks of runs; none without an assumption."""
+    every = {scene.case for scene, _ in runs}
+    told = []
+    for each in assumption_records(runs):
+        cases = each["cases"]
+        named = f" (Case{'s' * (len(cases) > 1)} {', '.join(map(str, cases))})"
+        told.append(each["what"] + named * (set(cases) != every))
+    return [f"{ASSUMED}: {'; '.join(told)}"] if told else []

@@ -38,7 +38,8 @@ def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
         torque = _state_torque(scene.torque, unit)
     else:
         torque = "no torque" if scene.torque.is_zero else f"N = {_law_phrase(scene.torque, unit)}"
-    found = assumed(scene, listings)
+    among = list(listings)
+    found = assumed(scene, among)
     on_omega, on_steps = (
         MARK if any(each["on"] == part for each in found) else "" for part in ("omega", "steps")
     )
@@ -47,7 +48,7 @@ def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
         f"Case {scene.case}: {scene.name}" if scene.case else scene.name,
         f"{body}; {torque}; omega(0) = {_tuple(scene.omega)}{on_omega} rad/s; "
         f"{number}{on_steps} {noun} of {scene.step_size:g} s",
-        *legend(scene, found),
+        *legend([(scene, among)]),
     ]
     if scene.is_impossible:
         lines.append("no rigid body has these moments: the largest exceeds the sum of the others")

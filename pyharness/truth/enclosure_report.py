@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.records import scene_record
 from pyharness.model.report import Column, Report, Section, Table, counted, short, words
 from pyharness.model.scene import Scene
@@ -43,6 +44,7 @@ def enclosure_report(scene: Scene, digits: int, found: Enclosure) -> Report:
             "how": found.how,
             "steps": found.steps,
             "rows": rows,
+            "assumptions": assumption_records([(scene, [])]),
         },
         data=Table(columns, lines),
     )

@@ -301,6 +301,13 @@ def test_some_faults_are_a_state_of_their_own(browser: Chrome, laboratory: Open)
         Select(browser.find_element(By.ID, "case")).select_by_value(str(case))
         assert text_of(browser, "assumed-what") == told
         assert browser.find_element(By.ID, "assumed-case").is_displayed() == (told != "")
+    # So is what a run of the printed cards depends on.
+    laboratory("#case=2&program=runge-kutta&listing=original")
+    assert text_of(browser, "assumed-what") == "I after the DO loop of runge-kutta, its last value"
+    laboratory("#case=3&program=runge-kutta&listing=original")
+    assert text_of(browser, "assumed-what").startswith("its initial omega; I after the DO loop")
+    laboratory("#case=3&program=two-term&listing=original")
+    assert text_of(browser, "assumed-what").endswith("C, not C1, on card 770 of two-term")
     laboratory("#case=3&program=runge-kutta&listing=original&omega0=1,2,3")
     assert not browser.find_element(By.ID, "assumed-case").is_displayed()
 

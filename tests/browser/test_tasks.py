@@ -58,5 +58,5 @@ def test_a_reader_needs_one_click_or_two(browser: Chrome, site: Path) -> None:
         assert "the initial omega of Cases 1, 3, 4, 6 and 7" in _seen(browser, ".assumed-legend")
         _go(browser, "Thesis and claims")
         _go(browser, "Figures")
-        assert "△ assumed" in _seen(browser, "#figure-08 figcaption")
-        assert "△ assumed" not in _seen(browser, "#figure-07 figcaption")
+        assert "* assumed" in _seen(browser, "#figure-08 figcaption")
+        assert "* assumed" not in _seen(browser, "#figure-10b figcaption")

@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 from selenium.webdriver import Chrome
 
-from tests.browser.screen import errors, on_paper, screen
+from pyharness.edition import ledger
+from pyharness.history.ablation import entries
+from tests.browser.screen import errors, on_paper, screen, without_scripts
 
 _OPEN = """
 const [id] = arguments, named = document.getElementById(id);
@@ -124,3 +126,31 @@ def test_claims_and_apparatus_are_short(browser: Chrome, site: Path, page: str, 
     with screen(browser, 360):
         height = browser.execute_script("return document.documentElement.scrollHeight")
         assert height < 10000
+
+
+@pytest.mark.campaign
+def test_the_apparatus_shows_the_entries_of_a_program_when_it_is_opened(
+    browser: Chrome, site: Path
+) -> None:
+    page = (site / "apparatus.html").as_uri()
+    shown = (
+        "return [...document.querySelectorAll('.entry')]"
+        ".filter((each) => each.checkVisibility()).length"
+    )
+    with screen(browser, 360):
+        browser.get(page)
+        assert browser.execute_script(shown) == 0
+        assert browser.execute_script("return document.documentElement.scrollHeight") < 2500
+        browser.find_element("css selector", "#of-runge-kutta > summary").click()
+        assert browser.execute_script(shown) == len(ledger.apparatus()["runge-kutta"]) > 10
+    # An address opens the group of its entry; without scripts the browser does.
+    for entry in ("stage-base", "three-masses"):
+        browser.get("about:blank")
+        browser.get(f"{page}#{entry}")
+        assert browser.find_element("id", entry).is_displayed()
+    with without_scripts(browser):
+        browser.get("about:blank")
+        browser.get(f"{page}#stage-base")
+        assert browser.find_element("id", "stage-base").is_displayed()
+    with on_paper(browser):
+        assert browser.execute_script(shown) == len(entries())

@@ -137,7 +137,7 @@ def test_interrupt_during_an_import_ends_in_a_line(module: str) -> None:
     bare = ["-S"] if module in {"typing", "enum"} else []
     with hearing():
         found = python(
-            *bare, "-c", IMPORTS, module, "compare", "--case", "3",
+            *bare, "-c", IMPORTS, module, "compare", "--case", "3", "--numerics",
             env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]) if bare else ""},
         )  # fmt: skip
     assert (found.returncode, found.stdout) == (130, "")

@@ -82,7 +82,7 @@ def test_run_json_is_as_contracted(printed: Printed) -> None:
     record = _record(printed, "run --case 3 --program runge-kutta")
     assert list(record) == [
         "schema", "scene", "method", "listing", "trajectory", "steps", "evaluations", "stop",
-        "ended", "build",
+        "ended", "build", "assumptions",
     ]  # fmt: skip
     assert record["schema"] == 1
     assert record["stop"] == {"step": 24, "variable": "V2", "quotient": record["stop"]["quotient"]}

@@ -51,16 +51,16 @@ COUNTS = (
     "not one of discretization",
     "three FORTRAN programs", "two by collocation and one by a Runge-Kutta method",
     "the seven cases", "One moves", "two others together", "at half the speed", "half speed",
-    "two programs of collocation, with two and with four terms", "seven cases", "fourth order",
+    "two collocation programs, with two and with four terms", "seven cases", "fourth order",
     "second order", "three programs", "three questions", "once more", "thirds of the step",
     "for two terms and at fifths for four", "one machine reading", "From the second step on",
     "on one digit", "two-term", "third, separate",
-    "three main programs", "misplaces one page", "three implementations",
+    "three main programs", "misplaces one page",
     "double precision", "One right-hand side", "One body",
     "with three choices", "for two terms", "for four,", "two terms",
     "as four", "about twice the time", "last fifth", "a known solution in two cases",
     "its three products", "one observation",
-    "two implementations", "one noisy scan", "three or five terms", "the one that",
+    "two implementations", "three or five terms", "the one that",
     "three or four terms",
     "four-term", "where one exists", "tends to zero", "are zero", "therefore zero",
     "the two errors",
@@ -209,6 +209,35 @@ def test_quotations_are_words_of_the_thesis() -> None:
     thesis = " ".join(re.sub(r"\$[^$]*\$|[*_]", "", THESIS.read_text()).split())
     for each in quotes:
         assert each in thesis, each
+
+
+def test_each_order_divides_the_error_by_the_reciprocal_at_least(found: dict[str, Any]) -> None:
+    """The introduction's argument of the equal step holds in Cases 2 to 5."""
+    factor = 1.0 / float(found["run"]["product"])
+    lab = Laboratory(False)
+    for case in range(2, 6):
+        for program in ("two-term", "four-term"):
+            assert lab.error(program, case) > factor**2 * lab.error("runge-kutta", case)
+    for name in ("two_term", "four_term"):
+        assert float(found["operations"][name]) > 1.0
+
+
+def test_the_introduction_argues_from_the_step_and_a_picture_shows_the_points() -> None:
+    introduction = TEMPLATE.partition("## Introduction")[2].partition("\n## ")[0]
+    assert "“the same step size is used throughout”" in introduction
+    assert "{{ run.product }}" in introduction
+    assert "(../figures/figure-points.svg)" in TEMPLATE
+    figures = re.findall(r"^\*Figure ([A-Z])\.", TEMPLATE, re.MULTILINE)
+    assert figures == ["A", "B", "C"]
+
+
+def test_the_thesis_cites_none_of_the_sources_on_the_practice_of_its_time() -> None:
+    practice = TEMPLATE.partition("**Practice around 1982.**")[2].partition("\n\n")[0]
+    names = ("Hull", "Shampine", "Gordon", "Fehlberg", "DVERK")
+    assert [each for each in names if each not in practice] == []
+    if not THESIS.exists():
+        pytest.skip("the thesis is not part of the project")
+    assert [each for each in names if each in THESIS.read_text()] == []
 
 
 def test_metadata_have_the_form_of_the_journal_and_the_facts_of_the_project() -> None:

@@ -272,3 +272,10 @@ def test_what_differs_is_marked_and_named(
     program: str, number: int, parts: dict[str, list[str]], kinds: list[str]
 ) -> None:
     assert compared(program, number) == (parts, kinds)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_note_is_a_sentence_before_its_cards(built_site: dict[str, bytes], program: str) -> None:
+    page = built_site[f"listing/{program}.html"].decode()
+    ends = re.findall(r'(.) <span class="muted">Cards: ', page)
+    assert ends == ["."] * len(decks.notes(program))

@@ -15,6 +15,8 @@ from pyharness.edition.ledger import assumption
 from pyharness.history.claims.ledger import judgement, judgements
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED
+from pyharness.history.figures import TERMS
+from pyharness.model import assumptions
 from pyharness.model.assumptions import open_starts
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS, Listing, subset, switches
@@ -108,7 +110,7 @@ def test_the_points_leave_the_step(slots: Slots) -> None:
     assert (run.ended, run.steps) == ("overflow", step - 1)
     assert slots["points-steps"] == run.steps
     assert slots["points-error"] == _error(6, "two-term", "original", slice(0, 1))
-    for program, terms in story.TERMS.items():
+    for program, terms in TERMS.items():
         fractions = [n / (terms + 1) for n in range(1, terms + 1)]
         assert story.data()["fractions"][program] == fractions
         cards = {card.text.strip() for card in deck(program).cards.values()}
@@ -133,8 +135,15 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
     (text,) = [each["text"] for each in supplied if each["id"] == "supplied"]
     for page in ("index", "laboratory", "figures", "claims", "thesis"):
         told = " ".join(html.unescape(built_site[f"{page}.html"].decode()).split())
-        assert told.count("△ assumed") >= 2, page
+        assert told.count("* assumed") >= 2, page
         assert text in told
+    assert assumption(2, ["runge-kutta"]).startswith("I after the DO loop")
+    assert assumption(2, ["runge-kutta"], "corrected") == ""
+    for scene in ("claim", "half-speed", "blind", "points", "corrected"):
+        part = (
+            built_site["index.html"].decode().partition(f'<section class="scene" id="{scene}"')[2]
+        )
+        assert "* assumed" in part.partition("</section>")[0], scene
     # From both starts that the thesis shows, Case 1 ends before.
     home = " ".join(built_site["index.html"].decode().split())
     steps = []
@@ -143,13 +152,22 @@ def test_what_is_assumed_is_marked(built_site: dict[str, bytes]) -> None:
         steps.append(run.steps)
     assert f"at steps {steps[0]} and {steps[1]}." in home
     figures = built_site["figures.html"].decode().split("<figcaption>")[1:]
-    for caption in figures:
-        (case,) = set(re.findall(r"laboratory.html#case=(\d)", caption.partition("</fig")[0]))
-        assert ("△ assumed" in caption.partition("</fig")[0]) == (int(case) in assumed)
+    for part in figures:
+        caption = part.partition("</fig")[0]
+        address = r"laboratory.html#case=(\d)&amp;program=([\w-]+)&amp;listing=(\w+)"
+        runs = re.findall(address, caption)
+        on = {
+            each["on"]
+            for case, program, base in runs
+            for each in assumptions.assumed(case_scene(int(case)), [subset(program, base)])
+        }
+        assert ("* assumed" in caption) == bool(on & {"omega", "listing"})
+        # The caption names a start that we supply.
+        assert ("its initial omega" in caption) == (int(runs[0][0]) in assumed)
     claims = built_site["claims.html"].decode()
     for each in judgements():
         line = claims.partition(f'id="{each.claim["id"]}"')[2].partition("</summary>")[0]
-        assert ("△ assumed" in line) == (not all(x.survives for x in each.survivals))
+        assert ("* assumed" in line) == (not all(x.survives for x in each.survivals))
 
 
 @pytest.mark.campaign
@@ -231,3 +249,13 @@ def test_the_name_of_the_edition_is_everywhere(built_site: dict[str, bytes]) -> 
     loaded = {path for element, path, _ in targets if element != "a"}
     assert "assets/story.js" in loaded
     assert sum(len(built_site[path]) for path in {"index.html", *loaded}) < 150e3
+
+
+def test_marks_on_curves_are_whole() -> None:
+    """A mark has a radius of 4.5 units, and what is outside of the plot is not drawn."""
+    left, _, right, _ = story.BOX
+    marks = story.context()["charts"]["claim"].marks
+    assert len(marks) == len(story.LETTERS)
+    for each in marks:
+        across = [float(point.split(",")[0]) for point in each.points.split()]
+        assert left + 4.5 <= min(across) < max(across) <= right - 4.5

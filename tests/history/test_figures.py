@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from pyharness.history import figures
 from pyharness.history.claims.rules import share_of_range
 from pyharness.history.figures import Curve, FigureFinding, curve_numbers
 from pyharness.model.listing import PROGRAMS, Listing
-from pyharness.thesis import compiled
+from pyharness.thesis import collocation, compiled
+from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import reference
 from pyharness.views import pictures
 from pyharness.views.pictures import saved
@@ -164,11 +166,35 @@ def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding])
 
 @pytest.mark.campaign
 @pytest.mark.usefixtures("fast")
+def test_points_are_those_at_which_the_twins_collocate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the second step on, a point of the printed programs is outside the step."""
+    used: list[list[float]] = []
+    interval = collocation.interval
+
+    def recorded(start: Any, points: Any, end: float, rates: Any) -> Any:
+        used.append(list(points))
+        return interval(start, points, end, rates)
+
+    monkeypatch.setattr(collocation, "interval", recorded)
+    rows = figures.points_picture().numbers.rows
+    scene = case_scene(2)
+    for program, terms in figures.TERMS.items():
+        used.clear()
+        run_program(scene, Listing.original(program), "python")
+        shown = [row[3] for row in rows if row[0] == program]
+        np.testing.assert_allclose(np.reshape(shown, (-1, terms)), used[:10], rtol=1e-14)
+        assert [max(points) > scene.step_size for points in used] == [False] + [True] * 99
+
+
 def test_list_of_files(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["figures", "--out", str(tmp_path)]) == 0
     captured = capsys.readouterr()
     lines = captured.out.splitlines()
-    assert (captured.err, len(lines)) == ("", 1 + len(ALL))
+    assert (captured.err, lines.index("")) == ("", 1 + len(ALL))
+    cases = [line.split()[1] for line in lines[1 : 1 + len(ALL)]]
+    assert cases[:8] == ["1*", "2*", "3*", "4*", "5*", "5", "6*", "7*"]
+    assert cases[8:] == ["1*", "2", "3*", "4*", "5", "5", "6*", "7*"]
+    assert lines[2 + len(ALL)].startswith("* assumed: omega(0), ours (Case 1)")
     assert max(map(len, lines)) <= 100
     assert "runge-kutta (stopped at step 25 by V2)" in lines[2]
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)

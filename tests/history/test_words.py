@@ -112,6 +112,7 @@ def test_report_has_every_run(found: Found) -> None:
     assert report.record()["runs"] == [run._asdict() for run in cell.runs]
     assert report.data is not None
     assert len(csv_text(report.data).splitlines()) == 1 + len(cell.runs)
+    assert str(report.text[-1][0]).startswith("* assumed: 100 steps")
     # Without 48 bits the report has no section on the machine's own words.
     assert len(report.text) == 4
     short = [*cells([2], ["runge-kutta"], (24,))]

@@ -22,6 +22,7 @@ import {
   sceneOfCase,
   stateFrom,
   stepsFrom,
+  suppliedIn,
   written,
 } from "./state.js";
 import { StepViewer } from "./steps.js";
@@ -163,7 +164,7 @@ function withoutTruth() {
 function showControls() {
   element("case").value = state.case;
   element("heading").textContent = data.headings[state.case].join("; ");
-  const supplied = state.omega0 === null ? data.assumed[state.case] : "";
+  const supplied = suppliedIn(data, state);
   element("assumed-case").hidden = supplied === "";
   element("assumed-what").textContent = supplied;
   const values = {

@@ -47,6 +47,16 @@ export function activeIn(data, base) {
 }
 
 // Return the listing that the switches of a program make: original, corrected, or some of the faults.
+// Return what we supply, and on which the run of a state depends; "" for a start of the reader's.
+export function suppliedIn(data, state) {
+  if (state.omega0 !== null) return "";
+  const isOriginal = listingOf(data, state) !== "corrected";
+  const onCards = data.assumedInRuns[state.case][state.program].filter(
+    ({ entry, active }) => isOriginal && state.active.includes(entry) === active,
+  );
+  return [data.assumed[state.case], ...onCards.map(({ what }) => what)].filter(Boolean).join("; ");
+}
+
 export function listingOf(data, { program, active }) {
   const own = KINDS.flatMap((kind) => namesOf(data, program, kind));
   const chosen = own.filter((name) => active.includes(name)).join();

@@ -1,10 +1,12 @@
-// Open the claim, sentence or entry that the address names, with all that is folded in it; a button
-// opens or closes all of them.
+// Open the claim, sentence or entry that the address names, with all that is folded in it, and the
+// group of an entry; a button opens or closes all of them.
 (() => {
   const open = () => {
     const named = document.getElementById(location.hash.slice(1));
-    if (!named?.matches(".claim, .sentence, .entry")) return;
-    for (const each of [named, ...named.querySelectorAll("details")]) each.open = true;
+    if (!named?.matches(".claim, .sentence, .entry, .entries")) return;
+    const inside = named.matches(".entries") ? [] : named.querySelectorAll("details");
+    const group = named.closest(".entries") ?? named;
+    for (const each of [group, named, ...inside]) each.open = true;
     named.scrollIntoView();
   };
   addEventListener("hashchange", open);

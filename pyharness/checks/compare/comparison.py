@@ -56,6 +56,7 @@ def compare_programs(
     effort: float = 1.0,
     attitude: bool = False,
     word: str = BINARY64,
+    methods: bool = True,
 ) -> Comparison:
     """Compare programs and SciPy's methods on one scene with each other and with the reference.
 
@@ -80,6 +81,8 @@ def compare_programs(
     word : str
         The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
         compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
+    methods : bool
+        Whether SciPy's methods run; `unexpected` and `is_sensitive` are the same without.
 
     Returns
     -------
@@ -102,6 +105,7 @@ def compare_programs(
     checked_scene(scene)
     may_stop = boolean("may_stop", may_stop)
     attitude = boolean("attitude", attitude)
+    methods = boolean("methods", methods)
     listings = listings_for() if listings is None else listings
     for each in listings:
         if not isinstance(each, Listing):
@@ -131,7 +135,7 @@ def compare_programs(
         good, per_step = accuracy(scene, run, truth), seconds / max(run.steps, 1)
         programs.append(ProgramFinding(listing, run, good, ulp, found, order, per_step))
     tolerances = {name: requested_tolerance(name, tolerance) for name in SCIPY_METHODS}
-    return _with_methods(scene, lipschitz, truth, programs, tolerances, effort, word)
+    return _with_methods(scene, lipschitz, truth, programs, tolerances, effort, word, methods)
 
 
 def listings_for(
@@ -244,12 +248,17 @@ def _with_methods(
     tolerances: Mapping[str, float],
     effort: float,
     word: str = BINARY64,
+    are_run: bool = True,
 ) -> Comparison:
     """Return the comparison of programs, and of methods with their tolerances."""
-    import scipy.integrate  # noqa: F401  (not to be timed with the first method)
+    if are_run:
+        import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 
     methods = []
     for name, tolerance in tolerances.items():
+        if not are_run:
+            methods.append(MethodFinding(name, tolerance, None, None, math.nan))
+            continue
         start = time.perf_counter()
         try:
             run = method_candidate(name, tolerance, effort).rows(scene)

@@ -5,7 +5,7 @@ from typing import Any
 from pyharness.checks.compare.agreement import Accuracy
 from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
 from pyharness.checks.compare.picture import comparison_picture
-from pyharness.model.assumptions import mark
+from pyharness.model.assumptions import assumption_records, mark
 from pyharness.model.records import (
     build_record,
     ending_record,
@@ -246,6 +246,9 @@ def _record(comparison: Comparison) -> dict[str, Any]:
         "unexpected": list(comparison.unexpected),
         "not_judged": list(comparison.not_judged),
         "build": build_record(),
+        "assumptions": assumption_records(
+            [(comparison.scene, [each.listing for each in comparison.programs])]
+        ),
     }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from pyharness.checks.theory.rotations import Rates, SteadyRotation, SteadyRotations
 from pyharness.checks.theory.rotations_picture import rotations_picture
+from pyharness.model.assumptions import assumption_records
 from pyharness.model.records import build_record, scene_record
 from pyharness.model.report import Column, Report, Section, Table, digits, numbers, words
 from pyharness.model.scene import Scene
@@ -39,6 +40,7 @@ def rotations_report(scene: Scene, found: SteadyRotations) -> Report:
             "disturbance": found.disturbance,
             "rotations": [_record(each) for each in found.rotations],
             "build": build_record(),
+            "assumptions": assumption_records([(scene, [])]),
         },
         data=numbers(_FULL, [_row(each) for each in found.rotations]),
         pictures={"rotations": partial(rotations_picture, scene)},

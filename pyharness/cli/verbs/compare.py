@@ -35,6 +35,8 @@ OPTIONS = {
     **shared.EFFORT,
     **shared.outputs(),
 }
+# Without --numerics, these formats show no method of `solve_ivp`, and no verdict depends on one.
+_WITHOUT_METHODS = {"table", "markdown"}
 EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 
@@ -69,6 +71,7 @@ def run(options: argparse.Namespace) -> int:
     shared.tell_inactive(options, listings)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
+    forms = {options.format or shared.FORMATS[0], *shared.also_files(options).values()}
     found = compare_programs(
         scene,
         listings,
@@ -78,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
         effort=effort,
         attitude=options.attitude,
         word=options.word or BINARY64,
+        methods=options.numerics or not forms <= _WITHOUT_METHODS,
     )
     shared.show(comparison_report(found, options.numerics), options)
     return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0

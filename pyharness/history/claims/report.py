@@ -7,7 +7,10 @@ from typing import Any
 
 from pyharness.history.claims.laboratory import start_text
 from pyharness.history.claims.ledger import Assignment, Judgement
+from pyharness.model.assumptions import assumption_records, claim_records
+from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.report import Column, Field, Line, Report, Section, Table, short, words
+from pyharness.model.scene_file import case_numbers, case_scene
 
 # A verdict as written in the table of all claims, and in its legend.
 _VERDICTS = {
@@ -147,7 +150,18 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
         }
         for each in judgements
     ]
-    return {"claims": entries}
+    return {"claims": entries, "assumptions": _supplied(judgements)}
+
+
+def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
+    """Return for JSON the assumptions on which the claims may depend; all depend on the units."""
+    told = [each.claim for each in judgements]
+    named = {name.rpartition(" ")[2] for each in told for name in each["assumptions"]}
+    others = {name.partition(":")[0] for each in told for name in each.get("otherwise", {})}
+    named |= {name.replace(" ", "-") for name in others}
+    runs = [(case_scene(n), [*map(Listing.original, PROGRAMS)]) for n in case_numbers()]
+    found = [*assumption_records(runs), *claim_records()]
+    return [each for each in found if each["id"] in {*named, "units"}]
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:

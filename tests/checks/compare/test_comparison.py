@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from pyharness import case_scene
+from pyharness.checks.compare import candidates
 from pyharness.checks.compare import comparison as room
 from pyharness.checks.compare import report as report_module
 from pyharness.checks.compare.agreement import accuracy, differences, distance, ulps
@@ -53,6 +55,32 @@ def test_all_is_as_expected_in_every_case() -> None:
             assert files["x.png"].startswith(b"\x89PNG")
         torque_free = found.scene.torque.is_zero
         assert (found.programs[0].accuracy.momentum is not None) == torque_free
+
+
+def test_methods_run_only_where_they_are_shown(
+    case_2: Comparison, printed: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran: list[str] = []
+    candidate = candidates.method_candidate
+
+    def recorded(name: str, *rest: Any) -> Any:
+        ran.append(name)
+        return candidate(name, *rest)
+
+    monkeypatch.setattr(room, "method_candidate", recorded)
+    found = compare_programs(case_scene(2), methods=False)
+    assert _text(found, False) == _text(case_2, False)
+    assert (found.unexpected, found.tolerance, found.is_sensitive) == (
+        case_2.unexpected, case_2.tolerance, case_2.is_sensitive,
+    )  # fmt: skip
+    one = "compare --case 2 --program two-term --listing original"
+    printed(one)
+    printed(f"{one} --format markdown")
+    assert not ran
+    for option in ("--numerics", "--format json", "--format csv"):
+        printed(f"{one} {option}")
+        assert ran == [*SCIPY_METHODS]
+        ran.clear()
 
 
 def test_table_says_which_variable_stopped_the_run(case_2: Comparison) -> None:

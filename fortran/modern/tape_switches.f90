@@ -14,7 +14,7 @@ module tape_switches
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
   real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
-  real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
+  real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that are one
   integer, parameter :: MOST_CUTS = 100
 
   type, public :: switches_t
@@ -33,7 +33,6 @@ module tape_switches
     ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
     integer :: first
     real(dp) :: slope
-    real(dp) :: gap       !! part of the step between the first crossing and those taken as one
     real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
     real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
     integer :: touching   !! its switch
@@ -256,13 +255,11 @@ contains
     root = minval(roots)
     if (root > factor) return
     verdict = CROSSES
-    switches%gap = 0.0_dp
     do i = 1, switches%n
       do level = LOWER, UPPER
         if (roots(level, i) <= root*(1.0_dp + TOGETHER)) then
           if (switches%first == 0) switches%first = i
           switches%crosses(i) = level
-          switches%gap = max(switches%gap, roots(level, i) - root)
         end if
       end do
     end do

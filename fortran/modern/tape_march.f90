@@ -15,8 +15,8 @@ module tape_march
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, perturb_tape, series_t, &
                          SIDE_BY_SIDE, slot_gradient, sum_perturbations, VARIATION_TOLERANCE
-  use tape_switches, only: CROSSES, IS_CHANGED, next_crossing, operand_error, resolve_switches, &
-                           SLIDES, STAYS, switches_t
+  use tape_switches, only: CROSSES, follow, IS_CHANGED, next_crossing, operand_error, &
+                           resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -597,6 +597,8 @@ contains
       !! the other rates would change.
       real(dp) :: other(tape%n_unknowns), here(tape%n_unknowns), zero(tape%n_unknowns)
       real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
+      integer :: on_level(size(switches%slots))
+      logical :: is_changed
 
       if (switches%touches < 0.0_dp) return
       is_compared = .true.
@@ -606,10 +608,16 @@ contains
       call two_sum(t(1), switches%touches*s%h + t(2), at_time(1), at_time(2))
       call derivatives_at(live, at_time, at, s%h, s, here)
       associate (value => s%a(0, switches%slots(switches%touching)))
-        value = merge(0.0_dp, 1.0_dp, value > 0.5_dp)
+        value = value + switches%touched
       end associate
-      call keep_live(tape, switches, s, live)
-      call derivatives_at(live, at_time, at, s%h, s, other)
+      on_level = switches%on_level
+      is_changed = .true.
+      do while (is_changed)
+        call keep_live(tape, switches, s, live)
+        call derivatives_at(live, at_time, at, s%h, s, other)
+        call follow(switches, s, is_changed)
+      end do
+      switches%on_level = on_level
       s%a(0, switches%slots) = slots
       call keep_live(tape, switches, s, live)
       call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, rates)

@@ -36,9 +36,11 @@ module tape_switches
     real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
     real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
     integer :: touching   !! its switch
+    real(dp) :: touched   !! what crossing the level would add to the result
+    logical, allocatable :: follows(:) !! whether the operand depends on other switches alone
   end type switches_t
 
-  public :: begin_switches, change, find_switches, next_crossing, operand_error, &
+  public :: begin_switches, change, find_switches, follow, next_crossing, operand_error, &
             resolve_switches, update
 
 contains
@@ -64,6 +66,7 @@ contains
     if (failed == 0) allocate (switches%operations(4, tape%n_operations), stat=failed)
     if (failed == 0) allocate (switches%matters(tape%n_operations), stat=failed)
     if (failed == 0) allocate (switches%is_discrete(tape%n_operations), stat=failed)
+    if (failed == 0) allocate (switches%follows(switches%n), stat=failed)
     if (failed /= 0) return
     switches%is_turned = .false.
     switches%is_live = .false.
@@ -79,20 +82,21 @@ contains
     end do
     switches%on_level = 0
     switches%crosses = 0
-    call find_discrete(tape, switches%is_discrete)
+    call find_discrete(tape, switches)
   end subroutine find_switches
 
-  pure subroutine find_discrete(tape, is_discrete)
+  pure subroutine find_discrete(tape, switches)
     !! Find the operations that depend on the results of switches alone.
     type(tape_t), intent(in) :: tape
-    logical, intent(out) :: is_discrete(:)
+    type(switches_t), intent(inout) :: switches
     logical :: of_slot(tape%n_slots)
     integer :: n
 
     of_slot = .false.
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n), &
-                 starts => tape%starts, slots => tape%slots)
+                 starts => tape%starts, slots => tape%slots, &
+                 is_discrete => switches%is_discrete)
         select case (tape%operations(1, n))
         case (SWITCH, FLOOR_OF)
           is_discrete(n) = .true.
@@ -109,6 +113,7 @@ contains
         of_slot(tape%operations(4, n)) = is_discrete(n)
       end associate
     end do
+    switches%follows = of_slot(switches%operands)
   end subroutine find_discrete
 
   pure subroutine begin_switches(i, near, switches, s)
@@ -248,6 +253,7 @@ contains
         if (touch >= 0.0_dp .and. root > factor) then
           switches%touches = touch
           switches%touching = i
+          switches%touched = -sign_of_level
         end if
       end do
     end do
@@ -271,6 +277,7 @@ contains
         *size_of(s%a(:s%order - 1, switches%operands(switches%first)), factor)) then
       switches%touches = factor
       switches%touching = switches%first
+      switches%touched = merge(-1.0_dp, 1.0_dp, switches%crosses(switches%first) == LOWER)
     end if
 
   contains
@@ -380,6 +387,23 @@ contains
     end do
     is_changed = .false.
   end subroutine update
+
+  pure subroutine follow(switches, s, is_changed)
+    !! Set the results of switches whose operands depend on other switches alone.
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    logical, intent(out) :: is_changed
+    real(dp) :: before
+    integer :: i
+
+    is_changed = .false.
+    do i = 1, switches%n
+      if (.not. (switches%is_live(i) .and. switches%follows(i))) cycle
+      before = s%a(0, switches%slots(i))
+      call begin_switches(i, ZERO_TERM*abs(s%a(0, switches%operands(i))), switches, s)
+      is_changed = is_changed .or. s%a(0, switches%slots(i)) /= before
+    end do
+  end subroutine follow
 
   pure subroutine change(i, level, switches, s)
     !! Change the result of a switch whose operand crosses a level.

@@ -492,6 +492,25 @@ def test_what_a_touch_may_change_grows(tolerance: float, gap: float, push: float
     assert error <= found.error + 1e-15 * found.growth
 
 
+@pytest.mark.parametrize(
+    ("gap", "push", "tolerance", "phase", "end"),
+    [(3.89e-12, 78.2, 3.31e-6, 0.947, 1.77), (8.67e-10, 68.3, 5.8e-4, 0.99238876, 1.62)],
+)
+def test_a_floor_may_touch_its_next_level(
+    gap: float, push: float, tolerance: float, phase: float, end: float
+) -> None:
+    """The floor of an odd number selects another branch, by another floor."""
+
+    def torque(t: Any, w: Any) -> Any:
+        is_even = np.floor(4.0 + w[0] + gap) % 2 < 1
+        return [np.cos(t + phase), push * np.where(is_even, 0.0, 1.0), 0.0]
+
+    found: Any = solve(_ball(torque, (math.sin(phase), 0.1, 0.0)), end, tolerance=tolerance)
+    wanted = 0.1 + 2.0 * push * math.acos(1.0 - gap)
+    assert found.ended == "sensitive"
+    assert abs(found.omega[0, 1] - wanted) <= found.error
+
+
 def test_switches_that_coincide_at_an_end_are_one() -> None:
     for unit, tolerance in ((1e-2, 1e-9), (1e-2, 1e-6), (1e90, 1e-6), (1e-120, 1e-8)):
 

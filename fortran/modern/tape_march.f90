@@ -638,7 +638,7 @@ contains
       call slot_gradient(s%arrays, switches%operands(switches%first), gradient)
       slope = switches%slope/s%h
       blur = s%noise(switches%operands(switches%first))/slope
-      switches%part = factor
+      switches%part = whole_step/s%h ! in which the terms of an operand are not all small
       call settle(tape, t_next, y + y_low, s%h, switches, s, live, after)
       jump = after - rates
       do block = 1, n_blocks

@@ -492,6 +492,33 @@ def test_what_a_touch_may_change_grows(tolerance: float, gap: float, push: float
     assert error <= found.error + 1e-15 * found.growth
 
 
+def test_a_pulse_between_two_levels_of_an_operand_is_not_lost() -> None:
+    """After the first level, all terms of the operand are small in the step to the second."""
+    source = np.random.default_rng(5)
+    for _ in range(200):
+        gap, push = 10.0 ** source.uniform(-12.0, -6.0), 10.0 ** source.uniform(-2.0, 3.0)
+        tolerance, low = 10.0 ** source.uniform(-12.0, -3.0), source.uniform(0.3, 3.0)
+        rate = source.uniform(0.3, 1.5)
+        high = low + gap
+
+        def torque(
+            t: Any,
+            w: Any,
+            push: float = push,
+            low: float = low,
+            high: float = high,
+            c: float = rate,
+        ) -> Any:
+            pulse = np.where(w[0] > low, 1.0, 0.0) - np.where(w[0] > high, 1.0, 0.0)
+            return [c, push * pulse, 0.0]
+
+        end = 3.5 / rate + 3.0
+        found: Any = solve(_ball(torque, (0.1, 0.0, 0.0)), end, tolerance=tolerance)
+        error = abs(found.omega[0, 1] - push * (high - low) / rate) / found.omega[0, 0]
+        assert found.ended in ("complete", "sensitive")
+        assert error <= tolerance + 4e-15 * found.growth
+
+
 @pytest.mark.parametrize(
     ("gap", "push", "tolerance", "phase", "end"),
     [(3.89e-12, 78.2, 3.31e-6, 0.947, 1.77), (8.67e-10, 68.3, 5.8e-4, 0.99238876, 1.62)],

@@ -13,6 +13,7 @@ module tape_switches
   integer, parameter :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
+  real(dp), parameter :: ROUNDED = 1e-14_dp     ! rounding error of an operand, over its terms
   real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
   real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that are one
   integer, parameter :: MOST_CUTS = 100
@@ -150,7 +151,7 @@ contains
     type(switches_t), intent(in) :: switches
     type(series_t), intent(in) :: s
 
-    nearness = ZERO_TERM*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
+    nearness = ROUNDED*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
   end function nearness
 
   pure subroutine resolve_switches(relative, switches, s, factor)
@@ -373,7 +374,7 @@ contains
       if (level /= 0) then
         switches%crosses(i) = 0
         if (abs(s%a(0, switches%operands(i)) - level_of(i, level, switches, s)) &
-            <= FAR/ZERO_TERM*near) then
+            <= FAR/ROUNDED*near) then
           call change(i, level, switches, s)
         else
           call begin_switches(i, near, switches, s)

@@ -15,8 +15,8 @@ module tape_march
                        MOST_TRIES, order_for
   use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, perturb_tape, series_t, &
                          SIDE_BY_SIDE, slot_gradient, sum_perturbations, VARIATION_TOLERANCE
-  use tape_switches, only: CROSSES, IS_CHANGED, next_crossing, operand_error, resolve_switches, &
-                           SLIDES, STAYS, switches_t
+  use tape_switches, only: CROSSES, follow, IS_CHANGED, next_crossing, operand_error, &
+                           resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -43,6 +43,8 @@ module tape_march
   integer, parameter :: CORRECTIONS = 4 ! of the step that ends at a switch
   ! Relative distance from a switch that an error may bridge; at least, of rounding errors.
   real(dp), parameter :: NEAR = 1e-13_dp, MOST_NEAR = 1e-5_dp
+  real(dp), parameter :: ROUNDING = 2.0_dp**(-53) ! unit of rounding errors
+  real(dp), parameter :: LARGEST_JUMP = 1e100_dp ! whose square is finite
 
   ! One integration of a request.
   type, public :: attempt_t
@@ -61,7 +63,6 @@ module tape_march
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
     real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
     logical :: finest = .false. ! whether the local tolerance is the smallest
-    logical :: grazes = .false. ! whether an error may decide if a switch changes
     real(dp) :: slides_at = 0.0_dp ! s
   end type outcome_t
 
@@ -104,7 +105,6 @@ contains
     logical :: is_guessed                     ! whether the size of an own state is
     logical :: diverges                       ! whether the guess is one of its last terms
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
-    real(dp) :: sum_of_gaps(tape%n_unknowns)  ! changes between switches that are taken as one
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch that is a touch
     integer :: i, n, n_before, order, tries
@@ -128,7 +128,6 @@ contains
     solution%n_rows = 0
     solution%n_steps = 0
     sum_of_noise = 0.0_dp
-    sum_of_gaps = 0.0_dp
     s%a = 0.0_dp
     s%blocks(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1, :) = 0.0_dp
     call begin(n, transitions)
@@ -286,7 +285,6 @@ contains
     end where
     found%growth = growth_of(transposed(n, lanes), sizes, transitions)
     found%noise = norm2(weights*sqrt(sum_of_noise))
-    found%error = max(found%error, maxval(weights*sum_of_gaps))
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
     end do
@@ -595,9 +593,12 @@ contains
     end function is_continued_to_switch
 
     subroutine check_touch()
-      !! Notice that an operand nearly crosses a level where the rates would jump: an error decides.
+      !! Where an operand nearly crosses a level, an error decides whether the rates jump: add what
+      !! the other rates would change.
       real(dp) :: other(tape%n_unknowns), here(tape%n_unknowns), zero(tape%n_unknowns)
       real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
+      integer :: on_level(size(switches%slots))
+      logical :: is_changed
 
       if (switches%touches < 0.0_dp) return
       is_compared = .true.
@@ -607,16 +608,22 @@ contains
       call two_sum(t(1), switches%touches*s%h + t(2), at_time(1), at_time(2))
       call derivatives_at(live, at_time, at, s%h, s, here)
       associate (value => s%a(0, switches%slots(switches%touching)))
-        value = merge(0.0_dp, 1.0_dp, value > 0.5_dp)
+        value = value + switches%touched
       end associate
-      call keep_live(tape, switches, s, live)
-      call derivatives_at(live, at_time, at, s%h, s, other)
+      on_level = switches%on_level
+      is_changed = .true.
+      do while (is_changed)
+        call keep_live(tape, switches, s, live)
+        call derivatives_at(live, at_time, at, s%h, s, other)
+        call follow(switches, s, is_changed)
+      end do
+      switches%on_level = on_level
       s%a(0, switches%slots) = slots
       call keep_live(tape, switches, s, live)
       call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, rates)
-      if (maxval(weights*abs(other - here))*abs(factor*s%h)*sqrt(nearly) > request%tolerance) then
-        found%grazes = .true.
-      end if
+      ! As far as it is known, the operand may be beyond the level during this part of the step.
+      other = min(LARGEST_JUMP, abs(other - here)*abs(factor*s%h)*sqrt(nearly))
+      where (other >= 0.0_dp) sum_of_noise = sum_of_noise + (other/ROUNDING)**2
     end subroutine check_touch
 
     subroutine cross()
@@ -631,11 +638,9 @@ contains
       call slot_gradient(s%arrays, switches%operands(switches%first), gradient)
       slope = switches%slope/s%h
       blur = s%noise(switches%operands(switches%first))/slope
-      switches%part = factor
+      switches%part = whole_step/s%h ! in which the terms of an operand are not all small
       call settle(tape, t_next, y + y_low, s%h, switches, s, live, after)
       jump = after - rates
-      ! Switches that were changed together, although they are a little apart.
-      sum_of_gaps = sum_of_gaps + abs(jump*switches%gap*s%h)
       do block = 1, n_blocks
         do i = 1, SIDE_BY_SIDE
           associate (lane => lanes(i, :n, block))

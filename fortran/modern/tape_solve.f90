@@ -107,7 +107,7 @@ contains
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE &
-        .and. (outcome%grazes .or. blurred > UNSURE*request%tolerance &
+        .and. (blurred > UNSURE*request%tolerance &
                .or. outcome%error > max(request%tolerance, FINEST))) then
       solution%status = SENSITIVE
     end if

@@ -13,8 +13,9 @@ module tape_switches
   integer, parameter :: LOWER = 1, UPPER = 2 ! levels on which an operand may be
   integer, parameter, public :: STAYS = 0, CROSSES = 1, SLIDES = 2, IS_CHANGED = 3
   real(dp), parameter :: ZERO_TERM = 1e-13_dp   ! part of the terms that is a rounding error
+  real(dp), parameter :: ROUNDED = 1e-14_dp     ! rounding error of an operand, over its terms
   real(dp), parameter :: FAR = 1e-8_dp          ! part that is none
-  real(dp), parameter :: TOGETHER = 1e-9_dp     ! relative difference of roots that are one
+  real(dp), parameter :: TOGETHER = 2.0_dp**(-50) ! relative difference of roots that are one
   integer, parameter :: MOST_CUTS = 100
 
   type, public :: switches_t
@@ -33,13 +34,14 @@ module tape_switches
     ! Of the first switch that crosses: its number, and the operand's derivative, 1 over the step.
     integer :: first
     real(dp) :: slope
-    real(dp) :: gap       !! part of the step between the first crossing and those taken as one
     real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
     real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
     integer :: touching   !! its switch
+    real(dp) :: touched   !! what crossing the level would add to the result
+    logical, allocatable :: follows(:) !! whether the operand depends on other switches alone
   end type switches_t
 
-  public :: begin_switches, change, find_switches, next_crossing, operand_error, &
+  public :: begin_switches, change, find_switches, follow, next_crossing, operand_error, &
             resolve_switches, update
 
 contains
@@ -65,6 +67,7 @@ contains
     if (failed == 0) allocate (switches%operations(4, tape%n_operations), stat=failed)
     if (failed == 0) allocate (switches%matters(tape%n_operations), stat=failed)
     if (failed == 0) allocate (switches%is_discrete(tape%n_operations), stat=failed)
+    if (failed == 0) allocate (switches%follows(switches%n), stat=failed)
     if (failed /= 0) return
     switches%is_turned = .false.
     switches%is_live = .false.
@@ -80,20 +83,21 @@ contains
     end do
     switches%on_level = 0
     switches%crosses = 0
-    call find_discrete(tape, switches%is_discrete)
+    call find_discrete(tape, switches)
   end subroutine find_switches
 
-  pure subroutine find_discrete(tape, is_discrete)
+  pure subroutine find_discrete(tape, switches)
     !! Find the operations that depend on the results of switches alone.
     type(tape_t), intent(in) :: tape
-    logical, intent(out) :: is_discrete(:)
+    type(switches_t), intent(inout) :: switches
     logical :: of_slot(tape%n_slots)
     integer :: n
 
     of_slot = .false.
     do n = 1, tape%n_operations
       associate (first => tape%operations(2, n), second => tape%operations(3, n), &
-                 starts => tape%starts, slots => tape%slots)
+                 starts => tape%starts, slots => tape%slots, &
+                 is_discrete => switches%is_discrete)
         select case (tape%operations(1, n))
         case (SWITCH, FLOOR_OF)
           is_discrete(n) = .true.
@@ -110,6 +114,7 @@ contains
         of_slot(tape%operations(4, n)) = is_discrete(n)
       end associate
     end do
+    switches%follows = of_slot(switches%operands)
   end subroutine find_discrete
 
   pure subroutine begin_switches(i, near, switches, s)
@@ -146,7 +151,7 @@ contains
     type(switches_t), intent(in) :: switches
     type(series_t), intent(in) :: s
 
-    nearness = ZERO_TERM*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
+    nearness = ROUNDED*size_of(s%a(:s%order - 1, switches%operands(i)), factor)
   end function nearness
 
   pure subroutine resolve_switches(relative, switches, s, factor)
@@ -249,6 +254,7 @@ contains
         if (touch >= 0.0_dp .and. root > factor) then
           switches%touches = touch
           switches%touching = i
+          switches%touched = -sign_of_level
         end if
       end do
     end do
@@ -256,13 +262,11 @@ contains
     root = minval(roots)
     if (root > factor) return
     verdict = CROSSES
-    switches%gap = 0.0_dp
     do i = 1, switches%n
       do level = LOWER, UPPER
         if (roots(level, i) <= root*(1.0_dp + TOGETHER)) then
           if (switches%first == 0) switches%first = i
           switches%crosses(i) = level
-          switches%gap = max(switches%gap, roots(level, i) - root)
         end if
       end do
     end do
@@ -274,6 +278,7 @@ contains
         *size_of(s%a(:s%order - 1, switches%operands(switches%first)), factor)) then
       switches%touches = factor
       switches%touching = switches%first
+      switches%touched = merge(-1.0_dp, 1.0_dp, switches%crosses(switches%first) == LOWER)
     end if
 
   contains
@@ -369,7 +374,7 @@ contains
       if (level /= 0) then
         switches%crosses(i) = 0
         if (abs(s%a(0, switches%operands(i)) - level_of(i, level, switches, s)) &
-            <= FAR/ZERO_TERM*near) then
+            <= FAR/ROUNDED*near) then
           call change(i, level, switches, s)
         else
           call begin_switches(i, near, switches, s)
@@ -383,6 +388,23 @@ contains
     end do
     is_changed = .false.
   end subroutine update
+
+  pure subroutine follow(switches, s, is_changed)
+    !! Set the results of switches whose operands depend on other switches alone.
+    type(switches_t), intent(inout) :: switches
+    type(series_t), intent(inout) :: s
+    logical, intent(out) :: is_changed
+    real(dp) :: before
+    integer :: i
+
+    is_changed = .false.
+    do i = 1, switches%n
+      if (.not. (switches%is_live(i) .and. switches%follows(i))) cycle
+      before = s%a(0, switches%slots(i))
+      call begin_switches(i, ZERO_TERM*abs(s%a(0, switches%operands(i))), switches, s)
+      is_changed = is_changed .or. s%a(0, switches%slots(i)) /= before
+    end do
+  end subroutine follow
 
   pure subroutine change(i, level, switches, s)
     !! Change the result of a switch whose operand crosses a level.

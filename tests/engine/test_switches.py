@@ -462,15 +462,80 @@ def test_a_state_that_rests_on_a_level_has_the_value_of_numpy() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-9, 1e-11, 3e-9])
-def test_switches_a_little_apart_have_an_error_if_they_are_taken_as_one(gap: float) -> None:
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-12])
+def test_a_pulse_between_two_switches_is_not_lost(gap: float, tolerance: float) -> None:
     def torque(t: Any, w: Any) -> Any:
-        return [np.where(t > 1.0, 1.0, 0.0) + np.where(t > 1.0 + gap, 1.0, 0.0), 0.0, 0.0]
+        pulse = np.where(t > 1.0, 1.0, 0.0) - np.where(t > 1.0 + gap, 1.0, 0.0)
+        return [10.0 * pulse, w[1] + 0.1 * pulse, 0.0]
 
-    scene = Scene("", (0.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), torque=torque)
-    found: Any = solve(scene, 2.0, tolerance=1e-12)
-    error = abs(found.omega[0, 0] - (2.0 - gap)) / 2.0
-    assert error <= found.error + 1e-15
-    assert (found.ended == "sensitive") == (found.error > 1e-12)
+    found: Any = solve(_ball(torque, (0.1, 0.0, 0.0)), 8.0, tolerance=tolerance)
+    wide = (1.0 + gap) - 1.0
+    wanted = [0.1 + 10.0 * wide, -0.1 * math.exp(7.0) * math.expm1(-wide), 0.0]
+    assert np.abs(found.omega[0] - wanted).max() <= 0.1 * (tolerance + 4e-15 * found.growth)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("gap", [1e-14, 1e-11, 1e-9])
+@pytest.mark.parametrize("push", [1e-1, 1e-3, 1e-5, 3e-7])
+def test_what_a_touch_may_change_grows(tolerance: float, gap: float, push: float) -> None:
+    """The torque acts for a moment, in which the series may not see that the level is crossed."""
+    level = 1.0 - gap
+    half = 2.0 * math.asin(math.sqrt(0.5 * (1.0 - level)))
+
+    def torque(t: Any, w: Any) -> Any:
+        return [0.0, w[1] + push * np.where(np.cos(t - 2.0) > level, 1.0, 0.0), 0.0]
+
+    found: Any = solve(_ball(torque, (1.0, 0.0, 0.0)), 8.0, tolerance=tolerance)
+    wanted = 2.0 * push * math.exp(6.0) * math.sinh(half)
+    error = abs(found.omega[0, 1] - wanted)
+    assert found.ended == "sensitive" or error <= tolerance + 4e-15 * found.growth
+    assert error <= found.error + 1e-15 * found.growth
+
+
+def test_a_pulse_between_two_levels_of_an_operand_is_not_lost() -> None:
+    """After the first level, all terms of the operand are small in the step to the second."""
+    source = np.random.default_rng(5)
+    for _ in range(200):
+        gap, push = 10.0 ** source.uniform(-12.0, -6.0), 10.0 ** source.uniform(-2.0, 3.0)
+        tolerance, low = 10.0 ** source.uniform(-12.0, -3.0), source.uniform(0.3, 3.0)
+        rate = source.uniform(0.3, 1.5)
+        high = low + gap
+
+        def torque(
+            t: Any,
+            w: Any,
+            push: float = push,
+            low: float = low,
+            high: float = high,
+            c: float = rate,
+        ) -> Any:
+            pulse = np.where(w[0] > low, 1.0, 0.0) - np.where(w[0] > high, 1.0, 0.0)
+            return [c, push * pulse, 0.0]
+
+        end = 3.5 / rate + 3.0
+        found: Any = solve(_ball(torque, (0.1, 0.0, 0.0)), end, tolerance=tolerance)
+        error = abs(found.omega[0, 1] - push * (high - low) / rate) / found.omega[0, 0]
+        assert found.ended in ("complete", "sensitive")
+        assert error <= tolerance + 4e-15 * found.growth
+
+
+@pytest.mark.parametrize(
+    ("gap", "push", "tolerance", "phase", "end"),
+    [(3.89e-12, 78.2, 3.31e-6, 0.947, 1.77), (8.67e-10, 68.3, 5.8e-4, 0.99238876, 1.62)],
+)
+def test_a_floor_may_touch_its_next_level(
+    gap: float, push: float, tolerance: float, phase: float, end: float
+) -> None:
+    """The floor of an odd number selects another branch, by another floor."""
+
+    def torque(t: Any, w: Any) -> Any:
+        is_even = np.floor(4.0 + w[0] + gap) % 2 < 1
+        return [np.cos(t + phase), push * np.where(is_even, 0.0, 1.0), 0.0]
+
+    found: Any = solve(_ball(torque, (math.sin(phase), 0.1, 0.0)), end, tolerance=tolerance)
+    wanted = 0.1 + 2.0 * push * math.acos(1.0 - gap)
+    assert found.ended == "sensitive"
+    assert abs(found.omega[0, 1] - wanted) <= found.error
 
 
 def test_switches_that_coincide_at_an_end_are_one() -> None:

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import threading
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -326,3 +327,25 @@ def test_a_pickled_tape_has_no_hash_of_another_process() -> None:
     again = pickle.loads(pickle.dumps(tape))
     assert "_hash" not in vars(again)
     assert (again, hash(again)) == (tape, hash(tape))
+
+
+def test_solutions_in_threads_share_no_memory() -> None:
+    scenes = [
+        scene_of(lambda t, w, q: -0.5 * q[0] * q[1:] - 0.01 * w, attitude=(1, 0.2, 0, 0)),
+        scene_of(lambda t, w: [0.1 * np.sin(t), -0.1 * w[1], 0.05 * w[0] * w[1]]),
+    ]
+    wanted = [solve(each, 60.0) for each in scenes]
+    wrong: list[int] = []
+
+    def work(begin: int) -> None:
+        for k in range(begin, begin + 40):
+            found, alone = solve(scenes[k % 2], 60.0), wanted[k % 2]
+            if (found.error, found.growth) != (alone.error, alone.growth):
+                wrong.append(k)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert not wrong

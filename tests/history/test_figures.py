@@ -164,8 +164,6 @@ def test_curve_that_diverges_leaves_the_picture(found: dict[str, FigureFinding])
     assert wild.ending == "overflow after step 56"
 
 
-@pytest.mark.campaign
-@pytest.mark.usefixtures("fast")
 def test_points_are_those_at_which_the_twins_collocate(monkeypatch: pytest.MonkeyPatch) -> None:
     """From the second step on, a point of the printed programs is outside the step."""
     used: list[list[float]] = []
@@ -186,6 +184,8 @@ def test_points_are_those_at_which_the_twins_collocate(monkeypatch: pytest.Monke
         assert [max(points) > scene.step_size for points in used] == [False] + [True] * 99
 
 
+@pytest.mark.campaign
+@pytest.mark.usefixtures("fast")
 def test_list_of_files(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["figures", "--out", str(tmp_path)]) == 0
     captured = capsys.readouterr()

@@ -24,8 +24,9 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   real(8), intent(in), target :: own_sizes(n_own + 1)
   integer(4), intent(in) :: n_own_times         ! n_times, or 0 without own states
   real(8), intent(inout), target :: own(n_own + 1, n_own_times + 1) ! as attitudes; last row unused
-  real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
-  ! (3) estimated error, (4) error amplification, (5) steps of all integrations
+  real(8), intent(inout) :: effort(6) ! (1) factor on the work limit; out: (2) factor required, or
+  ! time (s) at which the switch (6) slides or is touched, (3) estimated error, (4) error
+  ! amplification, (5) steps of all integrations
   integer(4), intent(in) :: n_nodes
   real(8), intent(in), target :: nodes(n_nodes) ! in parts of a step
   integer(4), intent(in) :: n                   ! number of unknowns
@@ -51,7 +52,8 @@ subroutine tape_rows(n_numbers, numbers, omega0, n_times, times, tolerance, n_at
   status = solution%status
   steps = solution%steps
   n_steps = solution%n_steps
-  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
+  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent, &
+                real(solution%switch, 8)]
 end subroutine tape_rows
 
 subroutine tape_step(n_numbers, numbers, n, t, state, tolerances, relative, trial, longest, &

@@ -83,6 +83,9 @@ module problem
     real(dp) :: error                              !! estimated, over the largest |omega|
     real(dp) :: growth                             !! error amplification; negative: unknown
     real(dp) :: spent                              !! steps of all integrations
+    !! switch of a tape along which the solution slides, or that is touched so that an error decides
+    !! whether it changes; at the time `needed`
+    integer :: switch = 0
   end type solution_t
 
 contains

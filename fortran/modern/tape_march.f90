@@ -63,7 +63,9 @@ module tape_march
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
     real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
     logical :: finest = .false. ! whether the local tolerance is the smallest
-    real(dp) :: slides_at = 0.0_dp ! s
+    integer :: switch = 0            ! that slides, or is touched and changes most
+    real(dp) :: switches_at = 0.0_dp ! s
+    real(dp) :: touched = 0.0_dp     ! what its change is, relative
   end type outcome_t
 
   public :: march
@@ -208,7 +210,8 @@ contains
         whole_step = factor*s%h
         call next_crossing(nearly, switches, s, factor, verdict)
         if (verdict == SLIDES) then
-          found%slides_at = t(1)
+          found%switches_at = t(1)
+          found%switch = switches%touching
           solution%status = SLIDING
           exit
         end if
@@ -624,6 +627,11 @@ contains
       ! As far as it is known, the operand may be beyond the level during this part of the step.
       other = min(LARGEST_JUMP, abs(other - here)*abs(factor*s%h)*sqrt(nearly))
       where (other >= 0.0_dp) sum_of_noise = sum_of_noise + (other/ROUNDING)**2
+      if (maxval(weights*other) > found%touched) then
+        found%touched = maxval(weights*other)
+        found%switch = switches%touching
+        found%switches_at = at_time(1)
+      end if
     end subroutine check_touch
 
     subroutine cross()

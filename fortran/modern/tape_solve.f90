@@ -111,7 +111,11 @@ contains
                .or. outcome%error > max(request%tolerance, FINEST))) then
       solution%status = SENSITIVE
     end if
-    if (solution%status == SLIDING) solution%needed = outcome%slides_at
+    if (solution%status == SLIDING .or. solution%status == SENSITIVE &
+        .and. outcome%touched > 0.5_dp*ROUNDING*outcome%noise) then
+      solution%switch = outcome%switch
+      solution%needed = outcome%switches_at
+    end if
     if (solution%status == GAVE_UP) then
       ! If the error is too large already, another integration with shorter steps will be needed.
       if (outcome%error > request%tolerance) outcome%ahead = ANOTHER*outcome%ahead

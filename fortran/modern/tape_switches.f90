@@ -349,6 +349,7 @@ contains
 
     if (switches%is_turned(i)) then
       verdict = SLIDES
+      switches%touching = i
       return
     end if
     verdict = IS_CHANGED

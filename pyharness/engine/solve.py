@@ -36,6 +36,7 @@ from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
 from pyharness.engine.steps import rates as rates_of
 from pyharness.engine.steps import transformed_steps
+from pyharness.engine.switch_text import with_text
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import with_constant_body
@@ -193,6 +194,8 @@ def solve(
             f"dense output and events of {method} need the series of a recorded torque, which ends "
             "before the last time; allowed: a smooth torque, or opaque(function)"
         )
+    if found.reason is not None:
+        found = replace(found, reason=with_text(found.reason, given))
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output or functions is not None:
         if found.sol is None:

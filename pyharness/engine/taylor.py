@@ -15,10 +15,11 @@ from pyharness.engine.problem import (
 )
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
+from pyharness.engine.switch_text import reason_of
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
-from pyharness.model.errors import SLIDING, InputError, TimedError
+from pyharness.model.errors import InputError, TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, of_law
@@ -44,13 +45,13 @@ def taylor(
     if with_steps and scene.torque.in_space:
         with suppress(InputError):  # too many terms to be recorded
             scene = replace(scene, torque=of_law(scene.law))
-    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     n_own = len(scene.states)
     kernel, given = series_kernel(scene)
+    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
@@ -59,6 +60,8 @@ def taylor(
         room = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
         room |= {"at_nodes": at_nodes, "n_nodes": NODES}
     own = _NO_STATES
+    if kernel == "tape_rows":
+        work = np.append(work, 0.0)
     if n_own:
         own = np.zeros((n_own + 1, len(times) + 1), order="F")
         own[:n_own, 0] = [each.start for each in scene.states]
@@ -85,8 +88,8 @@ def taylor(
     )
     if n_own:
         found = replace(found, own=own[:n_own, 1 : 1 + len(found.time)].T)
-    if found.ended == "sliding":
-        found = replace(found, reason=str(TimedError(SLIDING, work[1])))
+    if kernel == "tape_rows" and found.ended in ("sliding", "sensitive"):
+        found = replace(found, reason=reason_of(found.ended, work[1], int(work[5])))
     kept = others[0] if others else 0
     if not 0 < kept <= most or not found.has_all_rows:
         return found

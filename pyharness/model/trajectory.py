@@ -124,7 +124,7 @@ class Trajectory(Conversions):
         The error amplification: the largest norm of the state-transition matrix of omega from any
         time to the end.
     reason : str or None
-        The time and the operation at which a recorded torque is undefined, or slides.
+        The time and the operation at which a recorded torque is undefined, slides, or is touched.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
@@ -251,9 +251,10 @@ class Trajectory(Conversions):
             return "The integration reached all requested times."
         by = "" if self.growth is None else f", amplified by {short(self.growth)},"
         left = counted(math.floor(self.digits or 0.0), "correct digit")
+        why = "" if self.reason is None else f" {self.reason[0].upper()}{self.reason[1:]}."
         return (
             f"The integration reached all requested times, but rounding errors{by} exceed the "
-            f"tolerance; omega has {left}."
+            f"tolerance; omega has {left}.{why}"
         )
 
     @property

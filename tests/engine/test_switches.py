@@ -590,3 +590,40 @@ def test_broken_powers_at_zero_are_named_and_solved_by_scipy(omega: Any) -> None
         ),
     )  # fmt: skip
     assert solve(smooth, 10.0).omega == pytest.approx(bare.omega, abs=1e-5)
+
+
+def test_sliding_and_touches_tell_time_and_function() -> None:
+    def law(t: Any, w: Any) -> Any:
+        return [-0.1 * np.where(2.0 * w[0] + w[1] * w[2] > 0.1, 1.0, -1.0), 0.0, 0.0]
+
+    scene = Scene("", (0.3, 0.1, 0.2), (3.0, 2.0, 1.0), torque=law)
+    reason = str(solve(scene, 20.0).reason)
+    assert "from t = 6.44725 s on" in reason
+    assert reason.endswith("; it is the sign of 2*w1 + w2*w3 - 0.1")
+    # In the axes of the scene, with the names of its states, also beside another switch.
+    matrix = [[3.0, 0.2, 0.0], [0.2, 2.0, 0.0], [0.0, 0.0, 1.0]]
+
+    def relay(t: Any, w: Any, s: Any) -> Any:
+        return [0, 0, 0], {"x": -np.where(s["x"] - 0.5 * np.sin(w[1]) > 0.2, 1.0, -1.0) + abs(w[0])}
+
+    own = Scene("", (0.01, 0.1, 0.2), inertia=matrix, torque=relay, states={"x": 1.0})
+    assert str(solve(own, 20.0).reason).endswith("the sign of x - 0.5*sin(w2) - 0.2")
+    floor = _ball(lambda t, w: [-0.1 * (2.0 * np.floor(w[0] + 0.5) - 1.0), 0, 0], (0.7, 0.0, 0.0))
+    assert "the floor of w1 + 0.5" in str(solve(floor, 20.0).reason)
+
+    def touched(t: Any, w: Any) -> Any:
+        return [1.0 - t, np.where(w[0] > 0.5 - 1e-13, 1.0, 0.0), 0.0]
+
+    found = solve(_ball(touched, (0.0, 0.0, 0.3)), [0.5, 2.0])
+    assert found.ended == "sensitive"
+    assert str(found.reason).startswith(
+        "a switch (where, sign, a comparison) is touched at t = 1 s"
+    )
+    assert str(found.reason).endswith("it is the sign of w1 - 0.5")
+    assert found.message.endswith("it is the sign of w1 - 0.5.")
+    # A result that is sensitive for another reason has none.
+    top = Scene(
+        "", (1e-4, 2.0, 1e-4), (3.0, 2.0, 1.0), torque=lambda t, w: 1e-9 * np.clip(w, -1, 1)
+    )
+    far = solve(top, 60.0, tolerance=1e-12)
+    assert (far.ended, far.reason) == ("sensitive", None)

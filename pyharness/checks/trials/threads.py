@@ -19,7 +19,9 @@ from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
 from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import METHODS
+from pyharness.engine.solve import solve
 from pyharness.engine.solver import PREPARED, Solver
+from pyharness.engine.terms import damping
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension
 from pyharness.model.listing import Listing
@@ -45,6 +47,9 @@ SCENES = (
     Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
     Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
+# Its error amplification is computed from many steps.
+_BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
+_LATE = 20.0  # s
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,7 @@ def jobs() -> list[Job]:
             call = partial(_program, scene, listing, implementation)
             found.append(Job(listing.program, scene, call))
         found.append(Job("refusals", scene, partial(_refusal, scene)))
+    found.append(Job("taylor", _BRAKED, partial(_estimates, _BRAKED)))
     return found + [Job("linear-solver", case_scene(n), partial(_linear, n)) for n in range(1, 8)]
 
 
@@ -107,6 +113,11 @@ def _rows(scene: Scene, name: str) -> bytes:
     tolerance = max(_TOLERANCE, finest(name, scene, _TIMES[-1]))
     found = method_candidate(name, tolerance).rows(scene, _TIMES)
     return found.omega.tobytes() + f"{found.steps} {found.evaluations} {found.ended}".encode()
+
+
+def _estimates(scene: Scene) -> bytes:
+    found = solve(scene, _LATE, "taylor", _TOLERANCE)
+    return found.omega.tobytes() + f"{found.error} {found.growth}".encode()
 
 
 def _prepared(scene: Scene, name: str) -> bytes:

@@ -235,3 +235,10 @@ def test_score_leaves_out_what_is_equivalent_or_does_not_count() -> None:
     verdicts = [Verdict(one, outcome, None, 2.0) for outcome in outcomes]
     assert caught_share(verdicts) == 0.75
     assert table(verdicts).splitlines()[1].split() == ["all", "3", "1", "2", "1", "2.0"]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"), [("2.0", "2.02"), ("1e-9", "1e-08"), ("0.0", "0.01"), ("1e308", "1.0")]
+)
+def test_a_constant_becomes_another_number(text: str, wanted: str) -> None:
+    assert text_source.constant(text) == wanted

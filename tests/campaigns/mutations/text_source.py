@@ -37,10 +37,10 @@ _DECLARES = re.compile(r"(const|let|var|double|int|size_t|Py_ssize_t|char|void|l
 
 
 def constant(text: str) -> str:
-    """Return ten times a number that has an exponent, and 1.01 times any other."""
+    """Return ten times a number that has an exponent, 1.01 times any other; 1 beyond the range."""
     number = float(text.lower().replace("d", "e").replace("_", ""))
     factor = 10.0 if "e" in text.lower() or "d" in text.lower() else 1.01
-    return repr(number * factor if number else 0.01)
+    return repr(1.0 if number * factor == float("inf") else number * factor or 0.01)
 
 
 def language_of(file: str) -> str:

@@ -122,8 +122,10 @@ function showTime() {
     digits: `${digits.map((x) => x.toFixed(1)).join(" and ")} (error amplification ${brief(growth)})`,
   };
   for (const [id, text] of Object.entries(numbers)) element(`at-${id}`).textContent = text;
-  const rows = [...document.querySelectorAll(".numbers > div")];
-  element("status").textContent = isPlaying ? "Playing." : rows.map(wordsOf).join("; ");
+  if (!isPlaying) {
+    const rows = [...document.querySelectorAll(".numbers > div")];
+    element("status").textContent = rows.map(wordsOf).join("; ");
+  }
   setField("time", time);
   const slider = element("slider");
   slider.value = time < 0.01 ? 0 : 1 + ((Math.log10(time) + 2) / DECADES) * (POSITIONS - 1);
@@ -143,8 +145,12 @@ function play(wanted) {
   isPlaying = wanted;
   last = null;
   element("play").textContent = wanted ? "Pause" : "Play";
-  if (wanted) requestAnimationFrame(advance);
-  else change({ ...state, time: Number(state.time.toPrecision(9)) });
+  if (wanted) {
+    element("status").textContent = "Playing.";
+    requestAnimationFrame(advance);
+  } else {
+    change({ ...state, time: Number(state.time.toPrecision(9)) });
+  }
 }
 
 // Advance the time by a frame. Browsers call no frame of a hidden page; the clock stops with them.

@@ -608,6 +608,10 @@ def test_sliding_and_touches_tell_time_and_function() -> None:
 
     own = Scene("", (0.01, 0.1, 0.2), inertia=matrix, torque=relay, states={"x": 1.0})
     assert str(solve(own, 20.0).reason).endswith("the sign of x - 0.5*sin(w2) - 0.2")
+    second = _ball(lambda t, w: [-0.1 * np.sign(w[0] - 0.2), abs(w[1] + 2.0) - 2.0 - w[1], 0.0])
+    assert str(solve(second, 20.0).reason).endswith("the sign of w1 - 0.2")
+    third = _ball(lambda t, w: [0.1 * abs(w[1] + 2.0) - 0.2, 0.0, -0.1 * np.sign(w[2] + w[1] + 1)])
+    assert str(solve(third, 20.0).reason).endswith("the sign of w2 + w3 + 1")
     floor = _ball(lambda t, w: [-0.1 * (2.0 * np.floor(w[0] + 0.5) - 1.0), 0, 0], (0.7, 0.0, 0.0))
     assert "the floor of w1 + 0.5" in str(solve(floor, 20.0).reason)
 

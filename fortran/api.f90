@@ -63,50 +63,6 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
 end subroutine taylor_rows
 
-subroutine space_torque_rows(coefficients, ratios, m_constant, m_rate, n_sines, sines, n_cosines, &
-                             cosines, omega0, n_times, times, tolerance, n_attitudes, attitudes, &
-                             effort, rows, n_rows, status, steps)
-  ! Integrate by Taylor series under a torque about the axes of space: omega and attitude at
-  ! `times`, which have one sign and are ordered away from 0.
-  !f2py threadsafe
-  use problem, only: problem_t, request_t, solution_t
-  use space_torque, only: space_torque_solve
-  implicit none
-  real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: ratios(3)              ! largest moment over each moment
-  real(8), intent(in) :: m_constant(3)          ! torque over the largest moment, 1/s2
-  real(8), intent(in) :: m_rate(3)              ! 1/s3
-  integer(4), intent(in) :: n_sines
-  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
-  integer(4), intent(in) :: n_cosines
-  real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
-  real(8), intent(in) :: omega0(3)              ! rad/s
-  integer(4), intent(in) :: n_times
-  real(8), intent(in), target :: times(n_times)         ! s
-  real(8), intent(in) :: tolerance              ! allowed error: relative, and of the angle in rad
-  !f2py integer(4), intent(in), check(n_attitudes == n_times) :: n_attitudes
-  integer(4), intent(in) :: n_attitudes         ! n_times
-  real(8), intent(inout), target :: attitudes(4, n_attitudes + 1) ! column 1: the attitude at time 0
-  !f2py real(8), optional, intent(inout) :: effort(5) = 1.0
-  real(8), intent(inout) :: effort(5) ! (1) factor on the work limit; out: (2) factor required,
-  ! (3) estimated error, (4) error amplification, (5) steps of all integrations
-  real(8), intent(out), target :: rows(3, n_times)      ! rad/s; n_rows columns are set
-  integer(4), intent(out) :: n_rows
-  integer(4), intent(out) :: status             ! 0 complete, 2 overflow, 4 work limit, 6 sensitive
-  integer(8), intent(out) :: steps
-  type(solution_t) :: solution
-
-  solution%rows => rows
-  solution%attitudes(1:4, 0:n_times) => attitudes
-  call space_torque_solve(problem_t(coefficients, m_constant, m_rate, n_sines, n_cosines, sines, &
-                                    cosines), &
-                          ratios, request_t(omega0, tolerance, effort(1), times), solution)
-  n_rows = solution%n_rows
-  status = solution%status
-  steps = solution%steps
-  effort(2:) = [solution%needed, solution%error, solution%growth, solution%spent]
-end subroutine space_torque_rows
-
 subroutine choose_instructions(highest, taken)
   ! Select the kernels of one instruction set, for tests: 0 plain, 1 AVX2, 2 AVX-512. If the
   ! processor lacks it, the best set below it is taken. `taken` is the set that is used.

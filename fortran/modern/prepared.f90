@@ -7,12 +7,11 @@ module prepared
   use kinds, only: dp
   use levels, only: quick_solve, tape_solve, taylor_solve
   use methods, only: CLOSED_FORM, CLOSED_FORM_OR_TAYLOR, GAUSS, IMPROVED_EULER, QUICK, &
-                     QUICK_OR_TAYLOR, RK4, SPACE_TORQUE, SPHERE, TAPE, TAYLOR
+                     QUICK_OR_TAYLOR, RK4, SPHERE, TAPE, TAYLOR
   use places, only: COEFFICIENTS, COEFFICIENTS_LOW, CONSTANT, EFFORT, METHOD, MOMENTS, &
                     MOMENTS_LOW, N_COSINES, N_SINES, RATE, STEP, TOLERANCE, WAVES
   use prepared_scale, only: bring_near_one, is_result, LARGE, scale_back
   use problem, only: problem_t, request_t, solution_t
-  use space_torque, only: space_torque_solve
   use sphere, only: sphere_rows
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, REFUSED, SENSITIVE
   use tape, only: tape_of
@@ -241,7 +240,7 @@ contains
       status = OVERFLOW
     else
       status = REFUSED
-      if (code /= SPACE_TORQUE .and. code /= TAYLOR) then
+      if (code /= TAYLOR) then
         both(:, 1) = packed(MOMENTS:MOMENTS + 2)
         both(:, 2) = packed(MOMENTS_LOW:MOMENTS_LOW + 2)
         call torque_free_attitude_rows(both, start, 1, times, state(:3), state(4:), n_rows, status)
@@ -263,12 +262,7 @@ contains
         solution%rows(1:3, 1:1) => state(:3)
         solution%attitudes(1:4, 0:1) => attitudes
         associate (request => request_t(omega0, packed(TOLERANCE), packed(EFFORT), times))
-          if (code == SPACE_TORQUE) then
-            call space_torque_solve(problem, maxval(packed(MOMENTS:MOMENTS + 2)) &
-                                    /packed(MOMENTS:MOMENTS + 2), request, solution)
-          else
-            call taylor_solve(problem, request, solution)
-          end if
+          call taylor_solve(problem, request, solution)
         end associate
         state(4:) = attitudes(:, 1)
         status = solution%status

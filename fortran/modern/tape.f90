@@ -8,6 +8,7 @@ module tape
 
   integer, parameter, public :: TIME_SLOT = 1
   integer, parameter, public :: FIRST_UNKNOWN = 2
+  integer, parameter, public :: N_INPUTS = 8 !! time, omega and attitude
 
   type, public :: tape_t
     integer :: n_unknowns                            !! 3, or 7 with attitude, and own states

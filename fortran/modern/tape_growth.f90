@@ -16,6 +16,7 @@ module tape_growth
   ! unknown j at its beginning. Blocks are merged in pairs when the array is full.
   type, public :: transitions_t
     real(dp) :: matrices(MOST_UNKNOWNS, MOST_UNKNOWNS, MOST_BLOCKS)
+    real(dp) :: noise(MOST_UNKNOWNS, MOST_BLOCKS) !! squares of the rounding errors in a block
     logical :: has_row(MOST_BLOCKS) !! whether it has a row of the output before the last
     integer :: n                    !! number of unknowns
     integer :: steps                !! steps in the open block
@@ -23,7 +24,7 @@ module tape_growth
     integer :: steps_a_block
   end type transitions_t
 
-  public :: begin, count_step, growth_of, MOST_UNKNOWNS
+  public :: begin, count_step, find_growth, MOST_UNKNOWNS
 
 contains
 
@@ -39,10 +40,11 @@ contains
     transitions%has_row(1) = .false.
   end subroutine begin
 
-  pure subroutine count_step(with_row, matrix, transitions, is_full)
+  pure subroutine count_step(with_row, matrix, noise, transitions, is_full)
     !! Count one more step. When its block is full or has a row, store the matrix of the block.
     logical, intent(in) :: with_row        !! whether the step has a row before the last
     real(dp), intent(in) :: matrix(:, :)   !! of the open block
+    real(dp), intent(in) :: noise(:)       !! squares of the rounding errors in it
     type(transitions_t), intent(inout) :: transitions
     logical, intent(out) :: is_full        !! the caller then starts a new matrix
     integer :: m, n
@@ -57,10 +59,12 @@ contains
       t%steps = 0
       t%closed = t%closed + 1
       t%matrices(:n, :n, t%closed) = bounded(matrix(:n, :n))
+      t%noise(:n, t%closed) = noise(:n)
       if (t%closed == MOST_BLOCKS) then
         do m = 1, MOST_BLOCKS/2
           t%matrices(:n, :n, m) = bounded(composed(n, t%matrices(:, :, 2*m), &
                                                    t%matrices(:, :, 2*m - 1)))
+          t%noise(:n, m) = t%noise(:n, 2*m - 1) + t%noise(:n, 2*m)
           t%has_row(m) = t%has_row(2*m - 1) .or. t%has_row(2*m)
         end do
         t%closed = MOST_BLOCKS/2
@@ -70,12 +74,15 @@ contains
     end associate
   end subroutine count_step
 
-  pure real(dp) function growth_of(matrix, sizes, transitions)
-    !! Return the largest norm from the beginning of any block to any requested time.
+  subroutine find_growth(matrix, noise, sizes, transitions, growth, blur)
+    !! Find the largest norm from the beginning of any block to any requested time, and the largest
+    !! rounding error at one.
     real(dp), intent(in) :: matrix(:, :) !! of the open block
+    real(dp), intent(in) :: noise(:)     !! squares of the rounding errors in it
     !! Of the unknowns, to which perturbations are relative; 0 of one that does not count.
     real(dp), intent(in) :: sizes(:)
     type(transitions_t), intent(in) :: transitions
+    real(dp), intent(out) :: growth, blur !! relative
     real(dp) :: unit(MOST_UNKNOWNS, MOST_UNKNOWNS), open_block(MOST_UNKNOWNS, MOST_UNKNOWNS)
     integer :: i, m
 
@@ -86,34 +93,43 @@ contains
     open_block = unit
     associate (n => transitions%n)
       open_block(:n, :n) = bounded(matrix(:n, :n))
+      growth = 1.0_dp
+      blur = 0.0_dp
+      call grow(transitions%closed, open_block, sum_of_squares(n, unit, sqrt(noise), sizes) &
+                + sum_of_squares(n, open_block, sqrt(noise), sizes))
     end associate
-    growth_of = growth_until(transitions%closed, open_block, sizes, transitions)
     do m = 1, transitions%closed
-      if (transitions%has_row(m)) then
-        growth_of = max(growth_of, growth_until(m, unit, sizes, transitions))
-      end if
+      if (transitions%has_row(m)) call grow(m, unit, 0.0_dp)
     end do
-  end function growth_of
 
-  pure real(dp) function growth_until(last, behind, sizes, transitions)
-    !! Return the largest norm of the derivative by the unknowns at the beginning of any block up to
-    !! `last`.
-    integer, intent(in) :: last
-    real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from the end of block `last`
-    real(dp), intent(in) :: sizes(:)
-    type(transitions_t), intent(in) :: transitions
-    real(dp) :: matrix(MOST_UNKNOWNS, MOST_UNKNOWNS)
-    integer :: m, n
+  contains
 
-    n = transitions%n
-    matrix = behind
-    growth_until = norm(n, matrix, sizes)
-    do m = last, 1, -1
-      if (growth_until >= LARGEST) exit
-      matrix(:n, :n) = composed(n, matrix, transitions%matrices(:, :, m))
-      growth_until = max(growth_until, norm(n, matrix, sizes))
-    end do
-  end function growth_until
+    subroutine grow(last, behind, noise_behind)
+      !! Find the same for the time after block `last` and what is behind it.
+      integer, intent(in) :: last
+      real(dp), intent(in) :: behind(MOST_UNKNOWNS, MOST_UNKNOWNS) !! from the end of that block
+      real(dp), intent(in) :: noise_behind
+      real(dp) :: product(MOST_UNKNOWNS, MOST_UNKNOWNS), noise_of_block(MOST_UNKNOWNS), squares
+      integer :: m
+
+      associate (t => transitions, n => transitions%n)
+        product = behind
+        squares = noise_behind
+        growth = max(growth, norm(n, product, sizes))
+        do m = last, 1, -1
+          if (growth >= LARGEST) exit
+          ! The errors of a block are at its beginning or its end.
+          noise_of_block(:n) = sqrt(t%noise(:n, m))
+          squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
+          product(:n, :n) = composed(n, product, t%matrices(:, :, m))
+          squares = squares + sum_of_squares(n, product, noise_of_block, sizes)
+          growth = max(growth, norm(n, product, sizes))
+        end do
+        blur = max(blur, min(LARGEST, sqrt(squares)))
+      end associate
+    end subroutine grow
+
+  end subroutine find_growth
 
   pure real(dp) function norm(n, a, sizes)
     !! Return nearly the largest singular value of a matrix of relative perturbations; 1 for a
@@ -121,16 +137,28 @@ contains
     integer, intent(in) :: n
     real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
     real(dp), intent(in) :: sizes(:)
-    integer :: i, j
 
-    norm = real(1 - count(sizes(:n) > 0.0_dp), dp)
-    do j = 1, n
-      do i = 1, n
-        if (sizes(i) > 0.0_dp) norm = norm + (a(i, j)*(sizes(j)/sizes(i)))**2
-      end do
-    end do
+    norm = real(1 - count(sizes(:n) > 0.0_dp), dp) + sum_of_squares(n, a, sizes, sizes)
     norm = min(LARGEST, sqrt(max(1.0_dp, norm)))
   end function norm
+
+  pure real(dp) function sum_of_squares(n, a, perturbations, sizes)
+    !! Return the square of the relative perturbation that a matrix makes of independent ones.
+    integer, intent(in) :: n
+    real(dp), intent(in) :: a(MOST_UNKNOWNS, MOST_UNKNOWNS)
+    real(dp), intent(in) :: perturbations(:)
+    real(dp), intent(in) :: sizes(:)
+    integer :: i, j
+
+    sum_of_squares = 0.0_dp
+    do j = 1, n
+      do i = 1, n
+        if (sizes(i) > 0.0_dp) then
+          sum_of_squares = sum_of_squares + (a(i, j)*(perturbations(j)/sizes(i)))**2
+        end if
+      end do
+    end do
+  end function sum_of_squares
 
   elemental real(dp) function bounded(x)
     !! Limit an element of a derivative to LARGEST, which also replaces NaN.

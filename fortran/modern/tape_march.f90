@@ -8,13 +8,14 @@ module tape_march
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
   use step_limit, only: check_steps, limit_of, step_limit_t
-  use tape, only: FIRST_UNKNOWN, next_break, tape_arrays_t, tape_t, TIME_SLOT
-  use tape_growth, only: begin, count_step, growth_of, MOST_UNKNOWNS, transitions_t
+  use tape, only: FIRST_UNKNOWN, N_INPUTS, next_break, tape_arrays_t, tape_t, TIME_SLOT
+  use tape_growth, only: begin, count_step, find_growth, MOST_UNKNOWNS, transitions_t
   use tape_live, only: keep_live, settle
   use tape_plan, only: converge, fitting, LEAST_LOCAL_TOLERANCE, local_tolerance_of, &
                        MOST_TRIES, order_for
-  use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, perturb_tape, series_t, &
-                         SIDE_BY_SIDE, slot_gradient, sum_perturbations, VARIATION_TOLERANCE
+  use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, PADDED, perturb_tape, &
+                         series_t, SIDE_BY_SIDE, slot_gradient, sum_perturbations, sum_terms, &
+                         VARIATION_TOLERANCE
   use tape_switches, only: CROSSES, follow, IS_CHANGED, next_crossing, operand_error, &
                            resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
@@ -26,6 +27,8 @@ module tape_march
   ! Least factor on the first step that was tried, from rest and otherwise.
   real(dp), parameter :: SHORTER = 0.5_dp, MUCH_SHORTER = 0.05_dp
   real(dp), parameter :: GUESSED = 0.85_dp
+  real(dp), parameter :: MUCH_LESS = 0.5_dp ! change of a local tolerance that changes the order
+  real(dp), parameter :: FEW_STEPS = 32.0_dp ! for which perturbations may be inaccurate
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
   ! Largest error for which the linearised equations hold.
   real(dp), parameter :: LINEAR_RANGE = 0.1_dp
@@ -61,6 +64,7 @@ module tape_march
     real(dp) :: least = 0.0_dp  ! lower bound, for estimates that are too small
     real(dp) :: growth = 1.0_dp ! error amplification until any requested time
     real(dp) :: noise = 0.0_dp  ! rounding error of all steps, in units, relative
+    real(dp) :: blur = 0.0_dp   ! the same, amplified until any requested time
     real(dp) :: ahead = 0.0_dp  ! estimated steps to the end, if the work limit is exceeded
     logical :: finest = .false. ! whether the local tolerance is the smallest
     integer :: switch = 0            ! that slides, or is touched and changes most
@@ -89,7 +93,8 @@ contains
     real(dp) :: weights(tape%n_unknowns)      ! which make the unknowns comparable
     real(dp) :: noise(tape%n_unknowns)        ! of the rates
     real(dp) :: sum_of_noise(tape%n_unknowns) ! squares, of all steps
-    real(dp) :: change(tape%n_unknowns)       ! of the unknowns in the step
+    real(dp) :: noise_of_block(tape%n_unknowns) ! of those since the last block was closed
+    real(dp) :: change(PADDED)                ! of the unknowns in the step
     ! The error, and a perturbation of each unknown, in blocks.
     real(dp) :: lanes(SIDE_BY_SIDE, MOST_UNKNOWNS, MOST_BLOCKS)
     real(dp) :: own_sizes(tape%n_unknowns)    ! of own states: the largest so far
@@ -130,8 +135,11 @@ contains
     solution%n_rows = 0
     solution%n_steps = 0
     sum_of_noise = 0.0_dp
-    s%a = 0.0_dp
-    s%blocks(:, :, TIME_SLOT:FIRST_UNKNOWN + n - 1, :) = 0.0_dp
+    noise_of_block = 0.0_dp
+    s%a(:, :min(N_INPUTS, tape%n_slots)) = 0.0_dp
+    if (switches%n > 0) s%a = 0.0_dp
+    ! tape_terms.c leaves half of the lanes out, and tiny numbers in them would cost time.
+    if (n == 3) s%blocks = 0.0_dp
     call begin(n, transitions)
     call begin_lanes()
     live = tape
@@ -143,7 +151,7 @@ contains
     local_tolerance = max(LEAST_LOCAL_TOLERANCE, 0.125_dp*attempt%tolerance)
     ! The first step is a guess: a radian. From rest it is the whole time.
     s%h = sign(min(abs(t_end), 1.0_dp/max(scale, LEAST_SCALE)), t_end)
-    s%order = order_for(local_tolerance_of(attempt%tolerance, t_end/s%h), s%powers)
+    s%order = order_for(share_of(t_end/s%h), s%powers, of_steps=.false.)
     limit = limit_of(attempt%most_steps, attempt%stride)
     tries = 0
     is_rejected = .false.
@@ -176,9 +184,9 @@ contains
         end if
         if (.not. has_guess) then
           has_guess = .true.
-          local_tolerance = local_tolerance_of(attempt%tolerance, t_end/(factor*s%h))
+          local_tolerance = share_of(t_end/(factor*s%h))
           found%finest = local_tolerance <= LEAST_LOCAL_TOLERANCE
-          order = order_for(local_tolerance, s%powers)
+          order = order_for(local_tolerance, s%powers, of_steps=.false.)
           is_low = order > s%order
           s%order = order
           if (is_low .or. from_rest) cycle
@@ -242,9 +250,7 @@ contains
       call add_rows()
       if (solution%status /= COMPLETE) exit
       if (associated(solution%nodes)) call add_nodes()
-      do i = 1, n
-        sum_of_noise(i) = sum_of_noise(i) + (noise(i)*factor*s%h)**2
-      end do
+      call add_noise((noise*factor*s%h)**2)
       is_compared = .false.
       if (switches%n > 0) call check_touch()
       call take_step()
@@ -267,7 +273,8 @@ contains
         solution%status = OVERFLOW
         exit
       end if
-      call count_step(solution%n_rows > n_before, transposed(n, lanes), transitions, is_full)
+      call count_step(solution%n_rows > n_before, transposed(n, lanes), noise_of_block, &
+                      transitions, is_full)
       if (is_full) call begin_block()
       t = t_next
       has_values = size(tape%table_starts) == 1 .and. verdict == STAYS .and. .not. is_compared
@@ -276,6 +283,7 @@ contains
       s%h = factor*s%h
       if (verdict == CROSSES) s%h = whole_step
       if (abs(s%h) > abs(rest)) s%h = rest
+      if (has_guess) call share_tolerance()
       call check_steps(found%steps, t(1), rest, arrives .or. verdict == CROSSES, limit, &
                        found%ahead, solution%status)
       if (solution%status /= COMPLETE) exit
@@ -286,7 +294,8 @@ contains
     else where
       sizes = 0.0_dp
     end where
-    found%growth = growth_of(transposed(n, lanes), sizes, transitions)
+    call find_growth(transposed(n, lanes), noise_of_block, sizes, transitions, found%growth, &
+                     found%blur)
     found%noise = norm2(weights*sqrt(sum_of_noise))
     do i = 1, n
       found%error = max(found%error, weights(i)*abs(lanes(1, i, 1)))
@@ -309,15 +318,42 @@ contains
     end subroutine begin_own
 
     subroutine begin_block()
-      !! Set the perturbations to the unit vector of each unknown.
+      !! Set the perturbations to the unit vector of each unknown, and the rounding errors to zero.
       integer :: i
 
+      noise_of_block = 0.0_dp
       lanes(2:, :n, 1) = 0.0_dp
       lanes(:, :n, 2:n_blocks) = 0.0_dp
       do i = 1, n
         lanes(1 + mod(i, SIDE_BY_SIDE), i, 1 + i/SIDE_BY_SIDE) = 1.0_dp
       end do
     end subroutine begin_block
+
+    subroutine add_noise(squares)
+      !! Add the squares of rounding errors, in units.
+      real(dp), intent(in) :: squares(:)
+
+      sum_of_noise = sum_of_noise + squares
+      noise_of_block = noise_of_block + squares
+    end subroutine add_noise
+
+    real(dp) function share_of(steps)
+      !! Return the part of the tolerance that a step may use.
+      real(dp), intent(in) :: steps !! expected number
+
+      share_of = local_tolerance_of(attempt%tolerance, steps, with_attitude=first_own > 4)
+    end function share_of
+
+    subroutine share_tolerance()
+      !! Divide the tolerance anew, because the steps may become shorter or longer.
+      real(dp) :: share
+
+      share = share_of(real(found%steps, dp) + rest/s%h)
+      if (share < MUCH_LESS*local_tolerance .or. MUCH_LESS*share > local_tolerance) then
+        s%order = order_for(share, s%powers, of_steps=.false.)
+      end if
+      local_tolerance = share
+    end subroutine share_tolerance
 
     subroutine shorten()
       !! Try a shorter step, because the terms are not finite.
@@ -351,13 +387,14 @@ contains
 
     subroutine perturb()
       !! Expand the perturbations.
-      integer :: block, block_is_short
+      integer :: block, block_is_short, is_long
 
       is_short = 0
+      is_long = merge(1, 0, found%steps + rest/(factor*s%h) > FEW_STEPS)
       do block = 1, n_blocks
         last_terms(block) = perturb_tape(arrays_of_block(block), SIDE_BY_SIDE*(block - 1), s%h, &
                                          s%order, factor, weights, VARIATION_TOLERANCE, &
-                                         block_is_short)
+                                         is_long, block_is_short)
         is_short = max(is_short, block_is_short)
       end do
     end subroutine perturb
@@ -386,6 +423,7 @@ contains
             associate (v => s%blocks(lane, :, FIRST_UNKNOWN - 1 + i, block), &
                        relative => weights(i)/weights(number))
               first = max(first, relative*abs(v(1)))
+              if (last_terms(block) < s%order) cycle
               size_of_last = max(size_of_last, relative*abs(v(1 + s%order)), &
                                  relative*abs(v(s%order))/factor)
             end associate
@@ -518,24 +556,12 @@ contains
       !! Return whether the series continue beyond the end of the step: whether the derivatives
       !! there are those of the series. A pulse within the step may be too small to be seen at its
       !! beginning. The change of the unknowns is computed too.
-      real(dp) :: derivatives(tape%n_unknowns), slope(tape%n_unknowns)
-      real(dp) :: defect(tape%n_unknowns), size_of_terms(tape%n_unknowns), rounded, allowed
+      real(dp) :: derivatives(tape%n_unknowns), slope(PADDED)
+      real(dp) :: defect(tape%n_unknowns), size_of_terms(PADDED), rounded, allowed
       real(dp) :: reached, cancelled
-      integer :: i, k
+      integer :: i
 
-      change = 0.0_dp
-      slope = 0.0_dp
-      size_of_terms = 0.0_dp
-      ! The sums of the unknowns do not wait for each other.
-      do k = s%order, 1, -1
-        do i = 1, n
-          associate (term => s%a(k, FIRST_UNKNOWN - 1 + i))
-            change(i) = factor*(change(i) + term)
-            slope(i) = factor*(slope(i) + k*term)
-            size_of_terms(i) = factor*(size_of_terms(i) + k*abs(term))
-          end associate
-        end do
-      end do
+      call sum_terms(s%arrays, s%order, factor, change, slope, size_of_terms)
       ! Large terms that cancel are rounded, and a shorter step has smaller terms.
       reached = max(scale, maxval(abs(y(:3) + change(:3))), LEAST_SCALE)
       cancelled = max(maxval(size_of_terms(:3))/reached, 2.0_dp*sum(size_of_terms(4:first_own - 1)))
@@ -547,11 +573,11 @@ contains
         is_continued = .false.
         return
       end if
-      rounded = max(1.0_dp, maxval(weights*(size_of_terms + noise*abs(factor*s%h))))
-      call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, derivatives)
+      rounded = max(1.0_dp, maxval(weights*(size_of_terms(:n) + noise*abs(factor*s%h))))
+      call derivatives_at(live, t_next, y + (change(:n) + y_low), -s%h, s, derivatives)
       rates = derivatives
       allowed = MOST_DEFECT*local_tolerance + MOST_ROUNDING*epsilon(rounded)*rounded
-      defect = weights*abs(factor*s%h*derivatives - slope)
+      defect = weights*abs(factor*s%h*derivatives - slope(:n))
       ! NaN is not allowed.
       is_continued = all(defect <= allowed)
       if (is_continued) found%least = max(found%least, maxval(defect)/(s%order + 1))
@@ -623,10 +649,10 @@ contains
       switches%on_level = on_level
       s%a(0, switches%slots) = slots
       call keep_live(tape, switches, s, live)
-      call derivatives_at(live, t_next, y + (change + y_low), -s%h, s, rates)
+      call derivatives_at(live, t_next, y + (change(:n) + y_low), -s%h, s, rates)
       ! As far as it is known, the operand may be beyond the level during this part of the step.
       other = min(LARGEST_JUMP, abs(other - here)*abs(factor*s%h)*sqrt(nearly))
-      where (other >= 0.0_dp) sum_of_noise = sum_of_noise + (other/ROUNDING)**2
+      call add_noise(merge((other/ROUNDING)**2, 0.0_dp, other >= 0.0_dp))
       if (maxval(weights*other) > found%touched) then
         found%touched = maxval(weights*other)
         found%switch = switches%touching
@@ -656,7 +682,7 @@ contains
           end associate
         end do
       end do
-      sum_of_noise = sum_of_noise + (jump*blur)**2
+      call add_noise((jump*blur)**2)
     end subroutine cross
 
     subroutine take_step()
@@ -684,9 +710,9 @@ contains
         do k = s%order, 1, -1
           change(i) = part*(change(i) + s%a(k, FIRST_UNKNOWN - 1 + i))
         end do
-        error(i) = s%v(1, last_terms(1), FIRST_UNKNOWN - 1 + i)
+        error(i) = s%blocks(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
         do k = last_terms(1) - 1, 0, -1
-          error(i) = part*error(i) + s%v(1, k, FIRST_UNKNOWN - 1 + i)
+          error(i) = part*error(i) + s%blocks(1, k, FIRST_UNKNOWN - 1 + i, 1)
         end do
       end do
       error = error - (part/factor)**(s%order + 1)*left

@@ -9,7 +9,10 @@ module tape_plan
   private
 
   integer, parameter, public :: MOST_TRIES = 80
-  integer, parameter :: LEAST_ORDER = 8
+  ! Of an integration and of single steps: least order, and its factor on the logarithm of the
+  ! local tolerance. An integration has more work in a step that does not depend on the order.
+  integer, parameter :: LEAST_ORDER = 16, LEAST_OF_STEPS = 8
+  real(dp), parameter :: ORDERS = 1.1_dp, ORDERS_OF_STEPS = 0.7_dp
   integer, parameter :: CHECKED = 3  ! last terms checked: from rest a ramp makes only every third
   real(dp), parameter :: LONGER = 16.0_dp  ! largest factor on the step that was tried
   real(dp), parameter, public :: LEAST_LOCAL_TOLERANCE = 1e-18_dp ! below rounding
@@ -49,7 +52,7 @@ contains
     end do
   end function fitting
 
-  pure subroutine converge(tape, order, smallest, a, powers, factor)
+  subroutine converge(tape, order, smallest, a, powers, factor)
     !! Reduce the factor on the step so that the series of every operation converges. The last terms
     !! of the unknowns alone do not show it: an exponential may be so small at the beginning of a
     !! step that it changes no digit, and large a little later. Its argument therefore changes by at
@@ -115,26 +118,33 @@ contains
 
   end subroutine converge
 
-  pure integer function order_for(local_tolerance, powers)
+  pure integer function order_for(local_tolerance, powers, of_steps)
     !! Return the order with the least work for the requested digits (Jorba and Zou 2005), or the
     !! larger one that shows powers.
     real(dp), intent(in) :: local_tolerance
     type(powers_t), intent(in) :: powers
+    logical, intent(in) :: of_steps !! whether of single steps
+    real(dp) :: factor
 
-    order_for = max(LEAST_ORDER, powers%order, 1 + ceiling(-0.7_dp*log(local_tolerance)))
+    factor = merge(ORDERS_OF_STEPS, ORDERS, of_steps)
+    order_for = max(merge(LEAST_OF_STEPS, LEAST_ORDER, of_steps), powers%order, &
+                    1 + ceiling(-factor*log(local_tolerance)))
     order_for = min(MOST_ORDER, order_for)
   end function order_for
 
-  pure real(dp) function local_tolerance_of(tolerance, steps)
+  pure real(dp) function local_tolerance_of(tolerance, steps, with_attitude)
     !! Return the largest last terms. An error of omega becomes an error of phase, which grows with
-    !! time; the weights are those of the special kernel for 0.4 radians in a step.
+    !! time; the weights are those of the special kernel for 0.4 radians in a step. It becomes an
+    !! error of the attitude too.
     real(dp), intent(in) :: tolerance
     real(dp), intent(in) :: steps !! expected number
-    real(dp) :: way
+    logical, intent(in) :: with_attitude
+    real(dp) :: way, weight
 
     way = 0.12_dp*abs(steps)
-    local_tolerance_of = max(LEAST_LOCAL_TOLERANCE, &
-                             tolerance/(8.0_dp + way + way*(way/14.0_dp)))
+    weight = 8.0_dp + way + way*(way/14.0_dp)
+    if (with_attitude) weight = weight*(1.0_dp + way)
+    local_tolerance_of = max(LEAST_LOCAL_TOLERANCE, tolerance/weight)
   end function local_tolerance_of
 
 end module tape_plan

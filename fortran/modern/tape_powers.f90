@@ -21,7 +21,8 @@ module tape_powers
   real(dp), parameter, public :: INVISIBLE = 100.0_dp
 
   type, public :: powers_t
-    ! (slots): the factors of a product that is of many factors, or part of one; otherwise 0
+    ! (slots): the number of factors of a product that is of many factors, or part of one, negative;
+    ! 1 for a factor of one that is no product; otherwise 0
     integer, allocatable :: factors(:)
     ! (slots): logarithm of the largest coefficient with which a product of many factors is added
     ! to others; -huge if it is a factor of other products alone
@@ -176,9 +177,14 @@ contains
       end associate
     end do
     where (.not. is_part) powers%factors = 0
+    do n = 1, tape%n_operations
+      associate (factors => powers%factors(tape%operations(4, n)))
+        if (tape%operations(1, n) == PRODUCT) factors = -factors
+      end associate
+    end do
   end subroutine keep_many
 
-  pure subroutine resolve(tape, order, smallest, a, powers, factor)
+  subroutine resolve(tape, order, smallest, a, powers, factor)
     !! Reduce the factor on the step so that products of many factors are resolved.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: order
@@ -186,26 +192,42 @@ contains
     real(dp), intent(in) :: a(0:, :) !! (terms, slots)
     type(powers_t), intent(inout) :: powers
     real(dp), intent(inout) :: factor
-    real(dp) :: largest, visible
+    real(dp) :: largest
+    logical :: has_least
     integer :: n
 
     if (powers%order == 0) return
-    visible = min(0.0_dp, logarithm(smallest)) - INVISIBLE
-    do n = 1, tape%n_slots
-      associate (divisor => powers%divisors(n), least => powers%least(n))
-        least = visible
-        if (divisor == SEVERAL) then
-          least = log(LEAST_NUMBER)
-        else if (divisor /= NONE) then
-          least = min(visible, logarithm(abs(a(0, divisor))) - INVISIBLE)
-        end if
-        least = max(log(LEAST_NUMBER), least) - powers%scales(n)
-      end associate
-    end do
+    has_least = .false.
     do while (factor > 0.0_dp)
       do n = 1, tape%n_slots
         if (powers%factors(n) > 0) powers%shown(:, n) = size_and_mean(a(:order - 1, n), factor)
       end do
+      if (.not. has_least) then
+        ! Where all means are small enough, it does not matter which products are visible.
+        powers%least = -huge(0.0_dp)
+        call find_largest()
+        if (largest <= 1.0_dp) return
+        call find_least()
+        has_least = .true.
+      end if
+      do n = 1, tape%n_slots
+        if (powers%factors(n) > 0) powers%shown(1, n) = logarithm(powers%shown(1, n))
+      end do
+      call find_largest()
+      if (largest <= 1.0_dp) return
+      if (largest <= 2.0_dp) then
+        factor = factor*min(0.9_dp, 1.0_dp/largest)
+      else
+        factor = 0.5_dp*factor
+      end if
+    end do
+
+  contains
+
+    subroutine find_largest()
+      !! Find the largest mean order of a product that matters, over that allowed.
+      integer :: n
+
       largest = 0.0_dp
       do n = 1, tape%n_operations
         associate (first => tape%operations(2, n), second => tape%operations(3, n), &
@@ -219,17 +241,31 @@ contains
         end associate
       end do
       largest = largest/(PART_OF_ORDER*order)
-      if (largest <= 1.0_dp) return
-      if (largest <= 2.0_dp) then
-        factor = factor*min(0.9_dp, 1.0_dp/largest)
-      else
-        factor = 0.5_dp*factor
-      end if
-    end do
+    end subroutine find_largest
+
+    subroutine find_least()
+      !! Find the logarithms of the least products that matter.
+      real(dp) :: visible
+      integer :: n
+
+      visible = min(0.0_dp, logarithm(smallest)) - INVISIBLE
+      do n = 1, tape%n_slots
+        associate (divisor => powers%divisors(n), least => powers%least(n))
+          least = visible
+          if (divisor == SEVERAL) then
+            least = log(LEAST_NUMBER)
+          else if (divisor /= NONE) then
+            least = min(visible, logarithm(abs(a(0, divisor))) - INVISIBLE)
+          end if
+          least = max(log(LEAST_NUMBER), least) - powers%scales(n)
+        end associate
+      end do
+    end subroutine find_least
+
   end subroutine resolve
 
   pure function size_and_mean(terms, factor)
-    !! Return the logarithm of the sum of the absolute terms, and their mean order.
+    !! Return the sum of the absolute terms, and their mean order.
     real(dp), intent(in) :: terms(0:)
     real(dp), intent(in) :: factor !! on the step
     real(dp) :: size_and_mean(2)
@@ -242,7 +278,7 @@ contains
       weighted = factor*weighted + total
       total = factor*total + abs(terms(k))
     end do
-    size_and_mean = [logarithm(total), factor*weighted/max(LEAST_NUMBER, total)]
+    size_and_mean = [total, factor*weighted/max(LEAST_NUMBER, total)]
   end function size_and_mean
 
   pure real(dp) function logarithm(x)

@@ -39,6 +39,8 @@ module tape_series
   ! Largest terms of perturbations that a step leaves out, relative.
   real(dp), parameter, public :: VARIATION_TOLERANCE = 1e-3_dp
 
+  integer, parameter, public :: PADDED = 4*((MOST_UNKNOWNS + 3)/4) !! unknowns, four side by side
+
   ! Blocks of perturbations: the error, and one for each unknown.
   integer, parameter, public :: MOST_BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE)/SIDE_BY_SIDE
 
@@ -48,9 +50,8 @@ module tape_series
     integer :: order
     ! (0:LAST_TERM, slots): terms in ascending order
     real(dp), pointer, contiguous :: a(:, :) => null()
-    ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots): perturbations; the first block of them
-    real(dp), pointer, contiguous :: v(:, :, :) => null()
-    real(dp), pointer, contiguous :: blocks(:, :, :, :) => null() !! all of them, as v
+    ! (SIDE_BY_SIDE, 0:MOST_ORDER, slots, blocks): perturbations
+    real(dp), pointer, contiguous :: blocks(:, :, :, :) => null()
     real(dp), allocatable :: noise(:)       !! (slots): rounding errors of terms 0, in units
     type(powers_t) :: powers
     type(tape_arrays_t) :: arrays           !! what tape_terms.c reads of the tape
@@ -66,12 +67,13 @@ module tape_series
   end type block_t
 
   interface
-    pure integer(c_int64_t) function size_of_work(n_operations, n_slots) &
+    pure integer(c_int64_t) function size_of_work(n_operations, n_products, n_slots, n_terms) &
       bind(c, name="size_of_work_level")
       !! Return the size of the working storage, in numbers.
       import :: c_int, c_int64_t
       implicit none(type, external)
-      integer(c_int), intent(in), value :: n_operations, n_slots
+      integer(c_int), intent(in), value :: n_operations, n_products, n_slots
+      integer(c_int), intent(in), value :: n_terms !! of all combinations
     end function size_of_work
 
     subroutine begin_work(tape, n_slots) bind(c, name="begin_work_level")
@@ -91,8 +93,19 @@ module tape_series
       integer(c_int), intent(in), value :: order
     end subroutine expand_tape
 
+    subroutine sum_terms(tape, order, factor, changes, slopes, sizes) &
+      bind(c, name="sum_terms_level")
+      !! Sum the terms of the unknowns, of their derivatives times h, and of these without signs.
+      import :: c_int, dp, PADDED, tape_arrays_t
+      implicit none(type, external)
+      type(tape_arrays_t), intent(in) :: tape
+      integer(c_int), intent(in), value :: order
+      real(dp), intent(in), value :: factor    !! the step over h
+      real(dp), intent(inout) :: changes(PADDED), slopes(PADDED), sizes(PADDED)
+    end subroutine sum_terms
+
     integer(c_int) function perturb_tape(tape, number, h, order, factor, weights, tolerance, &
-                                         is_short) bind(c, name="perturb_tape_level")
+                                         is_long, is_short) bind(c, name="perturb_tape_level")
       !! Expand the perturbations to as many terms as they need, and return the last one's number.
       import :: c_int, dp, tape_arrays_t
       implicit none(type, external)
@@ -103,6 +116,7 @@ module tape_series
       real(dp), intent(in), value :: factor    !! the step over h
       real(dp), intent(in) :: weights(tape%n_unknowns) !! make the unknowns comparable
       real(dp), intent(in), value :: tolerance !! of the terms that are left out, relative
+      integer(c_int), intent(in), value :: is_long !! not 0: there are many steps
       integer(c_int), intent(out) :: is_short  !! not 0: all terms do not suffice
     end function perturb_tape
 
@@ -141,25 +155,28 @@ module tape_series
   end interface
 
   public :: allocate_series, begin_work, chosen, derivatives_at, expand, noise_of, perturb_tape, &
-            slot_gradient, sum_perturbations, value_of, vary_tape
+            slot_gradient, sum_perturbations, sum_terms, value_of, vary_tape
 
 contains
 
-  subroutine allocate_series(tape, n_blocks, memory, s, fits)
+  subroutine allocate_series(tape, n_blocks, n_perturbed, memory, s, fits)
     !! Allocate the terms of all slots, and of blocks of perturbations.
     type(tape_t), intent(in) :: tape
     integer, intent(in) :: n_blocks !! 0 for no perturbations
+    integer, intent(in) :: n_perturbed !! slots with perturbations
     real(dp), allocatable, intent(inout), target :: memory(:) !! of the terms
     type(series_t), intent(inout) :: s
     logical, intent(out) :: fits !! whether there is enough memory
     type(c_ptr) :: perturbations, work
     integer(c_intptr_t) :: address ! in numbers
     integer(int64) :: at, n_terms, n_perturbations, n_work
-    integer :: failed
+    integer :: failed, n_products
 
-    n_terms = (LAST_TERM + 1)*int(tape%n_slots, int64)
-    n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(tape%n_slots, int64)*n_blocks
-    n_work = size_of_work(tape%n_operations, tape%n_slots)
+    ! Results that nobody needs have a slot too.
+    n_terms = (LAST_TERM + 1)*(1 + int(tape%n_slots, int64))
+    n_perturbations = SIDE_BY_SIDE*(MOST_ORDER + 1)*int(n_perturbed, int64)*n_blocks
+    n_products = count(tape%operations(1, :) == PRODUCT)
+    n_work = size_of_work(tape%n_operations, n_products, tape%n_slots, size(tape%slots))
     fits = .false.
     allocate (memory(n_work + n_perturbations + n_terms + 2*SIDE_BY_SIDE), stat=failed)
     if (failed /= 0) return
@@ -175,13 +192,12 @@ contains
     at = at + n_work
     perturbations = c_null_ptr
     if (n_blocks > 0) then
-      s%blocks(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots, 1:n_blocks) => &
+      s%blocks(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:n_perturbed, 1:n_blocks) => &
         memory(at:at + n_perturbations - 1)
-      s%v(1:SIDE_BY_SIDE, 0:MOST_ORDER, 1:tape%n_slots) => s%blocks(:, :, :, 1)
-      perturbations = c_loc(s%v)
+      perturbations = c_loc(s%blocks)
     end if
     at = at + n_perturbations + SIDE_BY_SIDE - 1
-    s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - 1)
+    s%a(0:LAST_TERM, 1:tape%n_slots) => memory(at:at + n_terms - LAST_TERM - 2)
     s%arrays = arrays_of(tape, c_loc(s%a), perturbations, work)
     call begin_work(s%arrays, tape%n_slots)
     fits = .true.

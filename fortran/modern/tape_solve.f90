@@ -6,7 +6,7 @@ module tape_solve
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, GAVE_UP, SENSITIVE, SLIDING
-  use tape, only: tape_t
+  use tape, only: FIRST_UNKNOWN, tape_t
   use tape_march, only: attempt_t, march, outcome_t
   use tape_series, only: allocate_series, series_t, SIDE_BY_SIDE
   use tape_switches, only: find_switches, switches_t
@@ -48,6 +48,7 @@ contains
     type(outcome_t) :: outcome
     real(dp) :: attitude(4)
     real(dp) :: most, spent, cost, error, blurred, planned
+    real(dp) :: at_end ! amplification that is expected there
     logical :: again, fits
 
     call c_f_pointer(tape_at, tape)
@@ -71,7 +72,8 @@ contains
       solution%growth = 1.0_dp
       return
     end if
-    call allocate_series(tape, 1 + tape%n_unknowns/SIDE_BY_SIDE, memory, s, fits)
+    call allocate_series(tape, 1 + tape%n_unknowns/SIDE_BY_SIDE, &
+                         FIRST_UNKNOWN - 1 + tape%n_unknowns, memory, s, fits)
     if (.not. fits) return
     call find_switches(tape, switches, failed)
     if (failed /= 0) return
@@ -99,7 +101,7 @@ contains
                                PLANNED_GROWTH/outcome%growth)
       planned = max(planned, 2.0_dp*outcome%growth)
     end do
-    blurred = ROUNDING*outcome%growth*(1.0_dp + outcome%noise)
+    blurred = ROUNDING*(outcome%growth + outcome%blur)
     solution%steps = outcome%steps
     ! The propagated error may be small by chance at the end, although perturbations grew before.
     error = min(outcome%least*sqrt(outcome%growth), UNSURE*request%tolerance)
@@ -117,8 +119,11 @@ contains
       solution%needed = outcome%switches_at
     end if
     if (solution%status == GAVE_UP) then
-      ! If the error is too large already, another integration with shorter steps will be needed.
-      if (outcome%error > request%tolerance) outcome%ahead = ANOTHER*outcome%ahead
+      ! If the error or the amplification will be too large, another integration will be needed.
+      at_end = outcome%growth*(1.0_dp + outcome%ahead/real(max(1_int64, outcome%steps), dp))
+      if (outcome%error > request%tolerance .or. at_end > planned) then
+        outcome%ahead = ANOTHER*outcome%ahead
+      end if
       solution%needed = (spent - real(solution%steps, dp) + outcome%ahead)*cost/MOST_STEPS
       solution%steps = int(spent, int64)
     end if

@@ -43,7 +43,7 @@ contains
     call c_f_pointer(step_at, step)
     step%status = OVERFLOW
     step%expansions = 0
-    call allocate_series(tape, 0, memory, s, fits)
+    call allocate_series(tape, 0, 0, memory, s, fits)
     if (fits) call take_step(tape, request, s, step)
   end subroutine step_tape
 
@@ -66,7 +66,7 @@ contains
     allocate (tolerances(tape%n_unknowns), stat=failed)
     if (failed /= 0) return
     tolerances = max(LEAST_TOLERANCE, request%tolerances)
-    s%order = order_for(LOCAL_TOLERANCE*request%relative, s%powers)
+    s%order = order_for(LOCAL_TOLERANCE*request%relative, s%powers, of_steps=.true.)
     step%order = s%order
     s%h = request%trial
     is_rejected = .false.

@@ -4,9 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "tape.h"
-
-enum { SIDE_BY_SIDE = 8, TERMS = 40, TERMS_OF_PERTURBATION = 29 };
+#include "tape_groups.h"
 
 typedef double lanes __attribute__((vector_size(8 * SIDE_BY_SIDE)));
 typedef long long bits __attribute__((vector_size(8 * SIDE_BY_SIDE)));
@@ -36,119 +34,112 @@ static inline void store(double *to, lanes x) { *(lanes_anywhere *)to = x; }
 
 /* The same at any address. */
 typedef reg reg_anywhere __attribute__((aligned(8)));
-typedef double row[SIDE_BY_SIDE];
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 
-/* The Jacobian is computed at three nodes of a step, from as many terms as the least order has. */
-enum { NODES = 3, TERMS_AMID = 8 };
-
-/* Its columns, eight side by side: element [j / 8][i][j % 8] is that of rate i by unknown j. */
+/* The Jacobian, eight columns side by side: [j / 8][i][j % 8] is that of rate i by unknown j. */
 enum { BLOCKS = (MOST_UNKNOWNS + SIDE_BY_SIDE - 1) / SIDE_BY_SIDE };
 typedef row matrix[BLOCKS][MOST_UNKNOWNS];
 
-/* Sums of products of the terms of two slots, for as many pairs of slots as a register holds: all
-   products of terms that are not 0 nor the newest are known before any operation of an order. */
-enum { ABREAST = 4 };
-typedef double abreast __attribute__((vector_size(8 * ABREAST)));
-struct pairs {
-  int x[ABREAST], y[ABREAST]; /* places of the slots in the terms */
-  abreast of_x[TERMS_OF_PERTURBATION], of_y[TERMS_OF_PERTURBATION]; /* terms from 1 on */
-};
-
-/* The working storage. */
-struct work {
-  int n_pairs, n_slots;
-  struct pairs *pairs;
-  abreast *sums;
-  row (*tangents)[NODES]; /* of each slot at each node: derivatives by the unknowns */
-  abreast *middle; /* of each slot: values at the nodes */
-};
-
-static inline size_t rounded_up(size_t bytes) { return (bytes + 63) / 64 * 64; }
-
-/* Return the size of the working storage, in numbers. An operation has at most two pairs. */
-int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_slots)
+/* Return the size of the working storage, in numbers. */
+int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_products, int n_slots, int n_terms)
 {
-  const size_t groups = (2 * (size_t)n_operations + ABREAST - 1) / ABREAST;
-  const size_t of_slots = n_slots * (NODES * sizeof(row) + sizeof(abreast));
-  return (rounded_up(sizeof(struct work)) + rounded_up(groups * sizeof(struct pairs))
-          + rounded_up(groups * sizeof(abreast)) + rounded_up(of_slots)) / sizeof(double);
+  struct work work;
+  return divide_work(&work, NULL, n_operations, n_products, n_slots, n_terms) / sizeof(double);
 }
 
-static void add_pair(const struct tape *tape, int x, int y)
-{
-  struct work *work = tape->work;
-  struct pairs *pairs = work->pairs + work->n_pairs / ABREAST;
-  pairs->x[work->n_pairs % ABREAST] = x * TERMS;
-  pairs->y[work->n_pairs % ABREAST] = y * TERMS;
-  work->n_pairs++;
-}
-
-/* Divide the working storage, and find the pairs of slots whose products are needed, in the order in
-   which expand_tape needs them. */
+/* Divide the working storage, and find the groups of operations. */
 void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
 {
   struct work *work = tape->work;
-  const size_t groups = (2 * (size_t)tape->n_operations + ABREAST - 1) / ABREAST;
-  char *at = (char *)work + rounded_up(sizeof *work);
-  work->n_pairs = 0;
+  const int n_operations = tape->n_operations, nothing = n_slots * TERMS;
+  const int derivatives = tape->n_combinations - tape->n_unknowns;
+  int numbers[ABREAST], out[ABREAST], count, n_products = 0;
+  for (int n = 0; n < n_operations; n++) n_products += tape->operations[n][0] == PRODUCT;
+  divide_work(work, tape->work, n_operations, n_products, n_slots,
+              tape->starts[tape->n_combinations] - 1);
+  work->n_items = work->n_products = work->n_pairs = work->n_groups = 0;
   work->n_slots = n_slots;
-  work->pairs = (struct pairs *)at;
-  at += rounded_up(groups * sizeof(struct pairs));
-  work->sums = (abreast *)at;
-  at += rounded_up(groups * sizeof(abreast));
-  work->tangents = (row(*)[NODES])at;
-  work->middle = (abreast *)(work->tangents + n_slots);
-  memset(work->pairs, 0, groups * sizeof(struct pairs));
-  for (int n = 0; n < tape->n_operations; n++) {
-    const int *operation = tape->operations[n];
-    const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
-    switch (operation[0]) {
-    case PRODUCT: add_pair(tape, first, second); break;
-    case QUOTIENT: add_pair(tape, second, out); break;
-    case SQRT: add_pair(tape, out, out); break;
-    case EXP: add_pair(tape, out + 1, out); break;
-    case SINE_COSINE:
-      add_pair(tape, out + 2, out + 1);
-      add_pair(tape, out + 2, out);
-      break;
-    case TANH:
-      add_pair(tape, out + 2, out + 1);
-      add_pair(tape, out, out);
-      break;
-    case LOG:
-    case ATAN:
-    case ASIN: add_pair(tape, out + 1, second); break;
-    default: break;
+  work->combinations[0].slots = work->slots;
+  work->combinations[0].coefficients = work->coefficients;
+  order_operations(tape, work);
+  for (int i = 0; i < n_operations; i += count) {
+    const int *const operation = tape->operations[work->ordered[i]], kind = kind_of(operation);
+    struct item *item = work->items + work->n_items++;
+    for (count = 1; kind != OF_OTHERS && count < ABREAST && i + count < n_operations; count++) {
+      const int *next = tape->operations[work->ordered[i + count]];
+      if (kind_of(next) != kind || work->levels[next[3] - 1] != work->levels[operation[3] - 1]) break;
     }
+    *item = (struct item){operation[0], work->ordered[i]};
+    if (kind == OF_PRODUCTS) {
+      struct pairs *group = work->products + work->n_products;
+      *item = (struct item){PRODUCTS, work->n_products++};
+      for (int lane = 0; lane < ABREAST; lane++) {
+        const int *member = tape->operations[work->ordered[i + (lane < count ? lane : 0)]];
+        group->x[lane] = (member[1] - 1) * TERMS;
+        group->y[lane] = (member[2] - 1) * TERMS;
+        group->out[lane] = lane < count ? (member[3] - 1) * TERMS : nothing;
+      }
+    } else if (kind == OF_COMBINATIONS && count > 1) {
+      *item = (struct item){COMBINATIONS, work->n_groups};
+      for (int lane = 0; lane < count; lane++) {
+        const int *member = tape->operations[work->ordered[i + lane]];
+        numbers[lane] = member[1] - 1;
+        out[lane] = (member[3] - 1) * TERMS;
+      }
+      add_combinations(tape, work, count, numbers, out);
+    } else
+      add_pairs(work, operation);
+  }
+  for (int i = 0; i < tape->n_unknowns; i += count) {
+    for (count = 0; count < ABREAST && i + count < tape->n_unknowns; count++) {
+      numbers[count] = derivatives + i + count;
+      out[count] = (FIRST_UNKNOWN + i + count) * TERMS;
+    }
+    add_combinations(tape, work, count, numbers, out);
   }
 }
 
-static inline abreast gathered(const double *terms, const int *places, int k)
+static inline abreast gathered(const double *terms, const int *at, int k)
 {
-  return (abreast){terms[places[0] + k], terms[places[1] + k], terms[places[2] + k],
-                   terms[places[3] + k]};
+  return (abreast){terms[at[0] + k], terms[at[1] + k], terms[at[2] + k], terms[at[3] + k]};
 }
 
-/* Compute for each pair the sum of x(j) y(k - j), j = 1 to k - 1. The newest terms are not loaded
-   again: a load would have to wait for their store. */
-static inline void add_products(const struct work *work, const double *terms, int k)
+static inline void scatter(double *terms, const int *at, int k, abreast x)
 {
-  for (int i = 0; i * ABREAST < work->n_pairs; i++) {
-    struct pairs *pairs = work->pairs + i;
-    const abreast x = gathered(terms, pairs->x, k - 1), y = gathered(terms, pairs->y, k - 1);
-    pairs->of_x[k - 1] = x;
-    pairs->of_y[k - 1] = y;
-    abreast one = x * (k > 2 ? pairs->of_y[1] : y), two = {0.0};
-    if (k > 2) two = pairs->of_x[1] * y;
-    int j = 2;
-    for (; j < k - 2; j += 2) {
-      one += pairs->of_x[j] * pairs->of_y[k - j];
-      two += pairs->of_x[j + 1] * pairs->of_y[k - j - 1];
-    }
-    if (j < k - 1) one += pairs->of_x[j] * pairs->of_y[k - j];
-    work->sums[i] = one + two;
+  terms[at[0] + k] = x[0];
+  terms[at[1] + k] = x[1];
+  terms[at[2] + k] = x[2];
+  terms[at[3] + k] = x[3];
+}
+
+/* Return the sums of x(j) y(k - j), j = 1 to k - 1. */
+static inline abreast products_between(const struct pairs *pairs, int k)
+{
+  abreast one = {0.0}, two = {0.0};
+  int j = 1;
+  for (; j < k - 1; j += 2) {
+    one += pairs->of_x[j] * pairs->of_y[k - j];
+    two += pairs->of_x[j + 1] * pairs->of_y[k - j - 1];
   }
+  if (j < k) one += pairs->of_x[j] * pairs->of_y[k - j];
+  return one + two;
+}
+
+static inline void multiply(struct pairs *pairs, double *terms, int k)
+{
+  const abreast sum = products_between(pairs, k);
+  const abreast x = gathered(terms, pairs->x, k), y = gathered(terms, pairs->y, k);
+  pairs->of_x[k] = x;
+  pairs->of_y[k] = y;
+  scatter(terms, pairs->out, k, sum + (x * pairs->of_y[0] + pairs->of_x[0] * y));
+}
+
+static inline abreast combine(const struct combinations *group, const double *terms, int k)
+{
+  abreast sum = {0.0};
+  for (int i = 0; i < group->n_terms; i++)
+    sum += group->coefficients[i] * gathered(terms, group->slots[i], k);
+  return sum;
 }
 
 static inline double combined(const struct tape *tape, int n, int k, const series *a)
@@ -172,20 +163,45 @@ static int chosen(const struct tape *tape, const int *operation)
 void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
 {
   series *const a = tape->a;
+  double *const terms = a[0];
   const struct work *work = tape->work;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
+  const int n_sums = (work->n_pairs + ABREAST - 1) / ABREAST;
+  const int n_groups = (tape->n_unknowns + ABREAST - 1) / ABREAST;
+  const struct combinations *const rates = work->combinations + work->n_groups - n_groups;
 
-  memset(work->sums, 0, (work->n_pairs + ABREAST - 1) / ABREAST * sizeof(abreast));
-  for (int k = 0; k < order; k++) {
+  for (int i = 0; i < work->n_products; i++) {
+    struct pairs *pairs = work->products + i;
+    pairs->of_x[0] = gathered(terms, pairs->x, 0);
+    pairs->of_y[0] = gathered(terms, pairs->y, 0);
+  }
+  for (int i = 0; i < tape->n_unknowns; i++)
+    a[FIRST_UNKNOWN + i][1] = h * combined(tape, derivatives + i, 0, a);
+  for (int i = 0; i < n_groups; i++) work->unknowns[i][1] = gathered(terms, rates[i].out, 1);
+  for (int k = 1; k < order; k++) {
+    /* Of the operations that are no products, all sums are known before the order begins. */
+    for (int i = 0; i < n_sums; i++) {
+      struct pairs *pairs = work->others + i;
+      pairs->of_x[k - 1] = gathered(terms, pairs->x, k - 1);
+      pairs->of_y[k - 1] = gathered(terms, pairs->y, k - 1);
+      work->sums[i] = products_between(pairs, k);
+    }
     const double *sum = (const double *)work->sums;
-    if (k > 1) add_products(work, a[0], k);
-    for (int n = 0; k > 0 && n < tape->n_operations; n++) {
-      const int *operation = tape->operations[n];
+    for (const struct item *item = work->items; item < work->items + work->n_items; item++) {
+      if (item->kind == PRODUCTS) {
+        multiply(work->products + item->number, terms, k);
+        continue;
+      }
+      if (item->kind == COMBINATIONS) {
+        const struct combinations *group = work->combinations + item->number;
+        scatter(terms, group->out, k, combine(group, terms, k));
+        continue;
+      }
+      const int *operation = tape->operations[item->number];
       const double *x = a[operation[1] - 1], *y = a[operation[2] - 1];
       double *out = a[operation[3] - 1], *angle;
       switch (operation[0]) {
       case LINEAR: out[k] = combined(tape, operation[1] - 1, k, a); break;
-      case PRODUCT: out[k] = *sum++ + (x[k] * y[0] + x[0] * y[k]); break;
       case QUOTIENT: out[k] = (x[k] - *sum++ - y[k] * out[0]) / y[0]; break;
       case SQRT:
         /* A norm is constant at rest. */
@@ -224,8 +240,32 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
         break;
       }
     }
-    for (int i = 0; i < tape->n_unknowns; i++)
-      a[FIRST_UNKNOWN + i][k + 1] = h / (k + 1) * combined(tape, derivatives + i, k, a);
+    const abreast part = (abreast){0.0} + h / (k + 1);
+    for (int i = 0; i < n_groups; i++) {
+      work->unknowns[i][k + 1] = part * combine(rates + i, terms, k);
+      scatter(terms, rates[i].out, k + 1, work->unknowns[i][k + 1]);
+    }
+  }
+}
+
+/* Sum the terms of the unknowns but the first for the part `factor` of the step: their changes, those
+   of their derivatives times the step, and the latter without signs. */
+void OF_LEVEL(sum_terms, LEVEL)(const struct tape *tape, int order, double factor, double *changes,
+                                double *slopes, double *sizes)
+{
+  const struct work *work = tape->work;
+  const abreast_bits magnitude = ~(abreast_bits)(-(abreast){0.0});
+  for (int i = 0; i * ABREAST < tape->n_unknowns; i++) {
+    abreast change = {0.0}, slope = {0.0}, size = {0.0};
+    for (int k = order; k > 0; k--) {
+      const abreast x = work->unknowns[i][k], rate = (double)k * x;
+      change = factor * (change + x);
+      slope = factor * (slope + rate);
+      size = factor * (size + (abreast)((abreast_bits)rate & magnitude));
+    }
+    *(abreast_anywhere *)(changes + i * ABREAST) = change;
+    *(abreast_anywhere *)(slopes + i * ABREAST) = slope;
+    *(abreast_anywhere *)(sizes + i * ABREAST) = size;
   }
 }
 
@@ -387,22 +427,26 @@ static inline double largest(const struct tape *tape, int k, const double *weigh
   return found;
 }
 
+/* Return a series at the nodes, the `parts` of the step. */
+static inline nodal summed(const double *terms, nodal parts)
+{
+  nodal sum = (nodal){0.0} + terms[TERMS_AMID - 1];
+  for (int k = TERMS_AMID - 2; k >= 0; k--) sum = terms[k] + parts * sum;
+  return sum;
+}
+
 /* Compute the derivatives of the rates by some unknowns, from `first_column` on, at so many `nodes`, the
    `parts` of the step, times the step: element [i][j] of each matrix is that of rate i by unknown j. */
 static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, const int first_column,
-                                      const int columns, double h, abreast parts, row *jacobian[])
+                                      const int columns, double h, nodal parts, row *jacobian[])
 {
   const series *const a = tape->a;
   const struct work *work = tape->work;
-  abreast *const m = work->middle;
+  nodal *const m = work->middle;
   row(*const v)[NODES] = work->tangents;
   const int derivatives = tape->n_combinations - tape->n_unknowns;
 
-  for (int n = 0; n < work->n_slots; n++) {
-    abreast sum = (abreast){0.0} + a[n][TERMS_AMID - 1];
-    for (int k = TERMS_AMID - 2; k >= 0; k--) sum = a[n][k] + parts * sum;
-    m[n] = sum;
-  }
+  for (int n = 0; n < FIRST_UNKNOWN + tape->n_unknowns; n++) m[n] = summed(a[n], parts);
   memset(v, 0, (FIRST_UNKNOWN + tape->n_unknowns) * sizeof *v);
   for (int j = 0; j < columns && first_column + j < tape->n_unknowns; j++)
     for (int d = 0; d < nodes; d++) v[FIRST_UNKNOWN + first_column + j][d][j] = 1.0;
@@ -412,6 +456,11 @@ static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, 
     const int first = operation[1] - 1, second = operation[2] - 1, out = operation[3] - 1;
     if (is_rate || operation[0] == LINEAR) {
       const int c = is_rate ? derivatives + n - tape->n_operations : first;
+      if (!is_rate) {
+        m[out] = (nodal){0.0} + tape->constants[c];
+        for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++)
+          m[out] += tape->coefficients[i] * m[tape->slots[i] - 1];
+      }
       for (int p = 0; p < columns; p += IN_REGISTER) {
         reg sums[NODES] = {{0.0}};
         for (int i = tape->starts[c] - 1; i < tape->starts[c + 1] - 1; i++)
@@ -424,8 +473,11 @@ static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, 
       continue;
     }
     /* The derivatives of the first slot by the operands, and of the second by the first operand. */
-    abreast by_first = {0.0}, by_second = {0.0}, of_second = {0.0};
+    nodal by_first = {0.0}, by_second = {0.0}, of_second = {0.0};
     int from = first, other = 0, has_second = 0;
+    if (operation[0] == PRODUCT) m[out] = m[first] * m[second];
+    else if (operation[0] == QUOTIENT) m[out] = m[first] / m[second];
+    else m[out] = summed(a[out], parts);
     switch (operation[0]) {
     case PRODUCT: by_first = m[second], by_second = m[first], other = second; break;
     case QUOTIENT:
@@ -435,12 +487,17 @@ static ALWAYS_INLINE void set_columns(const struct tape *tape, const int nodes, 
       for (int d = 0; d < nodes; d++) by_first[d] = m[out][d] ? 0.5 / m[out][d] : 0.0;
       break;
     case EXP: by_first = m[out]; break;
-    case SINE_COSINE: by_first = m[out + 1], of_second = -m[out], has_second = 1; break;
-    case TANH: by_first = m[out + 1], of_second = -2.0 * m[out] * by_first, has_second = 1; break;
+    case SINE_COSINE:
+      by_first = m[out + 1] = summed(a[out + 1], parts), of_second = -m[out], has_second = 1;
+      break;
+    case TANH:
+      by_first = m[out + 1] = summed(a[out + 1], parts), of_second = -2.0 * m[out] * by_first;
+      has_second = 1;
+      break;
     case LOG:
     case ATAN:
     case ASIN: by_first = m[second]; break;
-    case SELECT: by_first = (abreast){0.0} + 1.0, from = chosen(tape, operation); break;
+    case SELECT: by_first = (nodal){0.0} + 1.0, from = chosen(tape, operation); break;
     default: from = 0; break; /* a table depends on the time alone, and a switch is constant */
     }
     for (int d = 0; d < nodes; d++) {
@@ -461,18 +518,18 @@ void OF_LEVEL(slot_gradient, LEVEL)(const struct tape *tape, int slot, double *g
   row *only[] = {jacobian};
   for (int j = 0; j < tape->n_unknowns; j++) {
     const int column = j % SIDE_BY_SIDE;
-    if (column == 0) set_columns(tape, 1, j, SIDE_BY_SIDE, 1.0, (abreast){0.0}, only);
+    if (column == 0) set_columns(tape, 1, j, SIDE_BY_SIDE, 1.0, (nodal){0.0}, only);
     gradient[j] = work->tangents[slot - 1][0][column];
   }
 }
 
 /* Compute term k + 1 of the perturbations of the unknowns, with the Jacobian as a polynomial of the
    part of the step. */
-static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbations *v,
-                                       const matrix *jacobian, int k)
+static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int nodes,
+                                       perturbations *v, const matrix *jacobian, int k)
 {
   const double part = 1.0 / (k + 1);
-  const int degree = k < NODES - 1 ? k : NODES - 1;
+  const int degree = k < nodes - 1 ? k : nodes - 1;
   for (int i = 0; i < n; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg sum = {0.0}, other = {0.0};
@@ -487,41 +544,55 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, perturbat
 }
 
 /* Compute one block of columns of the Jacobian as a polynomial of the part of the step, through its
-   values at the nodes of Gauss: the error of the perturbations is of order 2 NODES + 1. */
+   values at the nodes of Gauss: the error of the perturbations is of order 2 nodes + 1. */
 static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, const int columns,
-                                    double h, double factor, matrix *jacobian)
+                                    const int nodes, double h, double factor, matrix *jacobian)
 {
-  const double distance = 0.38729833462074170 * factor, middle = 0.5 * factor;
+  const int is_few = nodes == FEW_NODES;
+  const double distance = (is_few ? 0.28867513459481288 : 0.38729833462074170) * factor;
   const double per_slope = 0.5 / distance, per_curve = 0.5 / (distance * distance);
-  const abreast parts = {middle - distance, middle, middle + distance};
+  const double middle = 0.5 * factor;
+  const nodal parts = {middle - distance, is_few ? middle + distance : middle, middle + distance};
   row *to[NODES] = {jacobian[0][block], jacobian[1][block], jacobian[2][block]};
-  set_columns(tape, NODES, block * SIDE_BY_SIDE, columns, h, parts, to);
+  set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg *const before = (reg *)(to[0][i] + p), *const amid = (reg *)(to[1][i] + p);
-      reg *const after = (reg *)(to[2][i] + p);
+      reg *const after = (reg *)(to[nodes - 1][i] + p);
       const reg slope = per_slope * (*after - *before);
-      const reg curve = per_curve * ((*after - *amid) + (*before - *amid));
-      *before = *amid - middle * (slope - middle * curve);
+      const reg value = is_few ? 0.5 * (*before + *after) : *amid;
+      const reg curve = is_few ? (reg){0.0} : per_curve * ((*after - *amid) + (*before - *amid));
+      *before = value - middle * (slope - middle * curve);
       *amid = slope - 2.0 * middle * curve;
-      *after = curve;
+      if (!is_few) *after = curve;
     }
   }
 }
 
-static void set_later_blocks(const struct tape *tape, double h, double factor, matrix *jacobian)
+static ALWAYS_INLINE void set_blocks(const struct tape *tape, const int nodes, double h,
+                                     double factor, matrix *jacobian)
 {
-  for (int block = 1; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
-    set_block(tape, block, SIDE_BY_SIDE, h, factor, jacobian);
+  if (tape->n_unknowns == 3) set_block(tape, 0, 4, nodes, h, factor, jacobian);
+  else
+    for (int block = 0; block * SIDE_BY_SIDE < tape->n_unknowns; block++)
+      set_block(tape, block, SIDE_BY_SIDE, nodes, h, factor, jacobian);
+}
+
+static ALWAYS_INLINE void perturb_all(const int n, const int nodes, perturbations *v,
+                                      const matrix *jacobian, int k)
+{
+  if (n == 3) perturb_with(3, 4, nodes, v, jacobian, k);
+  else if (n == WITH_ATTITUDE) perturb_with(WITH_ATTITUDE, SIDE_BY_SIDE, nodes, v, jacobian, k);
+  else perturb_with(n, SIDE_BY_SIDE, nodes, v, jacobian, k);
 }
 
 /* Expand eight perturbations, from number `number` on, whose values are terms 0 of the unknowns, to as
    many terms as they need for the part `factor` of the step, and return the number of the last term.
-   `is_short` says that all terms do not suffice. `tolerance` is the largest relative size of a term
+   `is_long` says that there are many steps. `is_short` says that all terms do not suffice. `tolerance` is the largest relative size of a term
    that is left out. */
 int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h, int order,
                                   double factor, const double *weights, double tolerance,
-                                  int *is_short)
+                                  int is_long, int *is_short)
 {
   matrix jacobian[NODES] __attribute__((aligned(64)));
   perturbations *const v = (perturbations *)tape->v + FIRST_UNKNOWN;
@@ -538,13 +609,11 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   const double first = largest(tape, 0, weights, units, count);
   double before = first, power = 1.0;
   int k = 0;
-  if (n == 3) set_block(tape, 0, 4, h, factor, jacobian);
-  else set_block(tape, 0, SIDE_BY_SIDE, h, factor, jacobian);
-  if (n > SIDE_BY_SIDE) set_later_blocks(tape, h, factor, jacobian);
+  if (is_long) set_blocks(tape, NODES, h, factor, jacobian);
+  else set_blocks(tape, FEW_NODES, h, factor, jacobian);
   do {
-    if (n == 3) perturb_with(3, 4, v, jacobian, k++);
-    else if (n == WITH_ATTITUDE) perturb_with(WITH_ATTITUDE, SIDE_BY_SIDE, v, jacobian, k++);
-    else perturb_with(n, SIDE_BY_SIDE, v, jacobian, k++);
+    if (is_long) perturb_all(n, NODES, v, jacobian, k++);
+    else perturb_all(n, FEW_NODES, v, jacobian, k++);
     power *= factor;
     const double size = power * largest(tape, k, weights, units, count);
     /* Every other term may be zero. */

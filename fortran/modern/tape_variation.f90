@@ -64,7 +64,7 @@ contains
     found%status = GAVE_UP
     found%n_rows = 0
     steps = 0
-    call allocate_series(tape, n_blocks, memory, s, fits)
+    call allocate_series(tape, n_blocks, tape%n_slots, memory, s, fits)
     if (.not. fits) return
     allocate (blocks(n_blocks), stat=failed)
     if (failed /= 0) return

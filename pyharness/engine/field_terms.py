@@ -169,8 +169,7 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    The matrix R rotates from body to space. Use the term in sums; alone, a ``TorqueLaw(...,
-    frame="space")`` is solved faster.
+    The matrix R rotates from body to space. The term is for sums.
 
     Parameters
     ----------

@@ -139,7 +139,7 @@ def solve_side_by_side(
     A body remains unsolved if its error can't be measured. All do if the torque is neither recorded
     nor in space, or if the inertia matrix is full.
     """
-    packed = solver.packed_for_lanes
+    packed = solver.packed
     if packed[Places.METHOD] != Methods.TAPE or solver.scene.inertia is not None:
         return list(range(piece.start, piece.stop))
     times = times_within(solver.scene, times)

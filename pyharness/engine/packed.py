@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from pyharness.engine.problem import normalized, normalized_in_space, remainders
+from pyharness.engine.problem import normalized, remainders
 from pyharness.engine.recorded import kernel_tape, system
-from pyharness.engine.system import is_recorded
 from pyharness.model.codes import Methods, Places
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.principal import PrincipalScene
@@ -16,9 +15,9 @@ from pyharness.model.trajectory import Array
 def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`."""
     packed = _settings(code, scene.step_size, tolerance, effort)
-    if is_recorded(scene):
+    if code == Methods.TAPE:
         return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
-    coefficients, constant, rate, sines, cosines = _torque_of(scene)
+    coefficients, constant, rate, sines, cosines = normalized(scene)
     packed[Places.N_SINES] = sines.shape[1]
     packed[Places.N_COSINES] = cosines.shape[1]
     packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
@@ -45,11 +44,3 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
     packed[Places.STEP] = step_size
     packed[Places.EFFORT] = effort
     return packed
-
-
-def _torque_of(scene: Scene) -> tuple[Array, ...]:
-    if not scene.torque.in_space:
-        return normalized(scene)
-    # The packed array has the moments, and therefore not their ratios.
-    coefficients, _, *torque = normalized_in_space(scene)
-    return coefficients, *torque

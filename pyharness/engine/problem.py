@@ -24,25 +24,7 @@ _NOT_FINITE = (
 
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """Return A, B, C, and the torque over the moments; raise InputError if one is not finite."""
-    return _over(scene, scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0)))
-
-
-def normalized_in_space(scene: Scene) -> tuple[Array, ...]:
-    """Return A, B, C, the ratios of the largest moment to each, and the torque over the largest.
-
-    The scene must have moments. Raise InputError if a value is not finite.
-    """
-    moments = np.array(scene.moments)
-    largest = moments.max()
-    coefficients, *torque = _over(scene, scene.law, np.full(3, largest))
-    with np.errstate(over="ignore"):
-        ratios = largest / moments
-    if not np.isfinite(ratios).all():
-        raise InputError(_NOT_FINITE)
-    return coefficients, ratios, *torque
-
-
-def _over(scene: Scene, law: TorqueLaw, moments: Array) -> tuple[Array, Array, Array, Array, Array]:
+    law, moments = scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0))
     # A wave of amplitude 0 has no effect, but computing its sine or cosine would take time.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)

@@ -108,8 +108,7 @@ def solve(
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`, none beyond an overflow. Under a torque about the
-        axes of space, `error` is the difference of two integrations, and `growth` is None.
+        One row per time, in the order of `times`, none beyond an overflow.
 
     Raises
     ------

@@ -29,7 +29,6 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import ENDS, extension
 from pyharness.model.principal import axes_and_turn
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import of_law
 from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory, digits_left
 from pyharness.model.values import Number, Numbers, number, three, three_floats
 
@@ -169,18 +168,6 @@ class Solver(BoundKernel[Result]):
 
         return ManyStarts(extension().solve_packed_many, self.packed, self._packed_with_gil, slowly)
 
-    @cached_property
-    def packed_for_lanes(self) -> Array:
-        """Return the array for the kernel of many bodies, with a torque in space recorded."""
-        if self.packed[Places.METHOD] != Methods.SPACE_TORQUE:
-            return self.packed
-        scene, (tolerance, _, effort) = self.plan.scene, self.settings
-        try:
-            recorded = replace(scene, torque=of_law(scene.law))
-            return packed_scene(recorded, Methods.TAPE, tolerance, effort)
-        except InputError:  # too many terms to be recorded
-            return self.packed
-
     @property
     def ctypes(self) -> CompiledCall:
         """Return the solver for compiled code, such as numba's; C code uses `capsule`."""
@@ -302,10 +289,8 @@ def no_buffer(out: object) -> str:
 
 
 def _code(chosen: Plan, with_attitude: bool) -> int:
-    if is_recorded(chosen.scene):
+    if is_recorded(chosen.scene) or chosen.scene.torque.in_space:
         return Methods.TAPE
-    if with_attitude and chosen.scene.torque.in_space:
-        return Methods.SPACE_TORQUE
     if chosen.closed_form == "sphere" and not with_attitude:
         return CODES["sphere"]
     if chosen.method == "closed-form" or (with_attitude and chosen.closed_form):

@@ -7,7 +7,7 @@ from typing import Any
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque, torque_of
-from pyharness.model.symbols import Recorder
+from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import N_INPUTS, Tape
 from pyharness.model.values import Triple
 
@@ -30,7 +30,8 @@ def _system(
     tape: Tape, coefficients: Triple, divisors: Triple, attitude: bool, n_states: int
 ) -> Tape:
     own = 7 if attitude else 3
-    recorder = Recorder(n_inputs=max(N_INPUTS, 1 + own + n_states))
+    most = 2 * len(tape.operations) + MOST_OPERATIONS
+    recorder = Recorder(most, max(N_INPUTS, 1 + own + n_states))
     time, *unknowns = recorder.inputs()
     x, y, z, *q = unknowns[: own if n_states else 7]
     states = unknowns[own : own + n_states]

@@ -1,28 +1,23 @@
 """Integration by Taylor series, with adapted order and step size."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from pyharness.engine.problem import (
-    estimate_or_none,
-    normalized,
-    normalized_in_space,
-    trajectory_of,
-)
+from pyharness.engine.problem import estimate_or_none, normalized, trajectory_of
 from pyharness.engine.recorded import kernel_tape, system
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.switch_text import reason_of
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
-from pyharness.model.errors import InputError, TimedError
+from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque, of_law
+from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
 _NO_STATES = np.zeros((1, 1))
@@ -38,13 +33,9 @@ def taylor(
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
-    Under a torque about the axes of space, `error` is the difference of two of them, and `growth`
-    is None. With `with_steps`, `sol` has the steps, up to 20 000, and such a torque is recorded.
-    Raise InputError for an opaque torque, and if the work limit is exceeded.
+    With `with_steps`, `sol` has the steps, up to 20 000. Raise InputError for an opaque torque, and
+    if the work limit is exceeded.
     """
-    if with_steps and scene.torque.in_space:
-        with suppress(InputError):  # too many terms to be recorded
-            scene = replace(scene, torque=of_law(scene.law))
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
     joint = np.empty((4, n_attitudes + 1), order="F")
@@ -55,10 +46,8 @@ def taylor(
     most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
-    room: dict[str, Any] = {}
-    if kernel != "space_torque_rows":
-        room = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
-        room |= {"at_nodes": at_nodes, "n_nodes": NODES}
+    room: dict[str, Any] = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
+    room |= {"at_nodes": at_nodes, "n_nodes": NODES}
     own = _NO_STATES
     if kernel == "tape_rows":
         work = np.append(work, 0.0)
@@ -68,7 +57,7 @@ def taylor(
         room |= {"own": own, "own_sizes": [*(each.scale for each in scene.states), 0.0]}
     elif kernel == "tape_rows":
         room |= {"own": own, "own_sizes": own[0]}
-    rows, n_rows, status, steps, *others = getattr(extension(), kernel)(
+    rows, n_rows, status, steps, kept = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work, **room,
     )  # fmt: skip
@@ -90,7 +79,6 @@ def taylor(
         found = replace(found, own=own[:n_own, 1 : 1 + len(found.time)].T)
     if kernel == "tape_rows" and found.ended in ("sliding", "sensitive"):
         found = replace(found, reason=reason_of(found.ended, work[1], int(work[5])))
-    kept = others[0] if others else 0
     if not 0 < kept <= most or not found.has_all_rows:
         return found
     edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T.copy()
@@ -101,8 +89,7 @@ def taylor(
 
 def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
     """Return the kernel's name and first arguments; raise InputError for an opaque torque."""
+    scene = with_constant_body(scene)
     if isinstance(scene.torque, StateTorque):
         return "tape_rows", (kernel_tape(system(scene)),)
-    if scene.torque.in_space:
-        return "space_torque_rows", normalized_in_space(scene)
     return "taylor_rows", normalized(scene)

@@ -33,7 +33,6 @@ class Methods:
     QUICK_OR_TAYLOR = 8  # QUICK or TAYLOR, whichever needs fewer operations
     CLOSED_FORM_OR_TAYLOR = 9  # the Taylor series if the status of the closed form is REFUSED
     GAUSS = 10  # Gauss collocation has the code GAUSS plus its number of stages, 1 to 8
-    SPACE_TORQUE = 19  # the Taylor series for a torque about the axes of space, with attitude
 
 
 class Places:
@@ -49,7 +48,7 @@ class Places:
     RATE = 11  # three, 1/s3: its factor of time
     EFFORT = 14  # factor on the work limits
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
-    MOMENTS = 18  # three, kg m2: for the closed form with attitude, and for a torque in space
+    MOMENTS = 18  # three, kg m2: for the closed form with attitude
     MOMENTS_LOW = 21  # three, kg m2: exact minus rounded moments
     ROUNDED = 24  # 1: the initial omega was rounded after a rotation to principal axes; else 0
     WAVES = 25  # four numbers for each sine, then four for each cosine; or a tape

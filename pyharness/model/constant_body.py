@@ -1,4 +1,4 @@
-"""Scenes whose inertia changes, as scenes of a constant body under another torque."""
+"""Scenes with a changing inertia or a torque about axes of space, as scenes of another torque."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,14 +11,14 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene with the same solution whose inertia does not change with time.
+    """Return a scene with the same solution, of a constant body and a torque about its axes.
 
-    It has A = B = C = 0, and omega' as its torque. With the inertia I and the torque N, omega'
-    follows from I omega' = N - I' omega - omega x (I omega).
+    Where the inertia changes, it has A = B = C = 0, and omega' as its torque. With the inertia I
+    and the torque N, omega' follows from I omega' = N - I' omega - omega x (I omega).
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:
-        return scene
+        return replace(scene, torque=of_law(scene.law)) if torque.in_space else scene
     if isinstance(torque, TorqueLaw):
         torque = of_law(torque)
     tape = torque.tape

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import lru_cache, partial
 from inspect import Parameter, signature
 from typing import Any
 
@@ -20,6 +20,7 @@ from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
 from pyharness.model.values import Triple, converted, three_floats, triple
 
 Function = Callable[..., Any]
+_MOST_REPLAYED = 1_000_000  # operations of a torque of this project
 _ARGUMENTS = "allowed: a function of (t, omega), or of (t, omega, attitude)"
 _WITH_STATES = (
     "a function of (t, omega, states) or (t, omega, attitude, states) that returns the torque and "
@@ -157,7 +158,7 @@ def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Ar
 
 def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
     """Return a torque recorded from a function of this project, without checks."""
-    recorder = Recorder(n_inputs=N_INPUTS + len(own))
+    recorder = Recorder(_MOST_REPLAYED, N_INPUTS + len(own))
     time, *state = recorder.inputs()
     omega, attitude = map(symbol_array, (state[:3], state[3:7]))
     tape = recorder.tape(list(function(time, omega, attitude, *state[7:])))
@@ -179,6 +180,7 @@ def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] 
     return recorder.tape(list(function(time, omega, attitude, **values)))
 
 
+@lru_cache(maxsize=64)
 def of_law(law: TorqueLaw) -> StateTorque:
     """Return a torque law about axes of body or space as a recorded torque."""
     return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))

@@ -69,7 +69,7 @@ class Recorder:
         """
         self._has_lines = has_lines
         self.place = place
-        self._most, self._n_inputs, self._instead = most, n_inputs, instead
+        self.most, self._n_inputs, self._instead = most, n_inputs, instead
         self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
@@ -99,8 +99,8 @@ class Recorder:
     def slot(self, operation: Operation) -> int:
         """Return the slot of `operation`, which is recorded if new."""
         if operation not in self._slots:
-            if len(self._operations) == self._most:
-                most = self._most
+            if len(self._operations) == self.most:
+                most = self.most
                 raise InputError(
                     f"{self.place}: more than {most} operations; use fewer, or {self._instead}"
                 )
@@ -159,9 +159,9 @@ class Symbol:
             raise InputError(
                 f"{recorder.place}: a constant overflows or is not a number; use finite numbers"
             )
-        if len(terms) > MOST_OPERATIONS:
+        if len(terms) > recorder.most:
             raise InputError(
-                f"{recorder.place}: a sum of more than {MOST_OPERATIONS} terms; use fewer"
+                f"{recorder.place}: a sum of more than {recorder.most} terms; use fewer"
             )
         self.recorder, self._constant, self._terms = recorder, constant, terms
 

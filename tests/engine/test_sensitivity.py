@@ -196,7 +196,7 @@ def _grown(status: int, error: float, growth: float) -> Callable[..., Any]:
 
     def rows(*given: Any, effort: Any, **_: Any) -> Any:
         effort[2:4] = error, growth
-        return np.ones((3, len(given[6]))), len(given[6]), status, 7
+        return np.ones((3, len(given[6]))), len(given[6]), status, 7, 0
 
     return rows
 

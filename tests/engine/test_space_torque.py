@@ -202,13 +202,21 @@ def test_motion_far_from_one_is_the_same(factor: float) -> None:
     assert found.attitude == pytest.approx(wanted.attitude, abs=1e-15)
 
 
+def test_prepared_solver_refuses_motion_far_from_one() -> None:
+    solver = prepare(PUSHED, attitude=True)
+    omega, attitude = solver((0.0, 2.0**505, 2.0**505), 2.0**-505)
+    assert solver.status == "refused"
+    assert np.isnan([*omega, *attitude]).all()
+
+
 def test_what_rounding_has_become_is_told() -> None:
     found: Any = solve(PUSHED, [300.0], tolerance=1e-12, attitude=True)
     assert found.ended == "sensitive"
     assert found.error > 1e-12
-    assert found.growth is None
-    fine = solve(PUSHED, [2.0], attitude=True)
-    assert (fine.ended, fine.growth) == ("complete", None)
+    assert found.growth > 1e6
+    fine: Any = solve(PUSHED, [2.0], attitude=True)
+    assert fine.ended == "complete"
+    assert 1.0 <= fine.growth < 100.0
 
 
 # The number of steps per second is constant: the first integration shows the work of the second.
@@ -238,7 +246,7 @@ def test_prepared_solver_agrees_with_solve() -> None:
         found: Any = solve(start, [-2.0], attitude=True)
         assert (omega == found.omega[0]).all()
         assert (attitude == found.attitude[0]).all()
-        assert (each.status, each.error, each.growth) == ("complete", found.error, None)
+        assert (each.status, each.error, each.growth) == ("complete", found.error, found.growth)
         assert each.steps == found.steps
     omega, attitude = solver((0.1, 0.2, 3.0), 1e9)
     assert solver.status == "gave up"

@@ -95,17 +95,17 @@ def test_a_torque_about_the_axes_of_space_is_solved_side_by_side(
     assert single.omega[0].tobytes() == found.omega[3].tobytes()
 
 
-def test_a_law_with_too_many_terms_for_a_recording_is_solved_body_by_body() -> None:
+def test_a_law_with_thousands_of_waves_is_solved_side_by_side() -> None:
     waves = [((0.01, 0.0, 0.01), 1.0 + 0.01 * k) for k in range(2100)]
     scene = Scene(
         "", (1.0, 0.3, 0.0), moments=MOMENTS, torque=TorqueLaw(sines=waves, frame="space")
     )
     starts, turns = np.eye(3)[:2], np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    assert lanes(scene, starts, 0.5, turns)[1] == [0, 1]
+    assert lanes(scene, starts, 0.5, turns)[1] == []
     found = solve_many(scene, 0.5, omega=starts, attitude=turns)
     solver = prepare(scene, attitude=True)
     for i in range(2):
-        assert np.array_equal(found.omega[i], solver(starts[i], 0.5, turns[i])[0])
+        assert found.omega[i] == pytest.approx(solver(starts[i], 0.5, turns[i])[0], abs=1e-9)
 
 
 @pytest.mark.campaign

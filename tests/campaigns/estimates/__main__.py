@@ -70,9 +70,9 @@ class Answer:
     def faults(self) -> list[str]:
         """Return the names of the faults; a few estimates may be low."""
         complete = self.ended == "complete"
-        # A closed form loses no digit to rounding, and for a torque in space no amplification is
-        # known. For both, the error decides.
-        known = self.growth is not None or self.error > self.draw.tolerance
+        # A closed form loses no digit to rounding: the error decides.
+        is_closed = "no torque" in self.draw.kinds and "taylor" not in self.entry
+        is_lost = self.error > self.draw.tolerance if is_closed else self.lost > _SURELY
         # Torques that cancel make a scene sensitive by themselves, which K does not measure. With
         # the attitude the amplification is known up to the angle by which an error of omega may
         # rotate the body.
@@ -80,7 +80,7 @@ class Answer:
         calm = self.lost * angle < _HARDLY and "cancelling" not in self.draw.kinds
         flags = {
             "exceeds": self.is_judged and complete and not self.error <= self.limit,
-            "silent": self.lost > _SURELY and complete and known,
+            "silent": is_lost and complete and self.lost > _SURELY,
             "false alarm": calm and self.ended == SENSITIVE,
             "blind": self.seen is not None and self.seen < 0.01,
             "unfinished": self.is_judged and self.ended not in ("complete", SENSITIVE),

@@ -219,6 +219,18 @@ def test_what_rounding_has_become_is_told() -> None:
     assert 1.0 <= fine.growth < 100.0
 
 
+def test_rounding_counts_as_much_as_later_motion_amplifies_it() -> None:
+    # Most rounding errors are made at the end, when the body is fast; the first are amplified most.
+    scene = replace(PUSHED, omega=(0.3, -1.0, 2.0))
+    found: Any = solve(scene, [200.0], tolerance=1e-9, attitude=True)
+    true: Any = solve(scene, [200.0], tolerance=1e-13, attitude=True)
+    assert found.growth > 1e4
+    assert found.ended == "complete"
+    error = np.abs(found.omega - true.omega).max() / np.abs(true.omega).max()
+    assert error <= 3.0 * found.error <= 1e-9
+    assert true.growth / 2.5 < found.growth < 2.5 * true.growth
+
+
 # The number of steps per second is constant: the first integration shows the work of the second.
 CALM = replace(
     PUSHED, omega=(0.0, 1.0, 10.0), torque=replace(PUSHED.law, constant=(0.0, 0.0, 1e-9))

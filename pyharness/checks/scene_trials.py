@@ -12,11 +12,10 @@ import numpy as np
 
 from pyharness.checks.check import BITS, REFUSED, Attempt, Attempts, Check, Name
 from pyharness.checks.judge import MethodRun, Truth, by_rows, judge, reference_truth
-from pyharness.checks.orders import in_few_steps, order_if_seen
+from pyharness.checks.methods import in_few_steps, order_if_seen
 from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named
-from pyharness.checks.theory.conditioning import FLOW
-from pyharness.checks.theory.state_conditioning import conditioning_at
+from pyharness.checks.theory.conditioning import FLOW, conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import THREADS, Job, different
 from pyharness.engine.problem import closed_form

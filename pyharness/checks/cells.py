@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import BITS, Attempt, Check, Name, Selection
+from pyharness.checks.check import BITS, Attempt, Check, Name, Selection, selected
 from pyharness.checks.compare.agreement import differences, distance
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.basis import Basis
@@ -163,7 +163,7 @@ def decks(chosen: Selection) -> Iterator[Check]:
         for case in case_numbers()
         if not chosen.thin or cell_name(listing, case) in _THIN
     ]
-    asked = [each for each in asked if chosen.asks(each[0].id)]
+    asked = [each for each in asked if selected(each[0].id, chosen.only)]
     if not asked or compiler() is None:
         return
     with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:

@@ -16,7 +16,7 @@ from random import Random
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name, Sample, Selection
+from pyharness.checks.check import Attempt, Check, Name, Sample, Selection, selected
 from pyharness.checks.compare.candidates import prepared_candidate
 from pyharness.checks.judge import (
     IF_CALM,
@@ -137,7 +137,9 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
-        asked = _requested(chosen.asks, number, _entrances(drawn, number, chosen.thin))
+        asked = _requested(
+            lambda id: selected(id, chosen.only), number, _entrances(drawn, number, chosen.thin)
+        )
         if not asked:
             continue
         try:
@@ -167,7 +169,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             "attitude-taylor": partial(run_of_solve, "taylor", tolerance, scene, times),
             "attitude-prepared": partial(run_of_call, "auto", tolerance, scene, times[-1]),
         }
-        asked = _requested(chosen.asks, number, entrances)
+        asked = _requested(lambda id: selected(id, chosen.only), number, entrances)
         try:
             truth = reference_truth(scene, times, _EFFORT) if asked else None
         except InputError:

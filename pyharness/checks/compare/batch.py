@@ -179,9 +179,8 @@ class Batch:
     @cached_property
     def _shared(self) -> Scene:
         """Return `scene`, with an attitude only if the torque needs it."""
-        return (
-            self.scene if self.scene.torque.needs_attitude else replace(self.scene, attitude=None)
-        )
+        attitude = self.scene.attitude if self.scene.torque.needs_attitude else None
+        return replace(self.scene, attitude=attitude)
 
     @cached_property
     def _ends(self) -> Ensemble:
@@ -214,13 +213,9 @@ class Batch:
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)
-        arrays: dict[str, Any] = {
-            name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
-        }
-        if not self.scene.torque.needs_attitude:
-            arrays.pop("attitude", None)
-        arrays |= more
-        return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **arrays)
+        hidden = OF_PROGRAMS if self.scene.torque.needs_attitude else (*OF_PROGRAMS, "attitude")
+        options: dict[str, Any] = {k: x for k, x in self.arrays.items() if k not in hidden} | more
+        return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **options)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)

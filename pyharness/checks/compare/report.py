@@ -50,7 +50,10 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     if numerics:
         legend += _DRIFTS_LEGEND
         if has_programs:
-            legend += f"{_ULP_LEGEND} us/step: time per step of {_timed(comparison)}."
+            has_fortran = all(each.ulps is not None for each in comparison.programs)
+            timed = f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
+            timed = "Fortran, with the call" if comparison.word == BINARY64 else timed
+            legend += f"{_ULP_LEGEND} us/step: time per step of {timed}."
         if comparison.digits is not None:
             amplified = f"error amplification {short(comparison.growth)}"
             motion.append(f"{amplified}: rounding leaves {comparison.digits:.1f} digits")
@@ -64,41 +67,25 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     told = verdict(comparison)
     tables: list[Section] = []
     if has_programs:
-        tables.append([_programs(comparison, numerics), *_short_runs(comparison)])
+        steps = comparison.scene.steps
+        short_runs = [
+            f"{each.who} ended at step {each.trajectory.steps} of {steps}: its errors are the "
+            "largest up to there"
+            for each in comparison.programs
+            if each.trajectory.steps < steps
+        ]
+        tables.append([_programs(comparison, numerics), *short_runs])
     if numerics:
         tables.append([_methods(comparison)])
-
+    end = [*(failures if numerics else [_MORE]), *told]
     return Report(
         "compare",
-        text=[
-            [*scene, *reference, *motion],
-            [legend],
-            *tables,
-            *attitudes,
-            [*(failures if numerics else [_MORE]), *told],
-        ],
+        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, end],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],
         pictures={"omega": lambda: comparison_picture(comparison)},
     )
-
-
-def _timed(comparison: Comparison) -> str:
-    if comparison.word == BINARY64:
-        return "Fortran, with the call"
-    has_fortran = all(each.ulps is not None for each in comparison.programs)
-    return f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
-
-
-def _short_runs(comparison: Comparison) -> list[str]:
-    """Return a sentence for each program that ended early."""
-    return [
-        f"{each.who} ended at step {each.trajectory.steps} of {comparison.scene.steps}: its errors "
-        "are the largest up to there"
-        for each in comparison.programs
-        if each.trajectory.steps < comparison.scene.steps
-    ]
 
 
 def verdict(comparison: Comparison) -> list[str]:
@@ -138,11 +125,8 @@ def _programs(comparison: Comparison, numerics: bool) -> Table:
         Column("V", short, unit="m/s"),
     ]  # fmt: skip
     if numerics:
-        columns += [
-            *_DRIFTS,
-            Column("ulp", _count),
-            Column("us/step", digits(".2f", 1e6), unit="s"),
-        ]
+        time = Column("us/step", digits(".2f", 1e6), unit="s")
+        columns += [*_DRIFTS, Column("ulp", _count), time]
     rows = []
     for each in comparison.programs:
         run, good, listing = each.trajectory, each.accuracy, each.listing

@@ -104,14 +104,12 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     for each in due:
         name = Name("golden", each.source, each.name, options=options)
         yield Attempt(name, partial(_compared, each, entries.get(each.command), same_library))
+    told = "is recorded and no longer produced; verify --update forgets it"
     for command in sorted(set(entries) - {each.command for each in due}):
         rest = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
         source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
-        yield Attempt(Name("golden", source, rest, options=options), _forgotten)
-
-
-def _forgotten(name: Name) -> Check:
-    return name.judged(False, "is recorded and no longer produced; verify --update forgets it")
+        gone = Name("golden", source, rest, options=options)
+        yield Attempt(gone, lambda name: name.judged(False, told))
 
 
 def _compared(

@@ -92,7 +92,13 @@ class Forecaster:
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
-        self._wandering = self._of_one_step()
+        # The mean relative final error from one step's rounding. A component's rounding error is
+        # proportional to the component, and 0 if it never changes.
+        changes = (self._rates() != 0.0).any(axis=0)
+        carried = along.propagators * (along.omega * changes)[:, None, :]
+        squares = along.over_time(np.square(carried).sum(axis=2)) / float(along.times[-1])
+        size = math.sqrt(float(squares.max())) / along.flow.largest
+        self._wandering = _MEAN_ROUNDING * ROUNDING * self.method.roundings * size
 
     def predict(self, steps: int) -> Forecast:
         """Return the predicted errors of `steps` equal steps."""
@@ -131,18 +137,6 @@ class Forecaster:
             is_above = found.truncation > found.wandering
             low, high = (middle, high) if is_above else (low, middle)
         return time / high
-
-    def _of_one_step(self) -> float:
-        """Return the mean relative final error from one step's rounding.
-
-        A component's rounding error is proportional to the component, and 0 if it never changes.
-        """
-        here = self._path
-        changes = (self._rates() != 0.0).any(axis=0)
-        carried = here.propagators * (here.omega * changes)[:, None, :]
-        squares = here.over_time(np.square(carried).sum(axis=2)) / float(here.times[-1])
-        size = math.sqrt(float(squares.max())) / here.flow.largest
-        return _MEAN_ROUNDING * ROUNDING * self.method.roundings * size
 
     def _rates(self) -> Array:
         on = self._path.scene.right_hand_side()

@@ -105,9 +105,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
         return run[0] if len(run) else np.full(3, np.nan)
 
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
-    matrix = np.array(
-        amplification(listing).exact_matrix(jacobian(scene, scene.omega)), dtype=float
-    )
+    exact = amplification(listing).exact_matrix(jacobian(scene, scene.omega))
+    matrix = np.array(exact, dtype=float)
     derived = sum(np.split(matrix[-3:], len(matrix) // 3, axis=1))
     units = _units(scene, listing.program, np.abs(np.array(scene.omega)) + reach)
     return Probe(found, np.asarray(derived), amplified * ROUNDING * float(units.max()))
@@ -218,9 +217,8 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
     found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
     units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
     # J at omega, and at the value of F.
-    j, along_rate = jacobians(
-        scene, np.array([scene.omega, scene.right_hand_side()(0.0, scene.omega)])
-    )
+    slope = scene.right_hand_side()(0.0, scene.omega)
+    j, along_rate = jacobians(scene, np.array([scene.omega, slope]))
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
     derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
     return Probe(found, derived, amplified * ROUNDING * float(units.max()))

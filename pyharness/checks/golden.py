@@ -213,11 +213,8 @@ def _rows(entry: dict[str, Any]) -> Array:
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    parts = [
-        f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
-        for key in ("ended", "steps", "evaluations", "stop")
-        if old[key] != new[key]
-    ]
+    changed = [key for key in ("ended", "steps", "evaluations", "stop") if old[key] != new[key]]
+    parts = [f"{key} {old[key] or 'none'} -> {new[key] or 'none'}" for key in changed]
     before, after = _rows(old), _rows(new)
     if before.shape == after.shape:
         names = ("time", "TIME", "omega", "velocity")

@@ -230,9 +230,10 @@ def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
-    return lambda truth, tried: allowed(
-        truth, tolerance_of(tried), factor(truth.flow.amplification)
-    )
+    def limit(truth: Truth, tried: MethodRun) -> float:
+        return allowed(truth, tolerance_of(tried), factor(truth.flow.amplification))
+
+    return limit
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), FLOW, has_no_form)

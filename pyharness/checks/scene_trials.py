@@ -210,9 +210,8 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     again = _end(start, -time, method, tolerance)
     back = conditioning_at(start, [-time])
     # The error of the forward run is an initial error of the backward run.
-    limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification + back.limit(
-        tolerance
-    )
+    limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification
+    limit += back.limit(tolerance)
     attitude = None if scene.attitude is None else np.array(scene.attitude)
     return (np.array(scene.omega), attitude), again, limit
 

@@ -53,10 +53,9 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of steps; the value is the largest ratio of difference to bound."""
     for case in cases(chosen, (7,)):
+        compare = partial(_compare_steps, case_scene(case))
         for program in PROGRAMS:
-            yield Attempt(
-                Name("schemes", program, f"case-{case}"), partial(_compare_steps, case_scene(case))
-            )
+            yield Attempt(Name("schemes", program, f"case-{case}"), compare)
 
 
 def _compare_steps(scene: Scene, name: Name) -> Check:

@@ -150,8 +150,5 @@ class Comparison:
     @property
     def not_judged(self) -> tuple[str, ...]:
         """Return a sentence for each corrected program whose order could not be determined."""
-        return tuple(
-            f"{each.who}: {each.order}"
-            for each in self.programs
-            if each.order is not None and not each.order.is_judged
-        )
+        orders = [(each.who, each.order) for each in self.programs if each.order is not None]
+        return tuple(f"{who}: {order}" for who, order in orders if not order.is_judged)

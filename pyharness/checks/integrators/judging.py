@@ -156,10 +156,9 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
 
 def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:
     """Append to `found` the checks in one problem; raise PortError for an invalid answer."""
-    rows = len(problem.times)
     answers = []
     for level in range(LEVELS):
-        motion = ask(problem.request(level), rows)
+        motion = ask(problem.request(level), len(problem.times))
         if motion.refusal:
             name = Name("integrator", problem.name)
             found.add(problem.name, name.described(None, f"refused: {motion.refusal}"))
@@ -169,10 +168,7 @@ def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> Non
     if len({each.attitude is None for each in answers}) > 1:
         raise PortError("only some of the answers in a scene have an attitude")
     by_tolerance = finest.control == "tolerance"
-    settings = [
-        problem.tolerance(level) if by_tolerance else problem.step_size(level)
-        for level in range(LEVELS)
-    ]
+    settings = [*map(problem.tolerance if by_tolerance else problem.step_size, range(LEVELS))]
     floor = problem.floor(finest.rounding)
     parts = []
     errors = zip(*(problem.errors(motion) for motion in answers), strict=True)
@@ -184,10 +180,8 @@ def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> Non
     found.judged.append(judged)
     wanted = 1.0 if by_tolerance else due
     checks = [Name("integrator", "finite", problem.name).bounded(judged.lost, 0.0, _FINITE)]
-    checks += [
-        replace(_order_check(each, problem, wanted, floor), reference_bound=lambda: problem.bound)
-        for each in parts
-    ]
+    orders = [_order_check(each, problem, wanted, floor) for each in parts]
+    checks += [replace(each, reference_bound=lambda: problem.bound) for each in orders]
     if finest.attitude is not None:
         name = Name("integrator", "norm", problem.name)
         angle = parts[1].errors[-1]
@@ -232,7 +226,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:
         return []
-    if not (np.isfinite(forth.omega[-1]).all() and np.isfinite(forth.attitude[-1]).all()):
+    if not np.isfinite([*forth.omega[-1], *forth.attitude[-1]]).all():
         return []
     scene = replace(problem.scene, omega=-forth.omega[-1], attitude=forth.attitude[-1])
     back = ask(problem.request(level, scene), len(problem.times))
@@ -243,9 +237,8 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
         return [name.bounded(back.lost, 0.0, _FINITE)]
     start = np.array(problem.scene.omega)
     omega = float(np.abs(back.omega[-1] + start).max() / np.abs(start).max())
-    attitude = np.array([problem.scene.attitude])
-    angle = float(angle_between(back.attitude[-1:], attitude)[0])
-    error = max(omega, angle)
+    angles = angle_between(back.attitude[-1:], np.array([problem.scene.attitude]))
+    error = max(omega, float(angles[0]))
     there = max(x for x in problem.errors(forth) if x is not None)
     limit = _CONSERVED * forth.rounding * (problem.times[-1] / problem.step_size(level))
     kept = "the integrator is reversible" if error <= max(limit, 1e-3 * there) else "not reversible"

@@ -87,12 +87,9 @@ def _orders(found: Verdict) -> Section:
 def _drifts(found: Verdict) -> Section:
     if found.drift is None:
         return []
-    rows = [
-        [_MEANINGS[name], float(np.abs(values).max()), growth_power(found.drift.times, values)]
-        for name, values in found.drift.named.items()
-    ]
-    last = found.drift.times[-1]
-    return [f"without torque, up to {last:g} s; L: angular momentum", Table(_DRIFTS, rows)]
+    times, named = found.drift.times, found.drift.named.items()
+    rows = [[_MEANINGS[x], float(np.abs(y).max()), growth_power(times, y)] for x, y in named]
+    return [f"without torque, up to {times[-1]:g} s; L: angular momentum", Table(_DRIFTS, rows)]
 
 
 def _findings(found: Verdict) -> Section:
@@ -116,16 +113,14 @@ def integrator_picture(found: Verdict) -> Picture:
     rows: list[list[Any]] = []
     for part, axes in zip(PARTS, panels, strict=False):
         for judged in found.judged:
-            each = judged.order_of(part)
+            each, name = judged.order_of(part), judged.problem.name
             if each is None:
                 continue
-            number = int(judged.problem.name.rpartition("-")[2])
-            marker = _MARKERS[number % len(_MARKERS)]
-            axes.loglog(each.settings, _inside(each.errors), marker=marker, markersize=4.5,
-                        markerfacecolor="none", label=judged.problem.name,
-                        **_STYLES[judged.problem.kind])  # fmt: skip
+            marker = _MARKERS[int(name.rpartition("-")[2]) % len(_MARKERS)]
+            style = {"markersize": 4.5, "markerfacecolor": "none", **_STYLES[judged.problem.kind]}
+            axes.loglog(each.settings, _inside(each.errors), marker=marker, label=name, **style)
             pairs = zip(each.settings, each.errors, strict=True)
-            rows += [[judged.problem.name, part, x, error] for x, error in pairs]
+            rows += [[name, part, x, error] for x, error in pairs]
         unit = "relative" if part == "omega" else "rad"
         axes.set_title(f"error of {part}, {unit}", fontsize=10)
         axes.set_xlabel("tolerance" if found.control == "tolerance" else "step size, s")

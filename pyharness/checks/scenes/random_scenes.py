@@ -61,10 +61,8 @@ def draw(seed: str, number: int) -> Draw:
         scene = replace(NASTY[name](source), name=name)
     program = source.choice(PROGRAMS)
     early = [name for name in switches(program) if name not in _LATER]
-    defects, readings = (
-        frozenset(name for name in names if source.random() < share)
-        for names, share in ((early, 0.5), (names_of("reading", program), 0.3))
-    )
+    defects = frozenset(name for name in early if source.random() < 0.5)
+    readings = frozenset(x for x in names_of("reading", program) if source.random() < 0.3)
     found = Draw(
         scene=scene,
         listing=Listing(program, defects, readings),
@@ -250,9 +248,8 @@ def _extreme(source: Random) -> Scene:
     law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
     moments = [abs(x) or 1.0 for x in sizes]
     torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
-    return Scene(
-        "", omega, moments, None, torque, step_size=10.0 ** source.uniform(-100.0, 2.0), steps=20
-    )
+    step_size = 10.0 ** source.uniform(-100.0, 2.0)
+    return Scene("", omega, moments, None, torque, step_size=step_size, steps=20)
 
 
 def _unsorted_body(source: Random) -> Triple:

@@ -30,20 +30,11 @@ TURNING = ("gradient", "field", "spring", "mixed")
 # Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
-READY = (
-    "damping",
-    "drag",
-    "rate_control",
-    "attitude_control",
-    "wheels",
-    "gravity_gradient",
-    "magnetic_dipole",
-    "magnetic_damping",
-    "in_space",
-    "table",
-    "pulses",
-)
 TIMED = ("table", "pulses")  # ready terms that depend on time alone
+READY = (
+    *("damping", "drag", "rate_control", "attitude_control", "wheels", "gravity_gradient"),
+    *("magnetic_dipole", "magnetic_damping", "in_space", *TIMED),
+)
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:

@@ -164,10 +164,9 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
         for sign in (1.0, -1.0):
             x, y, near = _project(sign * unit[None], low, toward)
             opacity = 1.0 if near[0] > 0.0 else _HIDDEN
-            axes.plot(
-                x, y, marker="o", markersize=6.0, color="black", alpha=opacity,
-                markerfacecolor="black" if each.stable else "white",
-            )  # fmt: skip
+            face = "black" if each.stable else "white"
+            style = {"marker": "o", "markersize": 6.0, "color": "black", "markerfacecolor": face}
+            axes.plot(x, y, alpha=opacity, **style)
             if sign > 0.0:
                 axes.annotate(
                     f"axis {axis + 1}", (x[0], y[0]), (7, 7), textcoords="offset points",

@@ -53,11 +53,8 @@ _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
 # Methods with a tolerance, and those that also propagate the attitude. The torques of the cases are
 # not weak.
-_SOLVED = tuple(
-    name
-    for name, each in METHODS.items()
-    if each.finest < 1.0 and not each.weak_torque and name != "reference"
-)
+_TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
+_SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
 _PREPARED = ("auto", "taylor", "quick", "closed-form")
 _PREPARED_TURNED = ("auto", "taylor")

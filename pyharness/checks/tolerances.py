@@ -79,11 +79,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
 
 def _within_budget(name: str, least: float, radians: float, amplification: float) -> list[float]:
     most, coarsest = _BUDGETS.get(name, math.inf), _LADDER[-1]
-    costs = {
-        each: _cost(name, each, radians, amplification)
-        for each in sorted({least, *_LADDER})
-        if least <= each <= coarsest
-    }
+    tried = [each for each in sorted({least, *_LADDER}) if least <= each <= coarsest]
+    costs = {each: _cost(name, each, radians, amplification) for each in tried}
     allowed = [each for each, cost in costs.items() if cost <= most]
     if not allowed and least <= coarsest:
         return [coarsest] if costs[coarsest] <= _PATIENCE * most else []

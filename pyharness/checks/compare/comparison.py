@@ -119,10 +119,8 @@ def compare_programs(
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
-        candidates = [
-            program_candidate(listing, each, lipschitz, may_stop, effort=effort, word=word)
-            for each in languages
-        ]
+        own = partial(program_candidate, listing, effort=effort, word=word)
+        candidates = [own(each, lipschitz, may_stop) for each in languages]
         run, *other = (each.rows(scene) for each in candidates)
         judged = in_floats and not listing.active
         program = PROGRAM_REGISTRY[listing.program]

@@ -94,10 +94,8 @@ def _numbers(comparison: Comparison) -> Table:
     if truth.attitude is not None:
         names += " angle_error"
         bounds.append(truth.angle_error)
-    rows = [
-        ["reference", "", t, *omega, *bounds]
-        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
-    ]
+    exact = np.column_stack([truth.time, truth.omega]).tolist()
+    rows = [["reference", "", *row, *bounds] for row in exact]
     for name, label, run, good in _curves(comparison):
         n, angles = len(good.error), [] if good.turned is None else [good.turned]
         found = np.column_stack([run.time[:n], run.omega[:n], good.error, *angles])

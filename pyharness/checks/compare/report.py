@@ -160,13 +160,10 @@ def _attitudes(comparison: Comparison, numerics: bool) -> list[list[Table]]:
     columns = (
         *words("attitude listing"), Column("angle", short, unit="rad"), Column("L in space", short),
     )  # fmt: skip
-    found: list[tuple[str, str | None, Accuracy]] = [
-        (each.listing.program, each.listing.label, each.accuracy) for each in comparison.programs
-    ]
-    if numerics:
-        methods = comparison.methods
-        found += [(each.method, None, each.accuracy) for each in methods if each.accuracy]
-    rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found]
+    found: list[tuple[str, str | None, Accuracy | None]]
+    found = [(x.listing.program, x.listing.label, x.accuracy) for x in comparison.programs]
+    found += [(x.method, None, x.accuracy) for x in comparison.methods if numerics]
+    rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found if good]
     return [[Table(columns, rows)]]
 
 

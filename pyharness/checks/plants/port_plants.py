@@ -64,8 +64,7 @@ def _next_float(x: float) -> float:
 
 def _single(row: Row) -> Row:
     with np.errstate(over="ignore"):
-        rounded: Row = np.array(row).astype(np.float32).tolist()
-    return rounded
+        return [float(np.float32(x)) for x in row]
 
 
 def _shifted(rows: list[Row]) -> list[Row]:
@@ -221,10 +220,9 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
                 notes += [] if check.passed else [f"{check.id}: {check.note}"]
         seen = f"noticed in {len(notes)} of {counted(changed, 'changed run')}"
         note = " ".join([seen, *(f"({each})" for each in notes[:1])])
-        if not changed:
-            note = "changes no answer in these runs"
-        is_seen = len(notes) == changed
-        yield Outcome(plant.name, plant.fault, is_seen, len(notes), note, changed > 0)
+        note = note if changed else "changes no answer in these runs"
+        count = len(notes)
+        yield Outcome(plant.name, plant.fault, count == changed, count, note, changed > 0)
 
 
 def _faulty(

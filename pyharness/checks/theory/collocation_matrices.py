@@ -131,9 +131,7 @@ def solved(program: str, step: float) -> Solved:
     # Six right-hand sides, three regular and three random.
     rough = np.random.default_rng(count).normal(size=(3, count))
     sides = np.array([np.ones(count), places / count, (-1.0) ** places, *rough])
-    factors, found, ier = extension().solve_linear(
-        np.asfortranarray(matrix), np.asfortranarray(sides.T)
-    )
+    factors, found, ier = extension().solve_linear(*map(np.asfortranarray, (matrix, sides.T)))
     twin, twin_ier = leqt1f(matrix, sides.tolist())
     differing = int((np.array(twin) != found.T).sum()) + (ier != twin_ier)
     exact = fractions(matrix)
@@ -249,10 +247,8 @@ def declared_singular_below(program: str) -> float:
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
-        matrix = collocation.collocation_matrix(points(program, step))
-        *_, ier = extension().solve_linear(
-            np.asfortranarray(matrix), np.ones((len(matrix), 1), order="F")
-        )
+        matrix = np.asfortranarray(collocation.collocation_matrix(points(program, step)))
+        *_, ier = extension().solve_linear(matrix, np.ones((len(matrix), 1), order="F"))
         return bool(ier == SINGULAR)
 
     low, high = 1e-20, 1.0

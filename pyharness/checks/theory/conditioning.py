@@ -9,6 +9,7 @@ recorded operations of the equations.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -178,9 +179,8 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     A sine or cosine is multiplied by 1 plus its angle, because the angle's rounding error is
     proportional to the angle.
     """
-    products = np.abs(scene.euler_coefficients) * np.abs(
-        np.roll(omega, -1, 1) * np.roll(omega, -2, 1)
-    )
+    products = np.abs(np.roll(omega, -1, 1) * np.roll(omega, -2, 1))
+    products *= np.abs(scene.euler_coefficients)
     law = scene.body_torque
     moments = np.array(scene.moments or (1.0, 1.0, 1.0))
     torque = np.abs(law.constant) + np.abs(law.rate) * np.abs(times)[:, None]
@@ -294,10 +294,9 @@ def _bounded(value: Any) -> _Bounded:
 
 
 def _selected(condition: Any, first: Any, second: Any) -> _Bounded:
-    is_first, one, other = _bounded(condition).value > 0.0, _bounded(first), _bounded(second)
-    return _Bounded(
-        np.where(is_first, one.value, other.value), np.where(is_first, one.error, other.error)
-    )
+    choose = partial(np.where, _bounded(condition).value > 0.0)
+    one, other = _bounded(first), _bounded(second)
+    return _Bounded(choose(one.value, other.value), choose(one.error, other.error))
 
 
 _BOUNDS: Functions[Any] = Functions(

@@ -93,9 +93,8 @@ def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
 def _gauss(stages: int) -> Runner:
     def run(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
         step = _PARTS[stages] / _rate(scene)
-        rows, _, n_rows, status, evaluations = extension().gauss_solution(
-            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
-        )
+        given = scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+        rows, _, n_rows, status, evaluations = extension().gauss_solution(*given)
         if (n_rows, status) != (len(times), COMPLETE):
             raise InputError(
                 f"gauss-{stages} exceeded its work limit after {evaluations} right-hand sides"

@@ -233,17 +233,10 @@ class Batch:
 
     def _run_each(self, at: list[int]) -> ProgramEnsemble:
         n, steps = len(self.omega0), np.array(at, np.int32)
-        found = ProgramEnsemble(
-            omega=np.full((n, len(at), 3), np.nan),
-            status=np.full(n, Statuses.REFUSED, np.int8),
-            at=steps,
-            velocity=None,
-            recorded_time=np.full((n, len(at)), np.nan),
-            n_rows=np.zeros(n, np.int32),
-            stop_variable=np.zeros(n, np.int8),
-            stop_quotient=np.full(n, np.nan),
-            ier=None,
-        )
+        omega, recorded = np.full((n, len(at), 3), np.nan), np.full((n, len(at)), np.nan)
+        status, n_rows = np.full(n, Statuses.REFUSED, np.int8), np.zeros(n, np.int32)
+        stops = np.zeros(n, np.int8), np.full(n, np.nan)
+        found = ProgramEnsemble(omega, status, steps, None, recorded, n_rows, *stops, ier=None)
         for i in range(n):
             own = {name: array[i : i + 1] for name, array in self.arrays.items()}
             scene = self.scene

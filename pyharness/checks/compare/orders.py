@@ -1,6 +1,5 @@
 """Measured orders of convergence: powers of the step size to which the error is proportional."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -180,16 +179,15 @@ def _shows(order: float, due: int) -> bool:
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
-    for halvings in itertools.count():
-        parts = 2**halvings
-        if scene.steps * parts > most:
-            return
+    parts = 1
+    while scene.steps * parts <= most:
         try:
             finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
             check_steps(finer, "orders", "fortran", 1.0)
         except InputError:
             return  # does not fit in memory, or takes too long
         yield finer
+        parts *= 2
 
 
 def _fastest(scene: Scene, omega: Array) -> float:

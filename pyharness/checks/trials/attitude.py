@@ -221,10 +221,8 @@ def _solid_angle(scene: Scene, period: float) -> float:
 
 def _check_rotated(turn: Turn, name: Name) -> Check:
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
-    plain, other = (
-        solve(each, [time], method, tolerance, attitude=True).attitude
-        for each in (scene, turn.scene(scene))
-    )
+    run = partial(solve, times=[time], method=method, tolerance=tolerance, attitude=True)
+    plain, other = run(scene).attitude, run(turn.scene(scene)).attitude
     assert plain is not None
     assert other is not None
     apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))

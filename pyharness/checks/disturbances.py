@@ -352,6 +352,5 @@ def _doubling(
 
 def _bounds(scene: Scene, time: float) -> Sequence[float]:
     times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
-    omega: Array = solve(scene, times, "taylor", 1e-12).omega
-    largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()
-    return largest
+    omega = np.vstack([scene.omega, solve(scene, times, "taylor", 1e-12).omega])
+    return [float(x) for x in np.abs(omega).max(axis=0)]

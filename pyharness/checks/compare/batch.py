@@ -144,8 +144,7 @@ class Batch:
     def first_attitudes(self) -> Array:
         """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
         first = np.array(self.arrays.get("attitude", [self.scene.attitude or IDENTITY]))
-        found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
-        return found
+        return np.asarray(first / np.linalg.norm(first, axis=1, keepdims=True))
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) at `part` times `t_end` by another method, shape (n, 3)."""

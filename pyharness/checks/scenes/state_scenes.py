@@ -96,7 +96,7 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
     several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
     rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
     field = TorqueLaw(vector, sines=[([part, 0.0, part], rate)], frame="space")
-    made: dict[str, Callable[[], Any]] = {
+    made: dict[str, Callable[[], StateTorque]] = {
         "damping": lambda: damping(several),
         "drag": lambda: drag([0.1 * part, 0.2 * part / speed**2]),
         "rate_control": lambda: rate_control(several, [speed * x for x in vector]),
@@ -109,8 +109,7 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
         "table": lambda: _of_time(source, part * speed, 1.0 / speed, 12),
         "pulses": lambda: _of_time(source, part * speed, 1.0 / speed, 6),
     }
-    found: StateTorque = made[name]()
-    return found
+    return made[name]()
 
 
 def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:

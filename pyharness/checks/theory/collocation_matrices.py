@@ -178,8 +178,7 @@ def solved(program: str, step: float) -> Solved:
                 _share(missed, bound),
             ]
             every.append([*ratios, float(missed / (powers[0] * abs(b).max()))])
-        largest: list[float] = np.array(every).max(axis=0).tolist()
-        return largest
+        return [max(each) for each in zip(*every, strict=True)]
 
     residual, forward, increment, increment_error = errors(found)
     # The hypotheses of theorem 9.4: no operation underflows or overflows, and L and U are factors

@@ -188,11 +188,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     0, and None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
-    if spun == 0.0:
-        return math.inf
-    if rate == 0.0:
+    if spun != 0.0 and rate == 0.0:
         return None
-    shift = 0.25 * share**2 * spun * rate / min(others)
+    shift = 0.25 * share**2 * spun * rate / min(others) if spun else 0.0
     return OFF / shift if shift else math.inf
 
 

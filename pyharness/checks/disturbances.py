@@ -104,12 +104,11 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
         run = _run(replace(scene, omega=omega.tolist(), steps=1), listing)
         return run[0] if len(run) else np.full(3, np.nan)
 
-    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
+    found, limit = _differentiated(stepped, scene, listing.program)
     exact = amplification(listing).exact_matrix(jacobian(scene, scene.omega))
     matrix = np.array(exact, dtype=float)
     derived = sum(np.split(matrix[-3:], len(matrix) // 3, axis=1))
-    units = _units(scene, listing.program, np.abs(np.array(scene.omega)) + reach)
-    return Probe(found, np.asarray(derived), amplified * ROUNDING * float(units.max()))
+    return Probe(found, np.asarray(derived), limit)
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
@@ -214,21 +213,20 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
         end, _ = collocation.interval(omega.tolist(), points(program, moved * h), h, rates)
         return np.array(end)
 
-    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
-    units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
+    found, limit = _differentiated(stepped, scene, program, moved)
     # J at omega, and at the value of F.
     slope = scene.right_hand_side()(0.0, scene.omega)
     j, along_rate = jacobians(scene, np.array([scene.omega, slope]))
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
     derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
-    return Probe(found, derived, amplified * ROUNDING * float(units.max()))
+    return Probe(found, derived, limit)
 
 
 def _differentiated(
-    stepped: Callable[[Array], Array], omega: Sequence[float], count: int
-) -> tuple[Array, float, float]:
-    """Return the derivative, its neighbours' largest distance (rad/s), and its rounding factor."""
-    base = np.array(omega)
+    stepped: Callable[[Array], Array], scene: Scene, program: str, moved: float = 1.0
+) -> tuple[Array, float]:
+    """Return the derivative of a step at the initial omega, and a bound on its rounding error."""
+    base, count = np.array(scene.omega), _DEGREE[program] // 2
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
     weights = [float(each) for each in spacing(count)]
@@ -239,7 +237,9 @@ def _differentiated(
             away = i * spread * axis
             total += weight * (stepped(base + away) - stepped(base - away))
         columns.append(total / spread)
-    return np.array(columns).T, reach, 2.0 * sum(map(abs, weights)) / spread
+    amplified = 2.0 * sum(map(abs, weights)) / spread
+    units = _units(scene, program, np.abs(base) + reach, moved)
+    return np.array(columns).T, amplified * ROUNDING * float(units.max())
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:

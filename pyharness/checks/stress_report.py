@@ -65,9 +65,8 @@ def _table(checks: Sequence[Check]) -> Table:
         failed = sum(not check.passed for check in members)
         worst = max(judged, key=severity) if judged else max(members, key=_size)
         share = severity(worst)[1] if judged else None
-        where = worst.name.place or None
         numbers = [len(members), failed, len(judged), share, worst.value, worst.limit]
-        rows.append([name, *numbers, marks([worst]), where])
+        rows.append([name, *numbers, marks([worst]), worst.name.place or None])
     return Table(_HEADS, rows)
 
 
@@ -244,14 +243,13 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
             one = axes[row, column]
             own = [each for each in found if (each.motion, each.what) == (motion, what)]
             for each in own:
-                style = _OF_METHODS[each.method]
-                many = each.starts > 1
+                style, many = _OF_METHODS[each.method], each.starts > 1
                 marked = {"label": each.method, "markersize": 4, **style}
-                one.loglog(each.steps[many], each.error[many], **marked)
                 # Errors of a single start have open markers, and are not joined to errors over
                 # several starts.
-                alone = style | {"linestyle": "", "markerfacecolor": "none"}
-                one.loglog(each.steps[~many], each.error[~many], markersize=5, **alone)
+                alone = style | {"markersize": 5, "linestyle": "", "markerfacecolor": "none"}
+                for shown, look in ((many, marked), (~many, alone)):
+                    one.loglog(each.steps[shown], each.error[shown], **look)
                 one.loglog(each.steps, each.limits, color=style["color"], linewidth=0.5)
             ends = np.array([1e2, 1e7])
             begin = min(each.error[0] for each in own)

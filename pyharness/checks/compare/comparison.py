@@ -151,12 +151,9 @@ def listings_for(
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
-    for kind, option, names in (
-        ("defect", "--fix", fix),
-        ("defect", "--keep", keep),
-        ("reading", "--reading", readings),
-        ("conjecture", "--conjecture", assumed),
-    ):
+    given = {"--fix": fix, "--keep": keep, "--reading": readings, "--conjecture": assumed}
+    for option, names in given.items():
+        kind = "defect" if option in ("--fix", "--keep") else option.removeprefix("--")
         names_in = switchable if kind == "defect" else partial(names_of, kind)
         allowed = {name for program in chosen for name in names_in(program)}
         for name in names:

@@ -8,6 +8,7 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -131,27 +132,21 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
     A fault also explains an overflow of its own motion; a low order explains why a higher one is
     missing.
     """
-    faults = [each for each in found.findings if each.name not in FIRST_ORDER]
-    named = {each.name for each in faults}
-    explained = {problem for each in faults for problem in each.problems}
+    faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
+    explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}
     remarked = {problem for each in found.findings for problem in each.problems}
     low = set()
     for judged in found.judged:
         problem = judged.problem
-        states = [state for fault, state in problem.faulty if fault.name in named]
+        states = [state for fault, state in problem.faulty if fault.name in faults]
         if not all(np.isfinite(each.omega).all() for each in states):
             explained.add(problem.name)
         if problem.name in remarked:
             low |= {(each.part, problem.name) for each in judged.convergences if each.converges}
-    if named:
-        explained.add("long")
     failed = [check.name for check in found.checks if not check.passed]
-    where = [
-        each.circumstance or each.subject
-        for each in failed
-        if each.subject != "fault" and (each.subject, each.circumstance) not in low
-    ]
-    return tuple(dict.fromkeys(each for each in where if each not in explained))
+    due = [x for x in failed if x.subject != "fault" and (x.subject, x.circumstance) not in low]
+    where = dict.fromkeys(each.circumstance or each.subject for each in due)
+    return tuple(each for each in where if each not in explained)
 
 
 def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -255,12 +256,9 @@ class Judged:
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
     """Return `draws` random scenes of each kind, or those in `names` (``wave-1`` or a kind)."""
-    drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in MODERATE]
-    return [
-        Problem(scene)
-        for scene in drawn
-        if not names or scene.name in names or scene.name.partition("-")[0] in names
-    ]
+    pairs = product(range(draws), MODERATE)
+    drawn = (Problem(draw_moderate(seed, kind, number)) for number, kind in pairs)
+    return [each for each in drawn if not names or each.name in names or each.kind in names]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import chain, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -156,14 +157,10 @@ def listings(program: str) -> list[Listing]:
 
 def decks(chosen: Selection) -> Iterator[Check]:
     """Yield checks that each deck agrees with the port; none without a Fortran compiler."""
-    asked = [
-        (of_cell("decks", listing, case), listing, case)
-        for program in PROGRAMS
-        for listing in listings(program)
-        for case in case_numbers()
-        if not chosen.thin or cell_name(listing, case) in _THIN
-    ]
-    asked = [each for each in asked if selected(each[0].id, chosen.only)]
+    every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
+    some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
+    named = [(of_cell("decks", *cell), *cell) for cell in some]
+    asked = [each for each in named if selected(each[0].id, chosen.only)]
     if not asked or compiler() is None:
         return
     with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:
@@ -182,9 +179,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
         return name.judged(False, str(failure))
     wanted = np.column_stack([port.recorded_time, port.omega, port.velocity])
     found = deck.tape5[: port.steps]
-    faults = []
-    if found.tobytes() != wanted.tobytes():
-        faults.append("TAPE5 differs")
+    faults = [] if found.tobytes() == wanted.tobytes() else ["TAPE5 differs"]
     whole = page(scene, listing.program, port)
     overflowed = port.ended == "overflow"
     if not (deck.page.startswith(whole) if overflowed else deck.page == whole):

@@ -145,14 +145,13 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
         rounding = _turns(scene, times) if len(found) else np.zeros(0)
         for row, name in asked:
             pointing = values[row].pointing
-            if row >= len(found):
+            if row < len(found) and pointing is not None:
+                wanted = np.array([pointing.attitude])
+                error = float(angle_between(found[row : row + 1], wanted)[0])
+                limit = pointing.accuracy + tolerance + float(rounding[row])
+                yield name.bounded(error, limit, _PUBLISHED, "angle, rad")
+            else:
                 yield _without(problem, name, refusal, values[row])
-                continue
-            assert pointing is not None
-            wanted = np.array([pointing.attitude])
-            error = float(angle_between(found[row : row + 1], wanted)[0])
-            limit = pointing.accuracy + tolerance + float(rounding[row])
-            yield name.bounded(error, limit, _PUBLISHED, "angle, rad")
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
@@ -248,11 +247,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     accuracy = finest_print * UNITS[problem.unit]
     run = program_candidate(Listing.corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
-    result, before, steps, ended = None, None, _FEWEST_STEPS, ""
-    previous = 0.0
+    result, before, steps, ended, previous = None, None, _FEWEST_STEPS, "", 0.0
     while steps <= _MOST_STEPS:
-        stepped = replace(scene, step_size=time / steps, steps=steps)
-        rows = run(stepped)
+        rows = run(replace(scene, step_size=time / steps, steps=steps))
         if rows.ier is not None and rows.ier.any():
             # LEQT1F reports the matrices of tiny steps as singular; the program then has order 1.
             break
@@ -268,8 +265,7 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
-        before = omega
-        steps *= 2
+        before, steps = omega, 2 * steps
     if ended not in ("", "complete"):
         raise InputError(f"{program} in steps of {time / _MOST_STEPS:g} s: {ended}")
     return result

@@ -80,9 +80,8 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
     """Return the cells whose names begin with an element of `cells`; all if it is empty."""
     found = []
     for listing, case in all_cells():
-        name = cell_name(listing, case)
+        name, of = cell_name(listing, case), of_cell("port", listing, case)
         if listing.program in programs and case in cases and selected(name, cells):
-            of = of_cell("port", listing, case)
             found.append(Cell(name, of, f"--cell {name}", listing, case_scene(case)))
     return found
 
@@ -210,8 +209,7 @@ _TIMES = (
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
     """Return the report of a port's checks, of which there is at least one."""
     title = [f"{command}: against the twins, bit for bit"]
-    if seed:
-        title.append(f"seed of the random scenes: {seed}")
+    title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:
         title.append(f"ended at the first of {asked} cells that it did not answer")
     seconds = sum(check.seconds or 0.0 for check in checks)

@@ -17,7 +17,7 @@ from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named
 from pyharness.checks.theory.conditioning import FLOW, conditioning_at
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.checks.trials.threads import THREADS, Job, different
+from pyharness.checks.trials.threads import BOUND, THREADS, TITLE, Job, different
 from pyharness.engine.problem import closed_form
 from pyharness.engine.recorded import system
 from pyharness.engine.registry import (
@@ -83,11 +83,7 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
             "motion.",
             _invariance,
         ),
-        "threads": (
-            "the same calls from eight threads",
-            "No bit may differ, since calls share no state.",
-            _threads,
-        ),
+        "threads": (TITLE, BOUND, _threads),
     }
     if not any(_takes(method, scene) for method in FIXED_STEP):
         del made["step-size"]

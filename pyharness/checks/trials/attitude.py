@@ -94,9 +94,8 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
     """Return the largest error of the attitude (rad) that a method may have at `time` (s)."""
-    if method in FORMS:
-        return ATTITUDE
-    return flow.angle_limit(tolerance * lively(flow.amplification), time)
+    made = tolerance * lively(flow.amplification)
+    return ATTITUDE if method in FORMS else flow.angle_limit(made, time)
 
 
 POLICY = Policy(_limit, FLOW, refusable)

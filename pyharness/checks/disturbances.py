@@ -76,9 +76,7 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
     a, b, c = coefficients
     x, y, z = omega
     law = TorqueLaw((-a * y * z, -b * x * z, -c * x * y))
-    return Scene(
-        "steady rotation", omega, coefficients=coefficients, torque=law, step_size=step, steps=1
-    )
+    return Scene("steady rotation", omega, None, coefficients, law, step_size=step, steps=1)
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
@@ -170,9 +168,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
         # Along -1 the perturbation is exactly the eigenvector that decays.
         second = distance if direction.real else -distance
         start = (1.0, -1.0 if direction.real else 0.0, 1.0)
-        scene = Scene(
-            "top", start, coefficients=(distance, second, 0.0), step_size=1.0, steps=_GROWTH_STEPS
-        )
+        top = Scene("top", start, None, (distance, second, 0.0), step_size=1.0)
+        scene = replace(top, steps=_GROWTH_STEPS)
         rows = np.vstack([scene.omega, _run(scene, listing)])[:, :2]
         if len(rows) <= _GROWTH_STEPS:
             return True

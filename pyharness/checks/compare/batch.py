@@ -200,11 +200,11 @@ class Batch:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
-        if self.attitude and not self.scene.torque.needs_attitude:
-            # One attitude suits all scenes, because `attitudes` multiplies the result by
-            # `first_attitudes`.
-            return self._solve(method, tolerance, t_end, attitude=IDENTITY)
-        return self._solve(method, tolerance, t_end)
+        # One attitude suits all scenes, because `attitudes` multiplies the result by
+        # `first_attitudes`.
+        has_one = self.attitude and not self.scene.torque.needs_attitude
+        more = {"attitude": IDENTITY} if has_one else {}
+        return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""

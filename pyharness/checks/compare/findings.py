@@ -120,10 +120,8 @@ class Comparison:
                 told = ", ".join(each.differences)
                 found.append(f"{each.who}: Fortran and twin differ in {told}")
             if each.order is not None and each.order.state == "misses":
-                told = f"{each.order}, due {each.order.due}"
-                found.append(
-                    f"{each.who}: does not converge to the reference as the step is halved: {told}"
-                )
+                told = "does not converge to the reference as the step is halved"
+                found.append(f"{each.who}: {told}: {each.order}, due {each.order.due}")
         return tuple(found)
 
     def _excess(self, one: MethodFinding) -> str:

@@ -111,10 +111,9 @@ def _as_expected(comparison: Comparison) -> str:
     orders = [each.order for each in comparison.programs if each.order is not None]
     if not orders:
         return text
-    seen = ", ".join(
-        f"{each.value:.1f}" if each.value is not None else "rounding" if each.is_judged else "-"
-        for each in orders
-    )
+    unknown = ["rounding" if each.is_judged else "-" for each in orders]
+    pairs = zip(orders, unknown, strict=True)
+    seen = ", ".join(x if each.value is None else f"{each.value:.1f}" for each, x in pairs)
     due = ", ".join(str(each.due) for each in orders)
     return f"{text}; orders {seen} (expected {due})"
 

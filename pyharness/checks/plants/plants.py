@@ -279,8 +279,8 @@ _DRAWS = 12
 def self_test(seed: str, record: Path) -> Iterator[Outcome]:
     """Yield the outcomes without a fault, then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
-    failed, example = _failed(chosen)
-    yield control(failed.total(), _note(failed, example))
+    failed, note = _failed(chosen)
+    yield control(failed.total(), note)
     for plant in PLANTS:
         yield outcome(plant, chosen)
 
@@ -288,18 +288,15 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
     """Return whether any checks detect a planted fault, apart from the golden record's."""
     with plant.planted(plant.size):
-        failed, example = _failed(replace(chosen, only=plant.kinds))
+        failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
-    return Outcome(plant.name, plant.fault, noticed > 0, noticed, _note(failed, example))
+    return Outcome(plant.name, plant.fault, noticed > 0, noticed, note)
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the number of failed checks by kind, and one id, preferably not of the record."""
+    """Return numbers of failed checks by kind, and a note with an id, if possible of no record."""
     names = [check.id for check in verify(chosen) if not check.passed]
-    kinds = Counter(name.partition("/")[0] for name in names)
-    return kinds, min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")
-
-
-def _note(failed: Counter[str], example: str) -> str:
+    failed = Counter(name.partition("/")[0] for name in names)
+    example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")
     counts = ", ".join(f"{kind} {count}" for kind, count in failed.items())
-    return f"caught by {counts} ({example})" if failed else "nothing fails"
+    return failed, f"caught by {counts} ({example})" if failed else "nothing fails"

@@ -35,9 +35,8 @@ _PREPARED = ("quick", "auto")
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.1, 2.7)
 _PUSHED = TorqueLaw((10.0, -20.0, 15.0))
-_DRIVEN = TorqueLaw(
-    (3.0, 2.0, -4.0), (0.0, 1.0, 2.0), (((20.0, 0.0, 5.0), 7.0),), (((0.0, 30.0, 0.0), 11.0),)
-)
+_SINE, _COSINE = ((20.0, 0.0, 5.0), 7.0), ((0.0, 30.0, 0.0), 11.0)
+_DRIVEN = TorqueLaw((3.0, 2.0, -4.0), (0.0, 1.0, 2.0), [_SINE], [_COSINE])
 
 
 _FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)

@@ -9,6 +9,7 @@ import math
 import platform
 import shlex
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -162,11 +163,10 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record."""
-    try:
+    known: dict[str, dict[str, Any]] = {}
+    # If the old record is damaged, every trajectory counts as new.
+    with suppress(InputError):
         known = read_record(folder) if folder.is_dir() else {}
-    except InputError:
-        # If the old record is damaged, every trajectory counts as new.
-        known = {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     files: dict[str, list[dict[str, Any]]] = {}
     news = []

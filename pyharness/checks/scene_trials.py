@@ -130,10 +130,9 @@ def _length(scene: Scene, name: Name) -> Iterator[Attempt]:
 
 def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
     run, exact = tried(), truth()
-    found = [judge(name.with_quantity("omega"), run, replace(exact, attitude=None), TORQUE_POLICY)]
-    if exact.attitude is not None:
-        found.append(judge(name.with_quantity("angle"), run, exact, TORQUE_POLICY))
-    return found
+    truths = {"omega": replace(exact, attitude=None)}
+    truths |= {} if exact.attitude is None else {"angle": exact}
+    return [judge(name.with_quantity(x), run, y, TORQUE_POLICY) for x, y in truths.items()]
 
 
 def _step_size(scene: Scene, name: Name) -> Iterator[Attempt]:

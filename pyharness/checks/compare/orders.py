@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -202,11 +203,10 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
     """Return whether the error may be amplified rounding; True if its bound can't be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
-    try:
+    with suppress(InputError):
         flow = conditioning(scene, found.time)
-    except InputError:
-        return True
-    return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
+        return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
+    return True
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:

@@ -124,15 +124,14 @@ def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
         omega, attitude = judged.order_of("omega"), judged.order_of("attitude")
         if judged.finest.control == "tolerance" or judged.lost or omega is None:
             continue
-        name = ""
-        if omega.is_first:
+        problem = judged.problem
+        if omega.is_first and problem.kind == "wave" and calm_is_higher:
+            found.append(("torque-held", problem.name))
+        elif omega.is_first:
             name = "first-order-splitting" if _conserves_momentum(results) else "first-order"
-            if judged.problem.kind == "wave" and calm_is_higher:
-                name = "torque-held"
+            found.append((name, problem.name))
         elif omega.is_higher and attitude is not None and attitude.is_first:
-            name = "first-order-attitude"
-        if name:
-            found.append((name, judged.problem.name))
+            found.append(("first-order-attitude", problem.name))
     return found
 
 

@@ -47,23 +47,22 @@ _FLOOR = 1e-17  # smaller errors, and 0, are drawn here
 
 def integrator_report(found: Verdict, seed: str) -> Report:
     """Return the report of the checks of an integrator, with a picture."""
-    title: list[str] = [
-        f"{found.command}: against the true solution of random scenes (seed: {seed})",
-        *map(str, references(found.checks)),
-    ]
+    told = f"{found.command}: against the true solution of random scenes (seed: {seed})"
+    title = [told, *map(str, references(found.checks))]
     tables = [_orders(found), _drifts(found), _findings(found)]
     failed = listed_singly([check for check in found.checks if not check.passed])
     text: list[Section] = [title, failed, *tables, [verdict(found.checks)]]
     page = summary_page("verify --integrator", found.checks, title, depth=2, more=tables)
+    orders = [
+        (judged.problem.name, each) for judged in found.judged for each in judged.convergences
+    ]
+    convergence = [
+        {"problem": name, "part": each.part, "control": found.control} | asdict(each)
+        for name, each in orders
+    ]
     report = checks_report(
         "verify", found.checks, text, page, integrator=found.command, seed=seed,
-        findings=list(map(asdict, found.findings)),
-        convergence=[
-            {"problem": judged.problem.name, "part": each.part, "control": found.control}
-            | asdict(each)
-            for judged in found.judged
-            for each in judged.convergences
-        ],
+        findings=list(map(asdict, found.findings)), convergence=convergence,
     )  # fmt: skip
     return report._replace(pictures={"integrator": lambda: integrator_picture(found)})
 

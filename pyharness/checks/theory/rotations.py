@@ -273,11 +273,8 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"
     vertex = math.sqrt(abs(product))
-    places: Places = []
-    for factor, name in sorted(along.items()):
-        omega = {one: vertex * factor, other: math.copysign(vertex / factor, product)}
-        places.append((name, _three(omega)))
-    return told, places
+    found = {f: {one: vertex * f, other: math.copysign(vertex / f, product)} for f in along}
+    return told, [(along[factor], _three(found[factor])) for factor in sorted(along)]
 
 
 def _three(components: dict[int, float]) -> Triple:
@@ -299,11 +296,9 @@ def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
         f"{across[0]:.6g}, w{other + 1} w{axis + 1} = {across[1]:.6g}; {_SHOWN} w{axis + 1}"
     )
     vertex = math.sqrt(math.hypot(*across))
-    places: Places = []
-    for spin in (vertex * factor for factor in _ALONG):
-        omega = {axis: spin, one: across[0] / spin, other: across[1] / spin}
-        places.append(("hyperbola", _three(omega)))
-    return told, places
+    spins = [vertex * factor for factor in _ALONG]
+    found = [{axis: spin, one: across[0] / spin, other: across[1] / spin} for spin in spins]
+    return told, [("hyperbola", _three(each)) for each in found]
 
 
 def _points(products: Sequence[float]) -> tuple[str, Places]:

@@ -125,12 +125,9 @@ def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Return the check, against linear stability if it applies, of the smallest divergent step."""
     scene, method = case_scene(case), name.subject
-    if listing is None:
-        runner: Runner = method_candidate(method, 1.0).rows
-        scheme = Listing.corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
-    else:
-        runner = unstopped(listing).rows
-        scheme = listing
+    alike = "runge-kutta" if SCHEMES[method].order == 4 else "two-term"
+    scheme = listing or Listing.corrected(alike)
+    runner: Runner = (unstopped(listing) if listing else method_candidate(method, 1.0)).rows
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
         return name.described(found, _from(found, TIME))

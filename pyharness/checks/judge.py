@@ -254,14 +254,12 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     without closed form.
     """
     answer = tried.answer
-    if answer.refusal:
-        may = policy.may_refuse(tried, truth, answer.refusal)
-        return name.judged(may, f"{REFUSED}{answer.refusal}")
+    if why := answer.refusal:
+        return name.judged(policy.may_refuse(tried, truth, why), f"{REFUSED}{why}")
     if tried.method == "closed-form" and closed_form(tried.scene) is None:
         return name.judged(False, "solved what has no closed form")
     limit = policy.limit(truth, tried)
-    error = truth.error_of(answer) if answer.is_whole else math.inf
-    note = "" if answer.is_whole else answer.ended
+    error, note = (truth.error_of(answer), "") if answer.is_whole else (math.inf, answer.ended)
     bound = None if limit is None or math.isinf(limit) else limit
     if bound is None and math.isfinite(error):
         check = name.described(error, "" if limit is None else "the flow leaves no two digits")

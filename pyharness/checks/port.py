@@ -160,10 +160,9 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
     found = []
     if difference := _difference(wanted, given):
         first = next(each for each in difference["values"] if each["ulps"])
-        found.append(
-            f"first at step {difference['step']}, {first['variable']}: {first['ulps']:.0f} ulp "
-            f"({first['theirs']}, due {first['ours']})"
-        )
+        where = f"first at step {difference['step']}, {first['variable']}"
+        pair = f"{first['theirs']}, due {first['ours']}"
+        found.append(f"{where}: {first['ulps']:.0f} ulp ({pair})")
     seen, due = (len(given), answer.ended, answer.stop), (len(wanted), twin.ended, twin.stop)
     triples = zip(("rows", "ended", "stop"), seen, due, strict=True)
     found += [f"{name}: {value}, due {wants}" for name, value, wants in triples if value != wants]

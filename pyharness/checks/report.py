@@ -174,10 +174,8 @@ def references(checks: Sequence[Check]) -> Section:
     for basis in (PROVED, ESTIMATED):
         some = [each for each in known if each.basis == basis]
         if some:
-            lines.append(
-                f"error of the reference, relative or in rad, at most {joined(some).text('')} in "
-                f"{counted(len(some), 'check')}"
-            )
+            most, count = joined(some).text(""), counted(len(some), "check")
+            lines.append(f"error of the reference, relative or in rad, at most {most} in {count}")
     warnings = dict.fromkeys(each.warning for each in known if each.warning)
     return lines + [f"WARNING: {each}" for each in warnings]
 

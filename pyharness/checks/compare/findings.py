@@ -138,11 +138,8 @@ class Comparison:
         errors = {"omega": (max(one.accuracy.omega), made * largest + self.reference.error)}
         if one.accuracy.angle is not None:
             errors["attitude"] = one.accuracy.angle, made + self.reference.angle_error
-        told = [
-            f"error of {name} {short(error)}, limit {short(limit)}"
-            for name, (error, limit) in errors.items()
-            if not error <= limit
-        ]
+        excess = {name: pair for name, pair in errors.items() if not pair[0] <= pair[1]}
+        told = [f"error of {x} {short(y)}, limit {short(z)}" for x, (y, z) in excess.items()]
         return f"{one.method}: {'; '.join(told)}" if told else ""
 
     @property

@@ -67,20 +67,16 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     told = verdict(comparison)
     tables: list[Section] = []
     if has_programs:
-        steps = comparison.scene.steps
-        short_runs = [
-            f"{each.who} ended at step {each.trajectory.steps} of {steps}: its errors are the "
-            "largest up to there"
-            for each in comparison.programs
-            if each.trajectory.steps < steps
-        ]
+        steps, end = comparison.scene.steps, "its errors are the largest up to there"
+        ended = [(each.who, each.trajectory.steps) for each in comparison.programs]
+        short_runs = [f"{x} ended at step {n} of {steps}: {end}" for x, n in ended if n < steps]
         tables.append([_programs(comparison, numerics), *short_runs])
     if numerics:
         tables.append([_methods(comparison)])
-    end = [*(failures if numerics else [_MORE]), *told]
+    last = [*(failures if numerics else [_MORE]), *told]
     return Report(
         "compare",
-        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, end],
+        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, last],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],

@@ -172,11 +172,8 @@ def solved(program: str, step: float) -> Solved:
             # coefficient c, and n in the sum.
             bound = powers @ (reach + gamma(count + 4) * abs(x))
             missed = abs(Fraction(total) - powers @ truth)
-            ratios = [
-                max(map(_share, abs(exact @ x - b), allowed)),
-                max(map(_share, abs(truth - x), reach)),
-                _share(missed, bound),
-            ]
+            pairs = (abs(exact @ x - b), allowed), (abs(truth - x), reach), ([missed], [bound])
+            ratios = [max(map(_share, wrong, most)) for wrong, most in pairs]
             every.append([*ratios, float(missed / (powers[0] * abs(b).max()))])
         return [max(each) for each in zip(*every, strict=True)]
 

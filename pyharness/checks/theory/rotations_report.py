@@ -168,11 +168,9 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
             style = {"marker": "o", "markersize": 6.0, "color": "black", "markerfacecolor": face}
             axes.plot(x, y, alpha=opacity, **style)
             if sign > 0.0:
-                axes.annotate(
-                    f"axis {axis + 1}", (x[0], y[0]), (7, 7), textcoords="offset points",
-                    fontsize=9, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8,
-                    "alpha": 0.8},
-                )  # fmt: skip
+                box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8}
+                look: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9, "bbox": box}
+                axes.annotate(f"axis {axis + 1}", (x[0], y[0]), (7, 7), **look)
     axes.set_aspect("equal")
     axes.set_axis_off()
     told = "L / |L| without torque\ndot: stable, ring: not stable, red: separatrix"

@@ -334,16 +334,11 @@ def _doubling(
 
     `missed` allows for a peak between two steps; `rate` is an angular frequency (1/s).
     """
-    wanted = math.log(2.0) + missed
-
-    def grown(step: float) -> float:
-        growth = float(matrix.radius(np.array(1j * rate * step)))
-        return time / step * math.log(growth)
-
-    low, high = smallest, time
+    wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if grown(middle) >= wanted else (middle, high)
+        step = math.sqrt(low * high)
+        grown = time / step * math.log(float(matrix.radius(np.array(1j * rate * step))))
+        low, high = (low, step) if grown >= wanted else (step, high)
     return high
 
 

@@ -261,8 +261,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
         checks.append(change.bounded(found.drift.change, limit, CHANGE))
     for quantity, values in found.drift.named.items():
         name = Name("integrator", quantity, problem.name, quantity="drift")
-        largest = float(np.abs(values).max())
-        power = growth_power(found.drift.times, values)
+        largest, power = float(np.abs(values).max()), growth_power(times, values)
         note = "" if power is None else f"grows with the power {power:.1f} of the time"
         checks.append(name.described(largest if math.isfinite(largest) else None, note))
     found.add(problem.name, *checks)

@@ -4,25 +4,35 @@ A cell is a combination of a program, a case of Table 1 of the thesis, defects a
 
 Our arithmetic of machine words reproduces a machine's mantissa length and rounding, such as 48 bits
 for the CDC. It is checked by test vectors and by runs of the programs.
+
+The decks, which are compiled from the author's cards, depend on neither the port nor the twins.
+TAPE5, the file of all steps, is compared with the Fortran port bit for bit, the printed page as
+text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import chain, product
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from pyharness.checks.check import BITS, Attempt, Check, Name, Selection
+from pyharness.checks.check import BITS, Attempt, Check, Name, Selection, selected
 from pyharness.checks.compare.agreement import differences, distance
 from pyharness.checks.scenes.random_scenes import draw
 from pyharness.model.basis import Basis
 from pyharness.model.facts import facts
-from pyharness.model.listing import Listing
+from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import case_scene
+from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.thesis import in_word
 from pyharness.thesis.cells import all_cells, cell_name, listing_name
+from pyharness.thesis.decks import compiler, deck_text, run_deck, solver_object
+from pyharness.thesis.printer import page
 from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
 from pyharness.thesis.word import WORDS
@@ -128,3 +138,58 @@ def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check
         other = in_word.run_compiled(scene, listing, WORDS[word])
     found = differences(ours, other)
     return name.judged(not found, ", ".join(found), distance(ours, other), 0.0, BITS)
+
+
+_AT_ONCE = 2
+_THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/case-2/original")
+
+
+def listings(program: str) -> list[Listing]:
+    """Return the original and the corrected listing, and each with every single change."""
+    names = frozenset(switches(program))
+    found = [Listing.original(program), Listing.corrected(program)]
+    found += [Listing(program, frozenset([name])) for name in switches(program)]
+    found += [Listing(program, names - {name}) for name in switches(program)]
+    for reading in names_of("reading", program):
+        found += [Listing.original(program, [reading]), Listing(program, [reading])]
+    return list(dict.fromkeys(found))
+
+
+def decks(chosen: Selection) -> Iterator[Check]:
+    """Yield checks that each deck agrees with the port; none without a Fortran compiler."""
+    every = product(chain.from_iterable(map(listings, PROGRAMS)), case_numbers())
+    some = [cell for cell in every if not chosen.thin or cell_name(*cell) in _THIN]
+    named = [(of_cell("decks", *cell), *cell) for cell in some]
+    asked = [each for each in named if selected(each[0].id, chosen.only)]
+    if not asked or compiler() is None:
+        return
+    with TemporaryDirectory() as folder, ThreadPoolExecutor(_AT_ONCE) as pool:
+        solver_object(Path(folder))
+        yield from pool.map(partial(_compared, Path(folder)), asked)
+
+
+def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
+    name, listing, case = asked
+    scene = case_scene(case)
+    port = PROGRAM_REGISTRY[listing.program].run(scene, listing)
+    assert port.velocity is not None
+    try:
+        deck = run_deck(deck_text(listing, scene, "gfortran"), folder)
+    except RuntimeError as failure:
+        return name.judged(False, str(failure))
+    wanted = np.column_stack([port.recorded_time, port.omega, port.velocity])
+    found = deck.tape5[: port.steps]
+    faults = [] if found.tobytes() == wanted.tobytes() else ["TAPE5 differs"]
+    whole = page(scene, listing.program, port)
+    overflowed = port.ended == "overflow"
+    if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
+        faults.append("the page differs")
+    # Records of the deck after the port's last row.
+    rest = deck.tape5[port.steps :]
+    if not overflowed:
+        faults += [f"{len(rest)} records more"] if len(rest) else []
+    elif not len(rest) or np.isfinite(rest[:, 1:4]).all(axis=1).any():
+        faults.append("it continues with finite numbers where the port has none")
+    with np.errstate(all="ignore"):
+        apart = float(np.abs(found - wanted[: len(found)]).max(initial=0.0))
+    return name.judged(not faults, ", ".join(faults), apart, 0.0, BITS)

@@ -177,7 +177,7 @@ def make_checks(
 ) -> Iterator[Check]:
     """Yield the finished checks, and those deferred checks that `only` requests.
 
-    An exception becomes a failed check, unless its type is in `raised`.
+    An exception becomes a failed check, unless its type is in `raised`. A suite yields any checks.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -186,13 +186,19 @@ def make_checks(
             try:
                 found = each.make(each.name)
                 parts = [found] if isinstance(found, Check) else found
-                yield from (
-                    check for check in make_checks(parts, only, raised) if selected(check.id, only)
-                )
+                for check in make_checks(parts, only, raised):
+                    if each.name.id == each.name.suite or selected(check.id, only):
+                        yield check
             except raised:
                 raise
             except Exception as error:
-                yield _ended(each.name, error)
+                said = f"ended here: {error}"
+                if not isinstance(error, InputError):
+                    place = traceback.extract_tb(error.__traceback__)[-1]
+                    where = f"{Path(place.filename).name}, line {place.lineno}"
+                    said = printable(f"ended here: {type(error).__name__}: {error} ({where})")
+                ended = each.name.with_quantity("exception").judged(False, said)
+                yield replace(ended, again=each.name.replay)
 
 
 def run_suites(
@@ -207,24 +213,12 @@ def run_suites(
     the user's.
     """
     for suite, attempts in suites.items():
-        if not may_hold(suite, only):
-            continue
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
-        try:
-            yield from make_checks(attempts(), only, raised)
-        except raised:
-            raise
-        except Exception as error:
-            yield _ended(Name(suite, command=command), error)
 
+        def whole(name: Name, make: Callable[[], Attempts] = attempts) -> Attempts:
+            return make()
 
-def _ended(name: Name, error: Exception) -> Check:
-    said = f"ended here: {error}"
-    if not isinstance(error, InputError):
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(place.filename).name}, line {place.lineno}"
-        said = printable(f"ended here: {type(error).__name__}: {error} ({where})")
-    return replace(name.with_quantity("exception").judged(False, said), again=name.replay)
+        yield from make_checks([Attempt(Name(suite, command=command), whole)], only, raised)
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
@@ -262,10 +256,6 @@ class Selection:
     # problems with published results; None selects the problems of the package
     problems: Sequence["Problem"] | None = None
     thin: bool = False  # only a few checks of every kind, for `verify --self-test`
-
-    def asks(self, id: str) -> bool:
-        """Return whether the check `id` is requested."""
-        return selected(id, self.only)
 
     def may_ask(self, id: str) -> bool:
         """Return whether a check whose id equals or begins with `id` may be requested."""

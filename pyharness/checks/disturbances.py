@@ -76,9 +76,7 @@ def steady_scene(coefficients: Triple, omega: Triple, step: float) -> Scene:
     a, b, c = coefficients
     x, y, z = omega
     law = TorqueLaw((-a * y * z, -b * x * z, -c * x * y))
-    return Scene(
-        "steady rotation", omega, coefficients=coefficients, torque=law, step_size=step, steps=1
-    )
+    return Scene("steady rotation", omega, None, coefficients, law, step_size=step, steps=1)
 
 
 def jacobian(scene: Scene, omega: Sequence[float]) -> Exact:
@@ -104,13 +102,11 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
         run = _run(replace(scene, omega=omega.tolist(), steps=1), listing)
         return run[0] if len(run) else np.full(3, np.nan)
 
-    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[listing.program] // 2)
-    matrix = np.array(
-        amplification(listing).exact_matrix(jacobian(scene, scene.omega)), dtype=float
-    )
+    found, limit = _differentiated(stepped, scene, listing.program)
+    exact = amplification(listing).exact_matrix(jacobian(scene, scene.omega))
+    matrix = np.array(exact, dtype=float)
     derived = sum(np.split(matrix[-3:], len(matrix) // 3, axis=1))
-    units = _units(scene, listing.program, np.abs(np.array(scene.omega)) + reach)
-    return Probe(found, np.asarray(derived), amplified * ROUNDING * float(units.max()))
+    return Probe(found, np.asarray(derived), limit)
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
@@ -172,9 +168,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
         # Along -1 the perturbation is exactly the eigenvector that decays.
         second = distance if direction.real else -distance
         start = (1.0, -1.0 if direction.real else 0.0, 1.0)
-        scene = Scene(
-            "top", start, coefficients=(distance, second, 0.0), step_size=1.0, steps=_GROWTH_STEPS
-        )
+        top = Scene("top", start, None, (distance, second, 0.0), step_size=1.0)
+        scene = replace(top, steps=_GROWTH_STEPS)
         rows = np.vstack([scene.omega, _run(scene, listing)])[:, :2]
         if len(rows) <= _GROWTH_STEPS:
             return True
@@ -215,22 +210,20 @@ def moving_step(scene: Scene, listing: Listing, step: int) -> Probe:
         end, _ = collocation.interval(omega.tolist(), points(program, moved * h), h, rates)
         return np.array(end)
 
-    found, reach, amplified = _differentiated(stepped, scene.omega, _DEGREE[program] // 2)
-    units = _units(scene, program, np.abs(np.array(scene.omega)) + reach, moved)
+    found, limit = _differentiated(stepped, scene, program, moved)
     # J at omega, and at the value of F.
-    j, along_rate = jacobians(
-        scene, np.array([scene.omega, scene.right_hand_side()(0.0, scene.omega)])
-    )
+    slope = scene.right_hand_side()(0.0, scene.omega)
+    j, along_rate = jacobians(scene, np.array([scene.omega, slope]))
     third = float(weight_of_squares(listing, step)) * h**3 * (along_rate @ j)
     derived = np.eye(3) + h * j + 0.5 * h * h * (j @ j + along_rate) + third
-    return Probe(found, derived, amplified * ROUNDING * float(units.max()))
+    return Probe(found, derived, limit)
 
 
 def _differentiated(
-    stepped: Callable[[Array], Array], omega: Sequence[float], count: int
-) -> tuple[Array, float, float]:
-    """Return the derivative, its neighbours' largest distance (rad/s), and its rounding factor."""
-    base = np.array(omega)
+    stepped: Callable[[Array], Array], scene: Scene, program: str, moved: float = 1.0
+) -> tuple[Array, float]:
+    """Return the derivative of a step at the initial omega, and a bound on its rounding error."""
+    base, count = np.array(scene.omega), _DEGREE[program] // 2
     reach = _REACH * float(np.abs(base).max())
     spread = reach / count
     weights = [float(each) for each in spacing(count)]
@@ -241,7 +234,9 @@ def _differentiated(
             away = i * spread * axis
             total += weight * (stepped(base + away) - stepped(base - away))
         columns.append(total / spread)
-    return np.array(columns).T, reach, 2.0 * sum(map(abs, weights)) / spread
+    amplified = 2.0 * sum(map(abs, weights)) / spread
+    units = _units(scene, program, np.abs(base) + reach, moved)
+    return np.array(columns).T, amplified * ROUNDING * float(units.max())
 
 
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
@@ -339,21 +334,15 @@ def _doubling(
 
     `missed` allows for a peak between two steps; `rate` is an angular frequency (1/s).
     """
-    wanted = math.log(2.0) + missed
-
-    def grown(step: float) -> float:
-        growth = float(matrix.radius(np.array(1j * rate * step)))
-        return time / step * math.log(growth)
-
-    low, high = smallest, time
+    wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if grown(middle) >= wanted else (middle, high)
+        step = math.sqrt(low * high)
+        grown = time / step * math.log(float(matrix.radius(np.array(1j * rate * step))))
+        low, high = (low, step) if grown >= wanted else (step, high)
     return high
 
 
 def _bounds(scene: Scene, time: float) -> Sequence[float]:
     times = np.linspace(0.0, time, _SAMPLES + 1)[1:].tolist()
-    omega: Array = solve(scene, times, "taylor", 1e-12).omega
-    largest: list[float] = np.abs(np.vstack([scene.omega, omega])).max(axis=0).tolist()
-    return largest
+    omega = np.vstack([scene.omega, solve(scene, times, "taylor", 1e-12).omega])
+    return [float(x) for x in np.abs(omega).max(axis=0)]

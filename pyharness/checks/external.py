@@ -29,7 +29,6 @@ from pyharness.model.basis import Basis
 from pyharness.model.errors import InputError
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene, Triple
-from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
@@ -64,25 +63,21 @@ _Result = tuple[Array, float]
 
 def perturbed(scene: Scene, part: float) -> Iterator[Scene]:
     """Yield copies of the scene, each with one nonzero number multiplied by 1 + `part`."""
+    change: Any = replace
     for name in ("moments", "coefficients", "omega"):
         for triple in _triples(getattr(scene, name), part):
-            yield _with(scene, name, triple)
+            yield change(scene, **{name: triple})
     law = scene.law
     for name in ("constant", "rate"):
         for triple in _triples(getattr(law, name), part):
-            yield replace(scene, torque=_with(law, name, triple))
+            yield change(scene, torque=change(law, **{name: triple}))
     for name in ("sines", "cosines"):
         waves = getattr(law, name)
         for place, (amplitude, frequency) in enumerate(waves):
             faster = (amplitude, frequency * (1.0 + part))
             for wave in (*((triple, frequency) for triple in _triples(amplitude, part)), faster):
                 changed = (*waves[:place], wave, *waves[place + 1 :])
-                yield replace(scene, torque=_with(law, name, changed))
-
-
-def _with(whole: Scene | TorqueLaw, name: str, part: object) -> Any:
-    changes: dict[str, Any] = {name: part}
-    return replace(whole, **changes)
+                yield change(scene, torque=change(law, **{name: changed}))
 
 
 def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
@@ -114,8 +109,15 @@ def _names(
     own = partial(Name, "external", method, quantity=quantity, command=f"verify{given}")
     names = enumerate(own(f"{problem.name}/{value.time}") for value in values)
     asked = [(row, name) for row, name in names if selected(name.id, only)]
-    times = [float(value.time) for value in values]
-    return asked if asked and _can_take(method, problem.scene, times) else []
+    accepted, scene = True, problem.scene
+    if asked and method == "closed-form":
+        accepted = closed_form(scene) is not None
+    elif asked and method == "quick":
+        end = prepared_candidate(method, _TOLERANCES[method]).end(scene, float(values[0].time))
+        accepted = end.ended != "refused"
+    elif asked and method in PROGRAMS:
+        accepted = float(values[0].time) > 0.0
+    return asked if accepted else []
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
@@ -143,14 +145,13 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
         rounding = _turns(scene, times) if len(found) else np.zeros(0)
         for row, name in asked:
             pointing = values[row].pointing
-            if row >= len(found):
+            if row < len(found) and pointing is not None:
+                wanted = np.array([pointing.attitude])
+                error = float(angle_between(found[row : row + 1], wanted)[0])
+                limit = pointing.accuracy + tolerance + float(rounding[row])
+                yield name.bounded(error, limit, _PUBLISHED, "angle, rad")
+            else:
                 yield _without(problem, name, refusal, values[row])
-                continue
-            assert pointing is not None
-            wanted = np.array([pointing.attitude])
-            error = float(angle_between(found[row : row + 1], wanted)[0])
-            limit = pointing.accuracy + tolerance + float(rounding[row])
-            yield name.bounded(error, limit, _PUBLISHED, "angle, rad")
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
@@ -217,15 +218,6 @@ def _as_far_as_solved(
     return rows, ""
 
 
-def _can_take(method: str, scene: Scene, times: Sequence[float]) -> bool:
-    if method == "closed-form":
-        return closed_form(scene) is not None
-    if method == "quick":
-        end = prepared_candidate(method, _TOLERANCES[method]).end(scene, times[0])
-        return end.ended != "refused"
-    return method not in PROGRAMS or times[0] > 0.0
-
-
 def _results(problem: Problem, method: str, values: Sequence[Value]) -> list[_Result | None]:
     """Return omega and its error bound (rad/s) at each value; None for a singular program."""
     if method in PROGRAMS:
@@ -255,11 +247,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     accuracy = finest_print * UNITS[problem.unit]
     run = program_candidate(Listing.corrected(program), may_stop=False, velocity=False).rows
     order = PROGRAM_REGISTRY[program].order
-    result, before, steps, ended = None, None, _FEWEST_STEPS, ""
-    previous = 0.0
+    result, before, steps, ended, previous = None, None, _FEWEST_STEPS, "", 0.0
     while steps <= _MOST_STEPS:
-        stepped = replace(scene, step_size=time / steps, steps=steps)
-        rows = run(stepped)
+        rows = run(replace(scene, step_size=time / steps, steps=steps))
         if rows.ier is not None and rows.ier.any():
             # LEQT1F reports the matrices of tiny steps as singular; the program then has order 1.
             break
@@ -275,17 +265,14 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
-        before = omega
-        steps *= 2
+        before, steps = omega, 2 * steps
     if ended not in ("", "complete"):
         raise InputError(f"{program} in steps of {time / _MOST_STEPS:g} s: {ended}")
     return result
 
 
 def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array) -> Check:
-    factor = UNITS[unit]
-    omega, error = result
-    judged = []
+    factor, (omega, error), judged = UNITS[unit], result, []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
             # Decimals, because the print may have more digits than binary64.

@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -165,9 +165,8 @@ def _value(entry: object, sequence: object) -> Value:
             f"{where}: omega must be a list of three texts; '' means that the component is "
             "not printed"
         )
-    omega = tuple(
-        None if text == "" else figure(f"{where}: omega", text, good_to) for text in prints
-    )
+    read = partial(figure, f"{where}: omega", good_to=good_to)
+    omega = tuple(None if text == "" else read(text) for text in prints)
     if not any(omega) and pointing is None:
         raise InputError(f"{where}: no component of omega is given; give at least one")
     return Value(time, omega, pointing)
@@ -194,7 +193,5 @@ def _pointing(
     if key == "attitude":
         q, length = unit_quaternion(f"{where}: attitude", values)
         return Pointing(q, 2.0 * accuracy / length)
-    return Pointing(
-        of_angles(f"{where}: angles_deg", values, sequence),
-        math.radians(sum(each.accuracy for each in figures)),
-    )
+    q = of_angles(f"{where}: angles_deg", values, sequence)
+    return Pointing(q, math.radians(sum(each.accuracy for each in figures)))

@@ -9,6 +9,7 @@ import math
 import platform
 import shlex
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -104,14 +105,12 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     for each in due:
         name = Name("golden", each.source, each.name, options=options)
         yield Attempt(name, partial(_compared, each, entries.get(each.command), same_library))
+    told = "is recorded and no longer produced; verify --update forgets it"
     for command in sorted(set(entries) - {each.command for each in due}):
         rest = command.partition(" run ")[2].replace("--", "").replace(" ", "-")
         source = next(s for s, file in known.items() if entries[command] in file["trajectory"])
-        yield Attempt(Name("golden", source, rest, options=options), _forgotten)
-
-
-def _forgotten(name: Name) -> Check:
-    return name.judged(False, "is recorded and no longer produced; verify --update forgets it")
+        gone = Name("golden", source, rest, options=options)
+        yield Attempt(gone, lambda name: name.judged(False, told))
 
 
 def _compared(
@@ -164,11 +163,10 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record."""
-    try:
+    known: dict[str, dict[str, Any]] = {}
+    # If the old record is damaged, every trajectory counts as new.
+    with suppress(InputError):
         known = read_record(folder) if folder.is_dir() else {}
-    except InputError:
-        # If the old record is damaged, every trajectory counts as new.
-        known = {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
     files: dict[str, list[dict[str, Any]]] = {}
     news = []
@@ -215,11 +213,8 @@ def _rows(entry: dict[str, Any]) -> Array:
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any]) -> str:
-    parts = [
-        f"{key} {old[key] or 'none'} -> {new[key] or 'none'}"
-        for key in ("ended", "steps", "evaluations", "stop")
-        if old[key] != new[key]
-    ]
+    changed = [key for key in ("ended", "steps", "evaluations", "stop") if old[key] != new[key]]
+    parts = [f"{key} {old[key] or 'none'} -> {new[key] or 'none'}" for key in changed]
     before, after = _rows(old), _rows(new)
     if before.shape == after.shape:
         names = ("time", "TIME", "omega", "velocity")

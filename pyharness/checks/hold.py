@@ -258,9 +258,7 @@ def conserved(scene: Scene, omega: np.ndarray, largest: float) -> float:
     big = Fraction(largest)
     for power in (1, 2):
         weights = np.array([Fraction(moment) ** power for moment in scene.moments])
-        before, after = (
-            np.array([Fraction(float(w)) for w in each]) for each in (scene.omega, omega)
-        )
+        before, after = np.vectorize(Fraction, otypes=[object])([scene.omega, omega])
         change = abs(weights @ after**2 - weights @ before**2)
         slope = max(weights @ abs(before), weights @ abs(after))
         if change:

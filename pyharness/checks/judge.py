@@ -12,8 +12,7 @@ import numpy as np
 
 from pyharness.checks.check import REFUSED, Check, Name
 from pyharness.checks.compare.candidates import Candidate, End, method_candidate
-from pyharness.checks.theory.conditioning import FLOW, LIVELY, Conditioning
-from pyharness.checks.theory.state_conditioning import conditioning_at
+from pyharness.checks.theory.conditioning import FLOW, LIVELY, Conditioning, conditioning_at
 from pyharness.engine.problem import closed_form
 from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
@@ -231,9 +230,10 @@ def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
 
 
 def _granting(factor: Callable[[float], float]) -> Callable[[Truth, MethodRun], float]:
-    return lambda truth, tried: allowed(
-        truth, tolerance_of(tried), factor(truth.flow.amplification)
-    )
+    def limit(truth: Truth, tried: MethodRun) -> float:
+        return allowed(truth, tolerance_of(tried), factor(truth.flow.amplification))
+
+    return limit
 
 
 AS_STATED = Policy(_granting(lambda growth: 1.0), FLOW, has_no_form)
@@ -254,14 +254,12 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     without closed form.
     """
     answer = tried.answer
-    if answer.refusal:
-        may = policy.may_refuse(tried, truth, answer.refusal)
-        return name.judged(may, f"{REFUSED}{answer.refusal}")
+    if why := answer.refusal:
+        return name.judged(policy.may_refuse(tried, truth, why), f"{REFUSED}{why}")
     if tried.method == "closed-form" and closed_form(tried.scene) is None:
         return name.judged(False, "solved what has no closed form")
     limit = policy.limit(truth, tried)
-    error = truth.error_of(answer) if answer.is_whole else math.inf
-    note = "" if answer.is_whole else answer.ended
+    error, note = (truth.error_of(answer), "") if answer.is_whole else (math.inf, answer.ended)
     bound = None if limit is None or math.isinf(limit) else limit
     if bound is None and math.isfinite(error):
         check = name.described(error, "" if limit is None else "the flow leaves no two digits")

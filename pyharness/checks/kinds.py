@@ -4,14 +4,12 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
 
-from pyharness.checks.cells import cells, random_programs, words
-from pyharness.checks.check import Attempts, Check, Selection, run_suites
-from pyharness.checks.decks import decks
+from pyharness.checks.cells import cells, decks, random_programs, words
+from pyharness.checks.check import Attempts, Check, Selection, run_suites, selected
 from pyharness.checks.external import external_checks
 from pyharness.checks.external_file import problems
 from pyharness.checks.golden import golden
-from pyharness.checks.methods import attitudes, methods, prepared
-from pyharness.checks.orders import orders
+from pyharness.checks.methods import attitudes, methods, orders, prepared
 from pyharness.checks.random_methods import random_attitudes, random_methods, random_torques
 from pyharness.checks.schemes import schemes, stops
 
@@ -19,7 +17,7 @@ from pyharness.checks.schemes import schemes, stops
 def _external(chosen: Selection) -> Iterator[Check]:
     asked = problems() if chosen.problems is None else chosen.problems
     found = external_checks(asked, _THIN_EXTERNAL if chosen.thin else chosen.only)
-    return (check for check in found if chosen.asks(check.id))
+    return (check for check in found if selected(check.id, chosen.only))
 
 
 _THIN_EXTERNAL = [

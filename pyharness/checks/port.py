@@ -80,9 +80,8 @@ def port_cells(programs: Sequence[str], cases: Sequence[int], cells: Sequence[st
     """Return the cells whose names begin with an element of `cells`; all if it is empty."""
     found = []
     for listing, case in all_cells():
-        name = cell_name(listing, case)
+        name, of = cell_name(listing, case), of_cell("port", listing, case)
         if listing.program in programs and case in cases and selected(name, cells):
-            of = of_cell("port", listing, case)
             found.append(Cell(name, of, f"--cell {name}", listing, case_scene(case)))
     return found
 
@@ -161,17 +160,12 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
     found = []
     if difference := _difference(wanted, given):
         first = next(each for each in difference["values"] if each["ulps"])
-        found.append(
-            f"first at step {difference['step']}, {first['variable']}: {first['ulps']:.0f} ulp "
-            f"({first['theirs']}, due {first['ours']})"
-        )
-    for name, value, wants in (
-        ("rows", len(given), len(wanted)),
-        ("ended", answer.ended, twin.ended),
-        ("stop", answer.stop, twin.stop),
-    ):
-        if value != wants:
-            found.append(f"{name}: {value}, due {wants}")
+        where = f"first at step {difference['step']}, {first['variable']}"
+        pair = f"{first['theirs']}, due {first['ours']}"
+        found.append(f"{where}: {first['ulps']:.0f} ulp ({pair})")
+    seen, due = (len(given), answer.ended, answer.stop), (len(wanted), twin.ended, twin.stop)
+    triples = zip(("rows", "ended", "stop"), seen, due, strict=True)
+    found += [f"{name}: {value}, due {wants}" for name, value, wants in triples if value != wants]
     found += _of_ier(None if twin.ier is None else twin.ier.tolist(), answer.ier)
     return found
 
@@ -180,11 +174,10 @@ def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
     """Return the values in the first step that differs, in hexadecimal: JSON has no inf and nan."""
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
-            pairs = zip(VARIABLES, due.tolist(), row.tolist(), strict=True)
-            values = [
-                {"variable": name, "ours": x.hex(), "theirs": y.hex(), "ulps": ulps(x, y)}
-                for name, x, y in pairs
-            ]
+            values = []
+            for name, x, y in zip(VARIABLES, due.tolist(), row.tolist(), strict=True):
+                pair = {"ours": x.hex(), "theirs": y.hex(), "ulps": ulps(x, y)}
+                values.append({"variable": name, **pair})
             return {"step": step, "values": values}
     return None
 
@@ -194,10 +187,8 @@ def _of_ier(wanted: list[int] | None, given: list[int] | None) -> list[str]:
         due = "null" if wanted is None else counted(len(wanted), "value")
         return [] if wanted is given else [f"ier: due {due}"]
     pairs = enumerate(zip(wanted, given, strict=False), 1)
-    wrong = [
-        f"IER at step {step}: {value}, due {due}" for step, (due, value) in pairs if due != value
-    ]
-    return wrong[:1]
+    wrong = [(step, *pair) for step, pair in pairs if pair[0] != pair[1]]
+    return [f"IER at step {step}: {value}, due {due}" for step, due, value in wrong[:1]]
 
 
 def _rows(twin: Trajectory) -> Array:
@@ -217,8 +208,7 @@ _TIMES = (
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
     """Return the report of a port's checks, of which there is at least one."""
     title = [f"{command}: against the twins, bit for bit"]
-    if seed:
-        title.append(f"seed of the random scenes: {seed}")
+    title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:
         title.append(f"ended at the first of {asked} cells that it did not answer")
     seconds = sum(check.seconds or 0.0 for check in checks)
@@ -234,13 +224,10 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
 def step_section(check: PortCheck) -> Section:
     """Return the exact values of all variables in the first step that differs."""
     assert check.difference is not None
-    rows = [
-        [
-            each["variable"], _UNITS[each["variable"][0]], repr(float.fromhex(each["ours"])),
-            repr(float.fromhex(each["theirs"])), f"{each['ulps']:.0f}",
-        ]
-        for each in check.difference["values"]
-    ]  # fmt: skip
+    rows = []
+    for each in check.difference["values"]:
+        name, pair = each["variable"], (float.fromhex(each[who]) for who in ("ours", "theirs"))
+        rows.append([name, _UNITS[name[0]], *map(repr, pair), f"{each['ulps']:.0f}"])
     return [f"{check.id}, step {check.difference['step']}:", Table(_STEP, rows)]
 
 
@@ -249,9 +236,7 @@ def _times(checks: Sequence[PortCheck]) -> Section:
     for check in checks:
         if check.seconds is not None:
             groups.setdefault("/".join(check.id.split("/")[:2]), []).append(check.seconds)
-    rows = [
-        [name, len(each), sum(each), statistics.median(each), max(each)]
-        for name, each in groups.items()
-    ]
+    measures = (len, sum, statistics.median, max)
+    rows = [[name, *(f(each) for f in measures)] for name, each in groups.items()]
     told = "times from a request to the port's answer; the first one includes the start of the port"
     return [told, Table(_TIMES, rows)] if rows else []

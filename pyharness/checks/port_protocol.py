@@ -73,10 +73,8 @@ def read_answer(line: bytes, steps: int) -> Answer:
             raise PortError(f"no '{name}'; an answer has rows, ended, stop and ier")
     ended = read_name("ended", given["ended"], ENDINGS)
     told = f"it takes {len(VARIABLES)}: {' '.join(VARIABLES)}"
-    rows = [
-        read_row(f"row {number}", row, len(VARIABLES), told)
-        for number, row in enumerate(read_list("rows", given["rows"]), 1)
-    ]
+    numbered = enumerate(read_list("rows", given["rows"]), 1)
+    rows = [read_row(f"row {number}", row, len(VARIABLES), told) for number, row in numbered]
     if len(rows) > steps or (ended == "complete" and len(rows) < steps):
         raise PortError(f"{len(rows)} rows of a run of {steps} steps that ended '{ended}'")
     stop = None if given["stop"] is None else _stop(given["stop"])

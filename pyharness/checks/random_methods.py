@@ -16,7 +16,7 @@ from random import Random
 
 import numpy as np
 
-from pyharness.checks.check import Attempt, Check, Name, Sample, Selection
+from pyharness.checks.check import Attempt, Check, Name, Sample, Selection, selected
 from pyharness.checks.compare.candidates import prepared_candidate
 from pyharness.checks.judge import (
     IF_CALM,
@@ -137,7 +137,9 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
         drawn = draw(chosen.seed, number)
-        asked = _requested(chosen.asks, number, _entrances(drawn, number, chosen.thin))
+        asked = _requested(
+            lambda id: selected(id, chosen.only), number, _entrances(drawn, number, chosen.thin)
+        )
         if not asked:
             continue
         try:
@@ -167,16 +169,20 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
             "attitude-taylor": partial(run_of_solve, "taylor", tolerance, scene, times),
             "attitude-prepared": partial(run_of_call, "auto", tolerance, scene, times[-1]),
         }
-        asked = _requested(chosen.asks, number, entrances)
-        try:
-            truth = reference_truth(scene, times, _EFFORT) if asked else None
-        except InputError:
-            # The motion diverges, or is too fast or long for any true solution.
-            continue
+        asked = _requested(lambda id: selected(id, chosen.only), number, entrances)
+        truth = _truth_if_known(scene, times, _EFFORT) if asked else None
         if truth and allowed(truth, 0.0, 1.0) < 1.0:
             for subject, tried in asked.items():
                 made = partial(sample, tried, truth, IF_CALM)
                 yield Attempt(chosen.name_draw(number, subject), made)
+
+
+def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
+    """Return None if the motion diverges, or is too fast or long for any true solution."""
+    try:
+        return reference_truth(scene, times, effort)
+    except InputError:
+        return None
 
 
 def _requested(is_asked: Callable[[str], bool], number: int, entrances: Entrances) -> Entrances:
@@ -237,11 +243,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
         entrances = _torque_entrances(scene, time, source, is_slow)
         asked = _requested(chosen.may_ask, number, entrances)
         times = (_EARLIER * time, time)
-        try:
-            truth = reference_truth(scene, times, _EFFORT_TORQUE) if asked else None
-        except InputError:
-            # The motion diverges, or is too fast or long for any true solution.
-            continue
+        truth = _truth_if_known(scene, times, _EFFORT_TORQUE) if asked else None
         if truth and ROUNDING * truth.flow.amplification < 1.0:
             for subject, tried in asked.items():
                 yield Attempt(chosen.name_draw(number, subject), partial(_samples, tried, truth))

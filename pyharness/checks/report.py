@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 from pyharness.checks.check import Check, Sample, severity
@@ -122,11 +123,8 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
         lines += [f"FAILED {check.id}{_format_outcome(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")
-    if len(checks) <= _FEW:
-        lines += [
-            f"{each.id}:{_format_outcome(each, ', limit ')}" for each in checks if each.passed
-        ]
-    return lines
+    few = [check for check in checks if check.passed] if len(checks) <= _FEW else []
+    return lines + [f"{each.id}:{_format_outcome(each, ', limit ')}" for each in few]
 
 
 def _format_outcome(check: Check, against: str) -> str:
@@ -160,10 +158,10 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
     if not cells:
         return []
     bands = [name for _, name in _BANDS]
-    rows = [
-        [*key, *(x for values in cells[key] for x in (len(values), max(values, default=None)))]
-        for key in sorted(cells, key=lambda each: (each[0], bands.index(each[1])))
-    ]
+    rows: list[list[Any]] = []
+    for key in sorted(cells, key=lambda each: (each[0], bands.index(each[1]))):
+        pairs = ((len(values), max(values, default=None)) for values in cells[key])
+        rows.append([*key, *chain.from_iterable(pairs)])
     told = "worst: (error - 2e-15 K) / tolerance, with K the error amplification:"
     return [told, Table(_SAMPLES, rows)]
 
@@ -176,10 +174,8 @@ def references(checks: Sequence[Check]) -> Section:
     for basis in (PROVED, ESTIMATED):
         some = [each for each in known if each.basis == basis]
         if some:
-            lines.append(
-                f"error of the reference, relative or in rad, at most {joined(some).text('')} in "
-                f"{counted(len(some), 'check')}"
-            )
+            most, count = joined(some).text(""), counted(len(some), "check")
+            lines.append(f"error of the reference, relative or in rad, at most {most} in {count}")
     warnings = dict.fromkeys(each.warning for each in known if each.warning)
     return lines + [f"WARNING: {each}" for each in warnings]
 

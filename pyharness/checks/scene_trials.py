@@ -12,13 +12,12 @@ import numpy as np
 
 from pyharness.checks.check import BITS, REFUSED, Attempt, Attempts, Check, Name
 from pyharness.checks.judge import MethodRun, Truth, by_rows, judge, reference_truth
-from pyharness.checks.orders import in_few_steps, order_if_seen
+from pyharness.checks.methods import in_few_steps, order_if_seen
 from pyharness.checks.random_methods import TORQUE_POLICY
 from pyharness.checks.stress import Trial, named
-from pyharness.checks.theory.conditioning import FLOW
-from pyharness.checks.theory.state_conditioning import conditioning_at
+from pyharness.checks.theory.conditioning import FLOW, conditioning_at
 from pyharness.checks.tolerances import MIDDLING
-from pyharness.checks.trials.threads import THREADS, Job, different
+from pyharness.checks.trials.threads import BOUND, THREADS, TITLE, Job, different
 from pyharness.engine.problem import closed_form
 from pyharness.engine.recorded import system
 from pyharness.engine.registry import (
@@ -84,11 +83,7 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
             "motion.",
             _invariance,
         ),
-        "threads": (
-            "the same calls from eight threads",
-            "No bit may differ, since calls share no state.",
-            _threads,
-        ),
+        "threads": (TITLE, BOUND, _threads),
     }
     if not any(_takes(method, scene) for method in FIXED_STEP):
         del made["step-size"]
@@ -135,10 +130,9 @@ def _length(scene: Scene, name: Name) -> Iterator[Attempt]:
 
 def _errors(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Name) -> list[Check]:
     run, exact = tried(), truth()
-    found = [judge(name.with_quantity("omega"), run, replace(exact, attitude=None), TORQUE_POLICY)]
-    if exact.attitude is not None:
-        found.append(judge(name.with_quantity("angle"), run, exact, TORQUE_POLICY))
-    return found
+    truths = {"omega": replace(exact, attitude=None)}
+    truths |= {} if exact.attitude is None else {"angle": exact}
+    return [judge(name.with_quantity(x), run, y, TORQUE_POLICY) for x, y in truths.items()]
 
 
 def _step_size(scene: Scene, name: Name) -> Iterator[Attempt]:
@@ -211,9 +205,8 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     again = _end(start, -time, method, tolerance)
     back = conditioning_at(start, [-time])
     # The error of the forward run is an initial error of the backward run.
-    limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification + back.limit(
-        tolerance
-    )
+    limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification
+    limit += back.limit(tolerance)
     attitude = None if scene.attitude is None else np.array(scene.attitude)
     return (np.array(scene.omega), attitude), again, limit
 

@@ -53,10 +53,9 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 def schemes(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of steps; the value is the largest ratio of difference to bound."""
     for case in cases(chosen, (7,)):
+        compare = partial(_compare_steps, case_scene(case))
         for program in PROGRAMS:
-            yield Attempt(
-                Name("schemes", program, f"case-{case}"), partial(_compare_steps, case_scene(case))
-            )
+            yield Attempt(Name("schemes", program, f"case-{case}"), compare)
 
 
 def _compare_steps(scene: Scene, name: Name) -> Check:
@@ -169,18 +168,18 @@ def stops(chosen: Selection) -> Iterator[Attempt]:
             yield Attempt(name, partial(_compare_stops, case_scene(case), listing, known))
 
 
-def _run(scene: Scene) -> tuple[Trajectory, _Stages | None]:
+_Known = tuple[Trajectory, _Stages | None]
+
+
+def _run(scene: Scene) -> _Known:
     run = PROGRAM_REGISTRY[_PROGRAM].run(scene, Listing.corrected(_PROGRAM), may_stop=False)
     return run, _stages(scene, run) if _is_whole(scene, run) else None
 
 
 def _compare_stops(
-    scene: Scene,
-    listing: Listing,
-    known: Callable[[], tuple[Trajectory, _Stages | None]],
-    name: Name,
+    scene: Scene, listing: Listing, run_once: Callable[[], _Known], name: Name
 ) -> Check:
-    run, kutta = known()
+    run, kutta = run_once()
     if kutta is None:
         return name.judged(False, f"{run.ended}, or no velocity", limit=1.0, basis=_QUOTIENT)
     quotients = _quotients(scene, run, kutta, listing)

@@ -65,9 +65,8 @@ def _table(checks: Sequence[Check]) -> Table:
         failed = sum(not check.passed for check in members)
         worst = max(judged, key=severity) if judged else max(members, key=_size)
         share = severity(worst)[1] if judged else None
-        where = worst.name.place or None
         numbers = [len(members), failed, len(judged), share, worst.value, worst.limit]
-        rows.append([name, *numbers, marks([worst]), where])
+        rows.append([name, *numbers, marks([worst]), worst.name.place or None])
     return Table(_HEADS, rows)
 
 
@@ -151,11 +150,10 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         axes.set_xticks(list(places.values()), labels, rotation=90)
         axes.tick_params(axis="x", labelsize=6)
     grid[0, 0].set_ylim(_FLOOR / 2.0, _TOP * 2.0)
-    series = {(mark.rank, mark.what): mark for mark in reversed(marks)}
-    handles = []
-    for each in dict.fromkeys((mark.rank, mark.what) for mark in marks):
-        label = " ".join(each).strip() or "no setting"
-        handles.append(Line2D([], [], **series[each].style, markersize=4.0, label=label))
+    series: dict[str, _Mark] = {}
+    for mark in marks:
+        series.setdefault(f"{mark.rank} {mark.what}".strip() or "no setting", mark)
+    handles = [Line2D([], [], **x.style, markersize=4.0, label=k) for k, x in series.items()]
     inches = width * columns
     told = (
         f"{trial.name}: {trial.title}",
@@ -193,20 +191,19 @@ def _panel(
     for rank, what in dict.fromkeys((mark.rank, mark.what) for mark in marks):
         members = [mark for mark in marks if (mark.rank, mark.what) == (rank, what)]
         style = members[0].style
-        for judged in (True, False):
-            own = [mark for mark in members if (mark.check.limit is not None) == judged]
+        small: dict[str, Any] = {"markersize": 3.0, "markeredgewidth": 0.6}
+        line: dict[str, Any] = {"color": style["color"], "linewidth": 0.8}
+        line["linestyle"] = (0, (1, 1.2)) if what == "drift" else "-"
+        judged = [mark for mark in members if mark.check.limit is not None]
+        described = [mark for mark in members if mark.check.limit is None]
+        for own, face in ((judged, style["color"]), (described, "none")):
             at = [places[mark.kind, mark.circumstance] for mark in own]
-            axes.plot(
-                at, [_inside(mark.check.value) for mark in own], **style, markersize=3.0,
-                markerfacecolor=style["color"] if judged else "none", markeredgewidth=0.6,
-            )  # fmt: skip
+            values = [_inside(mark.check.value) for mark in own]
+            axes.plot(at, values, **style, **small, markerfacecolor=face)
         for kind in dict.fromkeys(mark.kind for mark in members):
-            own = [mark for mark in members if mark.kind == kind and mark.check.limit is not None]
-            at = [places[mark.kind, mark.circumstance] for mark in own]
-            axes.plot(
-                at, [_inside(mark.check.limit) for mark in own], color=style["color"],
-                linewidth=0.8, linestyle=(0, (1, 1.2)) if what == "drift" else "-",
-            )  # fmt: skip
+            own = [mark for mark in judged if mark.kind == kind]
+            at = [places[kind, mark.circumstance] for mark in own]
+            axes.plot(at, [_inside(mark.check.limit) for mark in own], **line)
     axes.set_yscale("log")
     # The names of the kinds are below the title.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
@@ -246,14 +243,13 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
             one = axes[row, column]
             own = [each for each in found if (each.motion, each.what) == (motion, what)]
             for each in own:
-                style = _OF_METHODS[each.method]
-                many = each.starts > 1
+                style, many = _OF_METHODS[each.method], each.starts > 1
                 marked = {"label": each.method, "markersize": 4, **style}
-                one.loglog(each.steps[many], each.error[many], **marked)
                 # Errors of a single start have open markers, and are not joined to errors over
                 # several starts.
-                alone = style | {"linestyle": "", "markerfacecolor": "none"}
-                one.loglog(each.steps[~many], each.error[~many], markersize=5, **alone)
+                alone = style | {"markersize": 5, "linestyle": "", "markerfacecolor": "none"}
+                for shown, look in ((many, marked), (~many, alone)):
+                    one.loglog(each.steps[shown], each.error[shown], **look)
                 one.loglog(each.steps, each.limits, color=style["color"], linewidth=0.5)
             ends = np.array([1e2, 1e7])
             begin = min(each.error[0] for each in own)
@@ -267,14 +263,13 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
             if row == len(_SHOWN) - 1:
                 one.set_xlabel("steps")
         axes[row, 0].set_ylabel("error of phase (rad)" if what == "phase" else "relative error")
-    figure.suptitle(
-        "Errors over many starts of one motion; open: of one start. Thin: the bounds.", fontsize=10
-    )
-    rows = [
-        [each.motion, each.method, each.what, f"{n:.0f}", *row]
-        for each in found
-        for n, *row in zip(each.steps, each.error, each.limits, each.starts, strict=True)
-    ]
+    told = "Errors over many starts of one motion; open: of one start. Thin: the bounds."
+    figure.suptitle(told, fontsize=10)
+    rows = []
+    for each in found:
+        names = [each.motion, each.method, each.what]
+        columns = zip(each.steps, each.error, each.limits, each.starts, strict=True)
+        rows += [[*names, f"{n:.0f}", *row] for n, *row in columns]
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
@@ -298,19 +293,14 @@ def regions_picture(found: "Regions") -> Picture:
     plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
     told = "grey: Gauss collocation, the whole left half-plane"
     plane.text(-4.5, 3.25, told, fontsize=8, color="#505050")
-    handles = []
+    handles: list[Any] = []
     for each, style in zip(found.regions, _OF_REGIONS, strict=True):
-        plane.contour(
-            found.real, found.imaginary, each.radius, levels=[1.0],
-            colors=style["color"], linestyles=[style["linestyle"]],
-            linewidths=style["linewidth"],
-        )  # fmt: skip
+        lines = {f"{name}s": [value] for name, value in style.items()}
+        plane.contour(found.real, found.imaginary, each.radius, levels=[1.0], **lines)
         for sign, alpha in ((1.0, 1.0), (-1.0, 0.35)):
-            shown = sign * each.growth > _LEAST
-            values = np.where(shown, sign * each.growth, np.nan)
-            (line,) = axis.plot(found.distances, values, alpha=alpha, label=each.name, **style)
-            if sign > 0.0:
-                handles.append(line)
+            values = np.where(sign * each.growth > _LEAST, sign * each.growth, np.nan)
+            drawn = axis.plot(found.distances, values, alpha=alpha, label=each.name, **style)
+            handles += drawn if sign > 0.0 else []
     plane.axhline(0.0, color="#808080", linewidth=0.6)
     plane.axvline(0.0, color="#808080", linewidth=0.6)
     plane.set(aspect="equal", xlabel="real part of z = h lambda", ylabel="imaginary part")
@@ -322,10 +312,8 @@ def regions_picture(found: "Regions") -> Picture:
     axis.set_ylabel("growth of a wobble in a step; faint: decay")
     axis.set_title("Along the imaginary axis: spinning about a stable axis", fontsize=10)
     axis.grid(visible=True, linewidth=0.3)
-    figure.legend(
-        handles, [each.name for each in found.regions], loc="outside lower center", ncols=3,
-        handlelength=5.0, frameon=False, fontsize=9,
-    )  # fmt: skip
+    look = {"ncols": 3, "handlelength": 5.0, "frameon": False, "fontsize": 9}
+    figure.legend(handles=handles, loc="outside lower center", **look)
     columns = [Column("distance", full=digits(".6g"), unit="rad")]
     columns += [Column(each.name, full=digits(".3g")) for each in found.regions]
     rows = np.column_stack([found.distances, *(each.growth for each in found.regions)])

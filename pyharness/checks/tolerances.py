@@ -73,21 +73,14 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)
-    found = _within_budget(name, least, radians, flow.amplification)
-    return [*found, None] if name in GAUSS else [*found]
-
-
-def _within_budget(name: str, least: float, radians: float, amplification: float) -> list[float]:
     most, coarsest = _BUDGETS.get(name, math.inf), _LADDER[-1]
-    costs = {
-        each: _cost(name, each, radians, amplification)
-        for each in sorted({least, *_LADDER})
-        if least <= each <= coarsest
-    }
+    tried = [each for each in sorted({least, *_LADDER}) if least <= each <= coarsest]
+    costs = {each: _cost(name, each, radians, flow.amplification) for each in tried}
     allowed = [each for each, cost in costs.items() if cost <= most]
-    if not allowed and least <= coarsest:
-        return [coarsest] if costs[coarsest] <= _PATIENCE * most else []
-    return sorted({*allowed[:1], *({MIDDLING} & set(allowed))})
+    found = sorted({*allowed[:1], *({MIDDLING} & set(allowed))})
+    if not allowed and least <= coarsest and costs[coarsest] <= _PATIENCE * most:
+        found = [coarsest]
+    return [*found, None] if name in GAUSS else [*found]
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:

@@ -23,7 +23,7 @@ from pyharness.checks.compare.orders import Order, State
 from pyharness.checks.golden import mathematics, read_record, recorded, update
 from pyharness.checks.judge import Answer, MethodRun
 from pyharness.checks.kinds import KINDS, verify
-from pyharness.checks.orders import judged_order
+from pyharness.checks.methods import judged_order
 from pyharness.checks.plants import plants
 from pyharness.checks.plants.plants import PLANTS
 from pyharness.checks.random_methods import may_refuse, truth_of

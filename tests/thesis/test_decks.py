@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pyharness.checks.cells import decks
 from pyharness.checks.check import Selection
-from pyharness.checks.decks import decks
 from pyharness.cli.main import main
 from pyharness.history.claims.laboratory import Laboratory
 from pyharness.model.facts import facts
@@ -104,7 +104,7 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     # A change of one card, and a stop that comes too late, are found.
     for wrong in ("T3=.02", "T3=.010000000000000002"):
         monkeypatch.setattr(
-            "pyharness.checks.decks.deck_text",
+            "pyharness.checks.cells.deck_text",
             lambda *given, wrong=wrong: deck_text(*given).replace("T3=.01", wrong.ljust(6)),
         )
         failed = [check for check in decks(Selection(thin=True)) if not check.passed]
@@ -117,7 +117,7 @@ def test_decks_and_port_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     [("1HI", "1HJ", "the page differs"), ("GO TO 8 ", "J=3     ", "75 records more")],
 )
 def test_page_and_records(old: str, new: str, told: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    changed = "pyharness.checks.decks.deck_text"
+    changed = "pyharness.checks.cells.deck_text"
     monkeypatch.setattr(changed, lambda *given: deck_text(*given).replace(old, new))
     (check,) = decks(Selection(only=["decks/runge-kutta/case-2/original"]))
     assert not check.passed
@@ -127,7 +127,7 @@ def test_page_and_records(old: str, new: str, told: str, monkeypatch: pytest.Mon
 def test_without_a_compiler_verify_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for room in ("checks.decks", "cli.verbs.verify"):
+    for room in ("checks.cells", "cli.verbs.verify"):
         monkeypatch.setattr(f"pyharness.{room}.compiler", lambda: None)
     assert list(decks(Selection(only=["decks"]))) == []
     assert main(["verify", "--only", "decks"]) == 2

@@ -100,8 +100,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
     if found:
         return found
     names = {"time": "time", "recorded_time": "TIME", "omega": "omega", "velocity": "velocity"}
-    arrays = ((_rows(first, name), _rows(second, name)) for name in names)
-    found = [told for told, (x, y) in zip(names.values(), arrays, strict=True) if ulps(x, y)]
+    found = [told for name, told in names.items() if ulps(_rows(first, name), _rows(second, name))]
     if not np.array_equal(first.ier, second.ier):  # type: ignore[arg-type]
         found.append("IER")
     if first.exact is not None and second.exact is not None:

@@ -144,8 +144,7 @@ class Batch:
     def first_attitudes(self) -> Array:
         """Return the normalised attitudes at time 0, shape (n, 4), or (1, 4) if shared."""
         first = np.array(self.arrays.get("attitude", [self.scene.attitude or IDENTITY]))
-        found: Array = first / np.linalg.norm(first, axis=1, keepdims=True)
-        return found
+        return np.asarray(first / np.linalg.norm(first, axis=1, keepdims=True))
 
     def by_method(self, method: str, tolerance: float, part: float = 1.0) -> Array:
         """Return omega (rad/s) at `part` times `t_end` by another method, shape (n, 3)."""
@@ -179,9 +178,8 @@ class Batch:
     @cached_property
     def _shared(self) -> Scene:
         """Return `scene`, with an attitude only if the torque needs it."""
-        return (
-            self.scene if self.scene.torque.needs_attitude else replace(self.scene, attitude=None)
-        )
+        attitude = self.scene.attitude if self.scene.torque.needs_attitude else None
+        return replace(self.scene, attitude=attitude)
 
     @cached_property
     def _ends(self) -> Ensemble:
@@ -202,11 +200,11 @@ class Batch:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
-        if self.attitude and not self.scene.torque.needs_attitude:
-            # One attitude suits all scenes, because `attitudes` multiplies the result by
-            # `first_attitudes`.
-            return self._solve(method, tolerance, t_end, attitude=IDENTITY)
-        return self._solve(method, tolerance, t_end)
+        # One attitude suits all scenes, because `attitudes` multiplies the result by
+        # `first_attitudes`.
+        has_one = self.attitude and not self.scene.torque.needs_attitude
+        more = {"attitude": IDENTITY} if has_one else {}
+        return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
         """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
@@ -214,13 +212,9 @@ class Batch:
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):
             return self._solve_each(method, tolerance, t_end)
-        arrays: dict[str, Any] = {
-            name: array for name, array in self.arrays.items() if name not in OF_PROGRAMS
-        }
-        if not self.scene.torque.needs_attitude:
-            arrays.pop("attitude", None)
-        arrays |= more
-        return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **arrays)
+        hidden = OF_PROGRAMS if self.scene.torque.needs_attitude else (*OF_PROGRAMS, "attitude")
+        options: dict[str, Any] = {k: x for k, x in self.arrays.items() if k not in hidden} | more
+        return solve_many(self._shared, t_end, method=method, tolerance=tolerance, **options)
 
     def _solve_each(self, method: str, tolerance: float, t_end: Array) -> Ensemble:
         n = len(self.omega0)
@@ -238,17 +232,10 @@ class Batch:
 
     def _run_each(self, at: list[int]) -> ProgramEnsemble:
         n, steps = len(self.omega0), np.array(at, np.int32)
-        found = ProgramEnsemble(
-            omega=np.full((n, len(at), 3), np.nan),
-            status=np.full(n, Statuses.REFUSED, np.int8),
-            at=steps,
-            velocity=None,
-            recorded_time=np.full((n, len(at)), np.nan),
-            n_rows=np.zeros(n, np.int32),
-            stop_variable=np.zeros(n, np.int8),
-            stop_quotient=np.full(n, np.nan),
-            ier=None,
-        )
+        omega, recorded = np.full((n, len(at), 3), np.nan), np.full((n, len(at)), np.nan)
+        status, n_rows = np.full(n, Statuses.REFUSED, np.int8), np.zeros(n, np.int32)
+        stops = np.zeros(n, np.int8), np.full(n, np.nan)
+        found = ProgramEnsemble(omega, status, steps, None, recorded, n_rows, *stops, ier=None)
         for i in range(n):
             own = {name: array[i : i + 1] for name, array in self.arrays.items()}
             scene = self.scene

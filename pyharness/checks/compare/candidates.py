@@ -171,13 +171,10 @@ def _turned(solver: Any, found: tuple[Array, Array]) -> End:
 
 
 def _answered(solver: Solver, omega: Array) -> End:
-    method, counted = solver.plan.method, 0
-    if method in FIXED_STEP:
-        counted = solver.steps * METHODS[method].evaluations
-    elif method.startswith("gauss-"):
-        counted = solver.steps
+    method = solver.plan.method
+    each = METHODS[method].evaluations if method in FIXED_STEP else method.startswith("gauss-")
     # A Taylor series has no evaluations, because it expands the right-hand side.
-    evaluations = None if method == "taylor" else counted
+    evaluations = None if method == "taylor" else solver.steps * int(each)
     return End(copied_result(omega), solver.status, solver.steps, evaluations)
 
 

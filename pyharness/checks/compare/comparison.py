@@ -119,10 +119,8 @@ def compare_programs(
     truth = reference(scene, scene.times(), velocity=True, effort=effort)
     programs = []
     for listing in listings:
-        candidates = [
-            program_candidate(listing, each, lipschitz, may_stop, effort=effort, word=word)
-            for each in languages
-        ]
+        own = partial(program_candidate, listing, effort=effort, word=word)
+        candidates = [own(each, lipschitz, may_stop) for each in languages]
         run, *other = (each.rows(scene) for each in candidates)
         judged = in_floats and not listing.active
         program = PROGRAM_REGISTRY[listing.program]
@@ -153,12 +151,9 @@ def listings_for(
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
-    for kind, option, names in (
-        ("defect", "--fix", fix),
-        ("defect", "--keep", keep),
-        ("reading", "--reading", readings),
-        ("conjecture", "--conjecture", assumed),
-    ):
+    given = {"--fix": fix, "--keep": keep, "--reading": readings, "--conjecture": assumed}
+    for option, names in given.items():
+        kind = "defect" if option in ("--fix", "--keep") else option.removeprefix("--")
         names_in = switchable if kind == "defect" else partial(names_of, kind)
         allowed = {name for program in chosen for name in names_in(program)}
         for name in names:
@@ -228,7 +223,16 @@ def compare_methods(
     if isinstance(methods, str):
         raise InputError(f"methods is text; allowed: a list of names, as in ['{methods}']")
     attitude = attitude or scene.torque.needs_attitude
-    tolerances = {name: _tolerance_of_method(name, tolerance) for name in methods}
+    tolerances = {}
+    for name in methods:
+        if name not in METHODS:
+            raise unknown("method", name, METHODS)
+        chosen = METHODS[name]
+        found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)
+        if not chosen.finest <= found <= 1.0:
+            finest = f"{chosen.finest:.2g}"
+            raise InputError(f"tolerance is {found:g}; allowed for {name}: {finest} to 1")
+        tolerances[name] = found
     if not tolerances:
         raise InputError(f"methods: the list is empty; allowed: {', '.join(METHODS)}")
     for name in tolerances:
@@ -256,29 +260,15 @@ def _with_methods(
 
     methods = []
     for name, tolerance in tolerances.items():
-        if not are_run:
-            methods.append(MethodFinding(name, tolerance, None, None, math.nan))
-            continue
-        start = time.perf_counter()
+        run, failure, start = None, "", time.perf_counter()
         try:
-            run = method_candidate(name, tolerance, effort).rows(scene)
+            run = method_candidate(name, tolerance, effort).rows(scene) if are_run else None
         except InputError as error:
-            methods.append(MethodFinding(name, tolerance, None, None, math.nan, str(error)))
-            continue
-        seconds = time.perf_counter() - start
-        good = accuracy(scene, run, truth)
-        methods.append(MethodFinding(name, tolerance, run, good, seconds))
+            failure = str(error)
+        seconds = math.nan if run is None else time.perf_counter() - start
+        good = None if run is None else accuracy(scene, run, truth)
+        methods.append(MethodFinding(name, tolerance, run, good, seconds, failure))
     growth = motion_growth(scene, scene.times()[-1])
     bound = bound_of(scene, truth, effort=effort)
     found = tuple(programs), tuple(methods)
     return Comparison(scene, lipschitz, truth, bound, *found, growth, word)
-
-
-def _tolerance_of_method(name: str, tolerance: float | None) -> float:
-    if name not in METHODS:
-        raise unknown("method", name, METHODS)
-    chosen = METHODS[name]
-    found = requested_tolerance(name, None if chosen.is_fixed_step else tolerance)
-    if not chosen.finest <= found <= 1.0:
-        raise InputError(f"tolerance is {found:g}; allowed for {name}: {chosen.finest:.2g} to 1")
-    return found

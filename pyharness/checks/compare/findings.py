@@ -120,10 +120,8 @@ class Comparison:
                 told = ", ".join(each.differences)
                 found.append(f"{each.who}: Fortran and twin differ in {told}")
             if each.order is not None and each.order.state == "misses":
-                told = f"{each.order}, due {each.order.due}"
-                found.append(
-                    f"{each.who}: does not converge to the reference as the step is halved: {told}"
-                )
+                told = "does not converge to the reference as the step is halved"
+                found.append(f"{each.who}: {told}: {each.order}, due {each.order.due}")
         return tuple(found)
 
     def _excess(self, one: MethodFinding) -> str:
@@ -140,18 +138,12 @@ class Comparison:
         errors = {"omega": (max(one.accuracy.omega), made * largest + self.reference.error)}
         if one.accuracy.angle is not None:
             errors["attitude"] = one.accuracy.angle, made + self.reference.angle_error
-        told = [
-            f"error of {name} {short(error)}, limit {short(limit)}"
-            for name, (error, limit) in errors.items()
-            if not error <= limit
-        ]
+        excess = {name: pair for name, pair in errors.items() if not pair[0] <= pair[1]}
+        told = [f"error of {x} {short(y)}, limit {short(z)}" for x, (y, z) in excess.items()]
         return f"{one.method}: {'; '.join(told)}" if told else ""
 
     @property
     def not_judged(self) -> tuple[str, ...]:
         """Return a sentence for each corrected program whose order could not be determined."""
-        return tuple(
-            f"{each.who}: {each.order}"
-            for each in self.programs
-            if each.order is not None and not each.order.is_judged
-        )
+        orders = [(each.who, each.order) for each in self.programs if each.order is not None]
+        return tuple(f"{who}: {order}" for who, order in orders if not order.is_judged)

@@ -1,8 +1,8 @@
 """Measured orders of convergence: powers of the step size to which the error is proportional."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -180,16 +180,15 @@ def _shows(order: float, due: int) -> bool:
 
 def _halved(scene: Scene, most_steps: int | None) -> Iterator[Scene]:
     most = max(_MOST_STEPS, scene.steps << _HALVINGS) if most_steps is None else most_steps
-    for halvings in itertools.count():
-        parts = 2**halvings
-        if scene.steps * parts > most:
-            return
+    parts = 1
+    while scene.steps * parts <= most:
         try:
             finer = replace(scene, step_size=scene.step_size / parts, steps=scene.steps * parts)
             check_steps(finer, "orders", "fortran", 1.0)
         except InputError:
             return  # does not fit in memory, or takes too long
         yield finer
+        parts *= 2
 
 
 def _fastest(scene: Scene, omega: Array) -> float:
@@ -204,11 +203,10 @@ def _is_grown_rounding(scene: Scene, found: Order) -> bool:
     """Return whether the error may be amplified rounding; True if its bound can't be computed."""
     if not found.steps or not math.isfinite(found.error):
         return False
-    try:
+    with suppress(InputError):
         flow = conditioning(scene, found.time)
-    except InputError:
-        return True
-    return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
+        return found.error <= flow.limit(0.0, _ROUNDINGS * found.steps) * flow.largest
+    return True
 
 
 def _may_be_singular(program: str, step_size: float) -> bool:

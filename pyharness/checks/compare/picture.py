@@ -1,11 +1,11 @@
 """The picture of a comparison: omega over time, and its errors below."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.checks.compare.agreement import Accuracy
-from pyharness.checks.compare.findings import Comparison
+from pyharness.checks.compare.findings import Comparison, MethodFinding, ProgramFinding
 from pyharness.engine.report import mark_end
 from pyharness.model.report import Picture, Table, numbers
 from pyharness.model.scene_report import heading
@@ -31,22 +31,13 @@ _MARKERS: dict[str, dict[str, Any]] = {
 }
 
 
-class _Curve(NamedTuple):
-    name: str  # program or method, which has a column of panels
-    label: str  # version of the program; empty for a method
-    trajectory: Trajectory
-    accuracy: Accuracy
-
-
-def _curves(comparison: Comparison) -> list[_Curve]:
-    return [
-        _Curve(each.listing.program, each.listing.label, each.trajectory, each.accuracy)
-        for each in comparison.programs
-    ] or [
-        _Curve(each.method, "", each.trajectory, each.accuracy)
-        for each in comparison.methods
-        if each.trajectory is not None and each.accuracy is not None
-    ]
+def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy]]:
+    """Return program or method, which has a column of panels, and listing, if any."""
+    found: list[tuple[str, str, ProgramFinding | MethodFinding]]
+    found = [(each.listing.program, each.listing.label, each) for each in comparison.programs]
+    found += [(each.method, "", each) for each in comparison.methods if not comparison.programs]
+    solved = ((name, label, each.trajectory, each.accuracy) for name, label, each in found)
+    return [(name, label, run, good) for name, label, run, good in solved if run and good]
 
 
 def comparison_picture(comparison: Comparison) -> Picture:
@@ -58,7 +49,7 @@ def comparison_picture(comparison: Comparison) -> Picture:
     from matplotlib.figure import Figure
 
     curves = _curves(comparison)
-    names = list(dict.fromkeys(each.name for each in curves))
+    names = list(dict.fromkeys(name for name, *_ in curves))
     figure = Figure(figsize=(4.2 * max(len(names), 1.4), 9.0), dpi=110, layout="constrained")
     truth = comparison.reference
     bounds = [truth.error] if truth.attitude is None else [truth.error, truth.angle_error]
@@ -69,22 +60,19 @@ def comparison_picture(comparison: Comparison) -> Picture:
         axes[-1, column].set_xlabel("time (s)")
         for row in range(3):
             _line(axes[row, column], truth.time, truth.omega[:, row], "reference")
-        for each in curves:
-            if each.name != name:
-                continue
-            run, label = each.trajectory, each.label
+        for _, label, run, good in (each for each in curves if each[0] == name):
             for row in range(3):
                 _line(axes[row, column], run.time, run.omega[:, row], label)
-            for row, error in enumerate((each.accuracy.error, each.accuracy.turned), 3):
+            for row, error in enumerate((good.error, good.turned), 3):
                 if error is not None:
                     shown = np.isfinite(error) & (error > 0.0)
                     _line(axes[row, column], run.time[: len(error)][shown], error[shown], label)
-    ended = [each for each in curves if each.trajectory.ended not in WITH_ALL_ROWS]
+    ended = [(name, run) for name, _, run, _ in curves if run.ended not in WITH_ALL_ROWS]
     for row in range(3):
         axes[row, 0].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
         _frame(axes[row, 0], truth.omega[:, row])
-        for each in ended:
-            mark_end(axes[row, names.index(each.name)], each.trajectory, row)
+        for name, run in ended:
+            mark_end(axes[row, names.index(name)], run, row)
     labels = ("error of any $\\omega$ (rad/s)", "error of attitude (rad)")
     for row, (bound, label) in enumerate(zip(bounds, labels, strict=False), 3):
         axes[row, 0].set_yscale("log")
@@ -106,18 +94,12 @@ def _numbers(comparison: Comparison) -> Table:
     if truth.attitude is not None:
         names += " angle_error"
         bounds.append(truth.angle_error)
-    rows = [
-        ["reference", "", t, *omega, *bounds]
-        for t, omega in zip(truth.time.tolist(), truth.omega.tolist(), strict=True)
-    ]
-    for each in _curves(comparison):
-        run, name = each.trajectory, [each.name, each.label]
-        errors = each.accuracy.error[:, None]
-        if each.accuracy.turned is not None:
-            errors = np.column_stack([errors, each.accuracy.turned])
-        n = len(errors)
-        found = np.column_stack([run.time[:n], run.omega[:n], errors])
-        rows += [[*name, *row] for row in found.tolist()]
+    exact = np.column_stack([truth.time, truth.omega]).tolist()
+    rows = [["reference", "", *row, *bounds] for row in exact]
+    for name, label, run, good in _curves(comparison):
+        n, angles = len(good.error), [] if good.turned is None else [good.turned]
+        found = np.column_stack([run.time[:n], run.omega[:n], good.error, *angles])
+        rows += [[name, label, *row] for row in found.tolist()]
     return numbers(names, rows)
 
 

@@ -50,7 +50,10 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     if numerics:
         legend += _DRIFTS_LEGEND
         if has_programs:
-            legend += f"{_ULP_LEGEND} us/step: time per step of {_timed(comparison)}."
+            has_fortran = all(each.ulps is not None for each in comparison.programs)
+            timed = f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
+            timed = "Fortran, with the call" if comparison.word == BINARY64 else timed
+            legend += f"{_ULP_LEGEND} us/step: time per step of {timed}."
         if comparison.digits is not None:
             amplified = f"error amplification {short(comparison.growth)}"
             motion.append(f"{amplified}: rounding leaves {comparison.digits:.1f} digits")
@@ -64,41 +67,21 @@ def comparison_report(comparison: Comparison, numerics: bool = False) -> Report:
     told = verdict(comparison)
     tables: list[Section] = []
     if has_programs:
-        tables.append([_programs(comparison, numerics), *_short_runs(comparison)])
+        steps, end = comparison.scene.steps, "its errors are the largest up to there"
+        ended = [(each.who, each.trajectory.steps) for each in comparison.programs]
+        short_runs = [f"{x} ended at step {n} of {steps}: {end}" for x, n in ended if n < steps]
+        tables.append([_programs(comparison, numerics), *short_runs])
     if numerics:
         tables.append([_methods(comparison)])
-
+    last = [*(failures if numerics else [_MORE]), *told]
     return Report(
         "compare",
-        text=[
-            [*scene, *reference, *motion],
-            [legend],
-            *tables,
-            *attitudes,
-            [*(failures if numerics else [_MORE]), *told],
-        ],
+        text=[[*scene, *reference, *motion], [legend], *tables, *attitudes, last],
         record=lambda: _record(comparison),
         data=_data(comparison),
         page=[scene, *tables, *attitudes, told],
         pictures={"omega": lambda: comparison_picture(comparison)},
     )
-
-
-def _timed(comparison: Comparison) -> str:
-    if comparison.word == BINARY64:
-        return "Fortran, with the call"
-    has_fortran = all(each.ulps is not None for each in comparison.programs)
-    return f"{'Fortran' if has_fortran else 'the twin'} in {comparison.word}"
-
-
-def _short_runs(comparison: Comparison) -> list[str]:
-    """Return a sentence for each program that ended early."""
-    return [
-        f"{each.who} ended at step {each.trajectory.steps} of {comparison.scene.steps}: its errors "
-        "are the largest up to there"
-        for each in comparison.programs
-        if each.trajectory.steps < comparison.scene.steps
-    ]
 
 
 def verdict(comparison: Comparison) -> list[str]:
@@ -124,10 +107,9 @@ def _as_expected(comparison: Comparison) -> str:
     orders = [each.order for each in comparison.programs if each.order is not None]
     if not orders:
         return text
-    seen = ", ".join(
-        f"{each.value:.1f}" if each.value is not None else "rounding" if each.is_judged else "-"
-        for each in orders
-    )
+    unknown = ["rounding" if each.is_judged else "-" for each in orders]
+    pairs = zip(orders, unknown, strict=True)
+    seen = ", ".join(x if each.value is None else f"{each.value:.1f}" for each, x in pairs)
     due = ", ".join(str(each.due) for each in orders)
     return f"{text}; orders {seen} (expected {due})"
 
@@ -138,11 +120,8 @@ def _programs(comparison: Comparison, numerics: bool) -> Table:
         Column("V", short, unit="m/s"),
     ]  # fmt: skip
     if numerics:
-        columns += [
-            *_DRIFTS,
-            Column("ulp", _count),
-            Column("us/step", digits(".2f", 1e6), unit="s"),
-        ]
+        time = Column("us/step", digits(".2f", 1e6), unit="s")
+        columns += [*_DRIFTS, Column("ulp", _count), time]
     rows = []
     for each in comparison.programs:
         run, good, listing = each.trajectory, each.accuracy, each.listing
@@ -176,13 +155,10 @@ def _attitudes(comparison: Comparison, numerics: bool) -> list[list[Table]]:
     columns = (
         *words("attitude listing"), Column("angle", short, unit="rad"), Column("L in space", short),
     )  # fmt: skip
-    found: list[tuple[str, str | None, Accuracy]] = [
-        (each.listing.program, each.listing.label, each.accuracy) for each in comparison.programs
-    ]
-    if numerics:
-        methods = comparison.methods
-        found += [(each.method, None, each.accuracy) for each in methods if each.accuracy]
-    rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found]
+    found: list[tuple[str, str | None, Accuracy | None]]
+    found = [(x.listing.program, x.listing.label, x.accuracy) for x in comparison.programs]
+    found += [(x.method, None, x.accuracy) for x in comparison.methods if numerics]
+    rows = [[*names, good.angle, good.momentum_in_space] for *names, good in found if good]
     return [[Table(columns, rows)]]
 
 

@@ -74,13 +74,13 @@ def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
     return [y * c - z * b, z * a - x * c, x * b - y * a]
 
 
-def _with_gyroscopic(*factors: float) -> Callable[[Scene], Scene]:
-    """Return a change of a scene that multiplies the gyroscopic term, -omega x (I omega)."""
+def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
+    """Return a change of a scene that multiplies the torque, and the term -omega x (I omega)."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
             each = zip(law_value(scene.law, t), factors, _gyroscopic(scene, omega), strict=True)
-            return [n + (1.0 - factor) * part for n, factor, part in each]
+            return [applied * n + (1.0 - factor) * part for n, factor, part in each]
 
         return replace(scene, torque=checked_torque(torque))
 
@@ -131,35 +131,21 @@ def _conjugate(q: Any) -> Any:
     return q[0], -q[1], -q[2], -q[3]
 
 
-def _from_identity(state: State, scene: Scene) -> State:
-    return State(state.omega, np.array(product(_conjugate(scene.attitude), state.attitude.T)).T)
-
-
 def _with_space_rates(scene: Scene) -> Scene:
     """Return the scene of p and -omega, where q' = (0, omega) q/2 instead of q' = q (0, omega)/2.
 
     The conjugate p of q satisfies p' = p (0, -omega)/2, and -omega satisfies Euler's equations with
     opposite gyroscopic term and torque.
     """
-
-    def torque(t: Any, omega: Any) -> list[Any]:
-        each = zip(_gyroscopic(scene, omega), law_value(scene.law, t), strict=True)
-        return [2.0 * term - n for term, n in each]
-
     start, back = _conjugate(scene.attitude), np.negative(scene.omega).tolist()
-    return replace(scene, torque=checked_torque(torque), omega=back, attitude=start)
+    opposite = _with_gyroscopic(-1.0, -1.0, -1.0, applied=-1.0)(scene)
+    return replace(opposite, omega=back, attitude=start)
 
 
 def _with_doubled_rates(scene: Scene) -> Scene:
     """Return the scene of a body with twice the omega, where q' = q (0, omega)."""
-
-    def torque(t: Any, omega: Any) -> list[Any]:
-        each = zip(law_value(scene.law, t), _gyroscopic(scene, omega), strict=True)
-        return [2.0 * n + 0.5 * term for n, term in each]
-
-    return replace(
-        scene, torque=checked_torque(torque), omega=np.multiply(2.0, scene.omega).tolist()
-    )
+    halved = _with_gyroscopic(0.5, 0.5, 0.5, applied=2.0)(scene)
+    return replace(halved, omega=np.multiply(2.0, scene.omega).tolist())
 
 
 def _with_fast_torque(scene: Scene) -> Scene:
@@ -178,8 +164,6 @@ def _of_thesis(half: State, scene: Scene) -> State:
         attitude / np.linalg.norm(attitude, axis=1, keepdims=True),
     )
 
-
-_ORDERS = ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
 
 FAULTS = (
     Fault("gyroscopic-missing", "the gyroscopic term omega x (I omega) is missing",
@@ -213,7 +197,7 @@ FAULTS = (
         Fault(f"moments-{''.join(str(axis + 1) for axis in order)}",
               f"the moments are used in the order {', '.join(str(axis + 1) for axis in order)}",
               _in_order(*order))
-        for order in _ORDERS
+        for order in ((0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0))
     ),
     Fault("half-speed", "time passes at half speed: the state is that of half the time",
           times=lambda times, step: 0.5 * times),
@@ -234,7 +218,9 @@ FAULTS = (
           state=lambda state, scene: State(state.omega, state.attitude * _CONJUGATE)),
     Fault("scalar-last", "the scalar of the quaternion is last, not first",
           state=lambda state, scene: State(state.omega, state.attitude[:, [1, 2, 3, 0]])),
-    Fault("attitude-from-identity", "the initial attitude is ignored", state=_from_identity),
+    Fault("attitude-from-identity", "the initial attitude is ignored",
+          state=lambda state, scene: State(
+              state.omega, np.array(product(_conjugate(scene.attitude), state.attitude.T)).T)),
     Fault("attitude-frame", "the quaternion advances as if omega were about the axes of space",
           _with_space_rates,
           state=lambda state, scene: State(-state.omega, state.attitude * _CONJUGATE)),
@@ -258,7 +244,6 @@ def motions(scene: Scene, times: Array, step: float) -> Iterator[tuple[Fault, St
             try:
                 found = fault.motion(scene, times, step)
             except ArithmeticError:
-                rows = len(times)
-                found = State(np.full((rows, 3), np.nan), np.full((rows, 4), np.nan))
+                found = State(*(np.full((len(times), width), np.nan) for width in (3, 4)))
         if found is not None:
             yield fault, found

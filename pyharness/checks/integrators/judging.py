@@ -8,6 +8,7 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -131,35 +132,28 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
     A fault also explains an overflow of its own motion; a low order explains why a higher one is
     missing.
     """
-    faults = [each for each in found.findings if each.name not in FIRST_ORDER]
-    named = {each.name for each in faults}
-    explained = {problem for each in faults for problem in each.problems}
+    faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
+    explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}
     remarked = {problem for each in found.findings for problem in each.problems}
     low = set()
     for judged in found.judged:
         problem = judged.problem
-        states = [state for fault, state in problem.faulty if fault.name in named]
+        states = [state for fault, state in problem.faulty if fault.name in faults]
         if not all(np.isfinite(each.omega).all() for each in states):
             explained.add(problem.name)
         if problem.name in remarked:
             low |= {(each.part, problem.name) for each in judged.convergences if each.converges}
-    if named:
-        explained.add("long")
     failed = [check.name for check in found.checks if not check.passed]
-    where = [
-        each.circumstance or each.subject
-        for each in failed
-        if each.subject != "fault" and (each.subject, each.circumstance) not in low
-    ]
-    return tuple(dict.fromkeys(each for each in where if each not in explained))
+    due = [x for x in failed if x.subject != "fault" and (x.subject, x.circumstance) not in low]
+    where = dict.fromkeys(each.circumstance or each.subject for each in due)
+    return tuple(each for each in where if each not in explained)
 
 
 def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:
     """Append to `found` the checks in one problem; raise PortError for an invalid answer."""
-    rows = len(problem.times)
     answers = []
     for level in range(LEVELS):
-        motion = ask(problem.request(level), rows)
+        motion = ask(problem.request(level), len(problem.times))
         if motion.refusal:
             name = Name("integrator", problem.name)
             found.add(problem.name, name.described(None, f"refused: {motion.refusal}"))
@@ -169,10 +163,7 @@ def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> Non
     if len({each.attitude is None for each in answers}) > 1:
         raise PortError("only some of the answers in a scene have an attitude")
     by_tolerance = finest.control == "tolerance"
-    settings = [
-        problem.tolerance(level) if by_tolerance else problem.step_size(level)
-        for level in range(LEVELS)
-    ]
+    settings = [*map(problem.tolerance if by_tolerance else problem.step_size, range(LEVELS))]
     floor = problem.floor(finest.rounding)
     parts = []
     errors = zip(*(problem.errors(motion) for motion in answers), strict=True)
@@ -184,10 +175,8 @@ def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> Non
     found.judged.append(judged)
     wanted = 1.0 if by_tolerance else due
     checks = [Name("integrator", "finite", problem.name).bounded(judged.lost, 0.0, _FINITE)]
-    checks += [
-        replace(_order_check(each, problem, wanted, floor), reference_bound=lambda: problem.bound)
-        for each in parts
-    ]
+    orders = [_order_check(each, problem, wanted, floor) for each in parts]
+    checks += [replace(each, reference_bound=lambda: problem.bound) for each in orders]
     if finest.attitude is not None:
         name = Name("integrator", "norm", problem.name)
         angle = parts[1].errors[-1]
@@ -232,7 +221,7 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
     forth = judged.answers[level]
     if not problem.scene.torque.is_zero or forth.attitude is None:
         return []
-    if not (np.isfinite(forth.omega[-1]).all() and np.isfinite(forth.attitude[-1]).all()):
+    if not np.isfinite([*forth.omega[-1], *forth.attitude[-1]]).all():
         return []
     scene = replace(problem.scene, omega=-forth.omega[-1], attitude=forth.attitude[-1])
     back = ask(problem.request(level, scene), len(problem.times))
@@ -243,9 +232,8 @@ def _returned(ask: Ask, judged: Judged) -> list[Check]:
         return [name.bounded(back.lost, 0.0, _FINITE)]
     start = np.array(problem.scene.omega)
     omega = float(np.abs(back.omega[-1] + start).max() / np.abs(start).max())
-    attitude = np.array([problem.scene.attitude])
-    angle = float(angle_between(back.attitude[-1:], attitude)[0])
-    error = max(omega, angle)
+    angles = angle_between(back.attitude[-1:], np.array([problem.scene.attitude]))
+    error = max(omega, float(angles[0]))
     there = max(x for x in problem.errors(forth) if x is not None)
     limit = _CONSERVED * forth.rounding * (problem.times[-1] / problem.step_size(level))
     kept = "the integrator is reversible" if error <= max(limit, 1e-3 * there) else "not reversible"
@@ -273,8 +261,7 @@ def _judge_long(ask: Ask, found: Verdict) -> None:
         checks.append(change.bounded(found.drift.change, limit, CHANGE))
     for quantity, values in found.drift.named.items():
         name = Name("integrator", quantity, problem.name, quantity="drift")
-        largest = float(np.abs(values).max())
-        power = growth_power(found.drift.times, values)
+        largest, power = float(np.abs(values).max()), growth_power(times, values)
         note = "" if power is None else f"grows with the power {power:.1f} of the time"
         checks.append(name.described(largest if math.isfinite(largest) else None, note))
     found.add(problem.name, *checks)

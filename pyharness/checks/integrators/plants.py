@@ -25,6 +25,10 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
+# A function of a quaternion, omega at both ends of a step, and its size (s).
+Advance = Callable[[Any, Array, Array, float], Any]
+
+
 @dataclass(frozen=True)
 class IntegratorPlant:
     """A fault planted in an integrator, and the name by which it must be recognised."""
@@ -32,7 +36,7 @@ class IntegratorPlant:
     name: str
     request: Callable[[dict[str, Any]], object] | None = None
     state: Callable[[State, Scene], State] | None = None
-    advance: Callable[[Any, Array, Array, float], Any] | None = None
+    advance: Advance | None = None
     # What an integrator with the fault has, of `_possible`.
     needs: tuple[str, ...] = ()
 
@@ -143,10 +147,24 @@ PLANTS = (
 def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
     """Return a function that requests states in a scene from an integrator with a planted fault."""
 
+    def advanced(advance: Advance, asked: dict[str, Any]) -> Motion:
+        h, times = asked["step_size"], asked["times"]
+        count = round(times[-1] / h)
+        every = [h * (n + 1) for n in range(count)]
+        motion = ask(json.dumps({**asked, "times": every}).encode(), count)
+        if motion.refusal or motion.attitude is None:
+            return motion
+        q, rows = tuple(asked["attitude"]), []
+        for a, b in itertools.pairwise(np.vstack([asked["omega"], motion.omega])):
+            q = advance(q, a, b, h)
+            rows.append(q)
+        chosen = [round(t / h) - 1 for t in times]
+        return replace(motion, omega=motion.omega[chosen], attitude=np.array(rows)[chosen])
+
     def asked_with_fault(line: bytes, rows: int) -> Motion:
         asked = json.loads(line)
         if plant.advance is not None:
-            return _advanced(ask, plant.advance, asked)
+            return advanced(plant.advance, asked)
         if plant.request is not None:
             plant.request(asked)
         motion = ask(json.dumps(asked).encode(), rows)
@@ -157,25 +175,6 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
         return replace(motion, **plant.state(state, scene)._asdict())
 
     return asked_with_fault
-
-
-def _advanced(
-    ask: Ask, advance: Callable[[Any, Array, Array, float], Any], asked: dict[str, Any]
-) -> Motion:
-    h, times = asked["step_size"], asked["times"]
-    count = round(times[-1] / h)
-    every = [h * (n + 1) for n in range(count)]
-    motion = ask(json.dumps({**asked, "times": every}).encode(), count)
-    if motion.refusal or motion.attitude is None:
-        return motion
-    omega = np.vstack([asked["omega"], motion.omega])
-    q, rows = tuple(asked["attitude"]), []
-    for a, b in itertools.pairwise(omega):
-        q = advance(q, a, b, h)
-        rows.append(q)
-    chosen = [round(t / h) - 1 for t in times]
-    attitude = np.array(rows)[chosen]
-    return replace(motion, omega=motion.omega[chosen], attitude=attitude)
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -197,11 +198,8 @@ def convergence(
         last = seen[-1]
         # The last tolerances alone show an error that ceases to decrease.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
-        powers = [
-            _power(errors[first] / errors[last], settings[first] / settings[last])
-            for first in firsts
-            if math.isfinite(errors[first])
-        ]
+        known = [k for k in firsts if math.isfinite(errors[k])]
+        powers = [_power(errors[k] / errors[last], settings[k] / settings[last]) for k in known]
         order = min(powers, default=0.0)
     return Convergence(part, tuple(settings), tuple(errors), order)
 
@@ -258,12 +256,9 @@ class Judged:
 
 def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
     """Return `draws` random scenes of each kind, or those in `names` (``wave-1`` or a kind)."""
-    drawn = [draw_moderate(seed, kind, number) for number in range(draws) for kind in MODERATE]
-    return [
-        Problem(scene)
-        for scene in drawn
-        if not names or scene.name in names or scene.name.partition("-")[0] in names
-    ]
+    pairs = product(range(draws), MODERATE)
+    drawn = (Problem(draw_moderate(seed, kind, number)) for number, kind in pairs)
+    return [each for each in drawn if not names or each.name in names or each.kind in names]
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,10 +300,8 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
         vectors = np.array(scene.moments) * omega
         energy, momentum = (vectors * omega).sum(axis=1), np.linalg.norm(vectors, axis=1)
         changes = [np.abs(each[1:] / each[:-1] - 1.0) for each in (energy, momentum)]
-        named = {
-            "energy": energy[1:] / energy[0] - 1.0,
-            "momentum": momentum[1:] / momentum[0] - 1.0,
-        }
+        conserved = {"energy": energy, "momentum": momentum}
+        named = {name: each[1:] / each[0] - 1.0 for name, each in conserved.items()}
         if motion.attitude is not None:
             there = in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
             named["direction"] = _angle(there[1:], there[:1])

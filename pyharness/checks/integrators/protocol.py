@@ -50,16 +50,11 @@ def request(scene: Scene, times: Sequence[float], step_size: float, tolerance: f
 
     Times are multiples of `step_size` (s); `tolerance` is relative to the largest omega.
     """
-    record = scene_record(scene)
     asked = {
         "schema": SCHEMAS["integrator request"],
-        "moments": list(scene.moments or ()),
-        "omega": list(scene.omega),
-        "attitude": list(scene.attitude or ()),
-        "torque": record["torque"],
-        "times": list(times),
-        "step_size": step_size,
-        "tolerance": tolerance,
+        **{name: list(getattr(scene, name) or ()) for name in ("moments", "omega", "attitude")},
+        "torque": scene_record(scene)["torque"],
+        **{"times": list(times), "step_size": step_size, "tolerance": tolerance},
     }
     return json.dumps(asked, allow_nan=False).encode()
 
@@ -108,8 +103,6 @@ def _rows(what: str, value: object, rows: int, width: int) -> Array:
     found = read_list(what, value)
     if len(found) != rows:
         raise PortError(f"{what} has {len(found)} rows; {rows} times were requested")
-    numbers = [
-        read_row(f"{what}, row {number}", row, width, f"allowed: {width}")
-        for number, row in enumerate(found, 1)
-    ]
+    named = ((f"{what}, row {number}", row) for number, row in enumerate(found, 1))
+    numbers = [read_row(where, row, width, f"allowed: {width}") for where, row in named]
     return np.array(numbers, dtype=float).reshape(-1, width)

@@ -70,21 +70,16 @@ def _explained(judged: Judged) -> list[str]:
     if both is not None:
         return [both.name]
     # One fault of omega, and one of the returned attitude.
-    first = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
-    if first is None:
+    base = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
+    if base is None:
         return []
-    base = first
-    names = [base.name]
-    for fault, _ in judged.problem.faulty:
-        if fault.name in OUTPUTS:
 
-            def states(level: int, output: Fault = fault) -> State:
-                problem = judged.problem
-                return output.state(problem.faulty_states(base, level), problem.scene)
+    def states(output: Fault, level: int) -> State:
+        return output.state(judged.problem.faulty_states(base, level), judged.problem.scene)
 
-            if _approaches(judged, base, states, range(2)):
-                names.append(fault.name)
-    return names
+    outputs = [fault for fault, _ in judged.problem.faulty if fault.name in OUTPUTS]
+    seen = [x for x in outputs if _approaches(judged, base, partial(states, x), range(2))]
+    return [base.name, *(each.name for each in seen)]
 
 
 def _best(
@@ -106,8 +101,7 @@ def _approaches(
     judged: Judged, fault: Fault, states: Callable[[int], State], parts: Sequence[int]
 ) -> bool:
     """Return whether the answers converge to the states of a fault."""
-    pairs = enumerate(judged.answers)
-    errors = [errors_between(states(level), motion) for level, motion in pairs]
+    errors = [errors_between(states(k), motion) for k, motion in enumerate(judged.answers)]
     floor = max(judged.problem.floor(judged.finest.rounding), _OF_MOTIONS)
     for k in parts:
         true = judged.convergences[k]
@@ -115,10 +109,8 @@ def _approaches(
         least = _FALLS
         if fault.of_step and true.order is not None and not true.is_higher:
             least += max(true.order, 0.0)
-        orders = [
-            convergence(true.part, true.settings, values, floor, overall).order
-            for overall in (True, False)
-        ]
+        measure = partial(convergence, true.part, true.settings, values, floor)
+        orders = [measure(overall).order for overall in (True, False)]
         if values[-1] > floor and any(order is None or order < least for order in orders):
             return False
     return True
@@ -126,30 +118,27 @@ def _approaches(
 
 def _by_orders(results: Sequence[Judged]) -> list[tuple[str, str]]:
     found = []
-    calm_is_higher = any(
-        each.convergences[0].is_higher for each in results if each.problem.kind != "wave"
-    )
+    calm = [each for each in results if each.problem.kind != "wave"]
+    calm_is_higher = any(each.convergences[0].is_higher for each in calm)
     for judged in results:
         omega, attitude = judged.order_of("omega"), judged.order_of("attitude")
         if judged.finest.control == "tolerance" or judged.lost or omega is None:
             continue
-        name = ""
-        if omega.is_first:
+        problem = judged.problem
+        if omega.is_first and problem.kind == "wave" and calm_is_higher:
+            found.append(("torque-held", problem.name))
+        elif omega.is_first:
             name = "first-order-splitting" if _conserves_momentum(results) else "first-order"
-            if judged.problem.kind == "wave" and calm_is_higher:
-                name = "torque-held"
+            found.append((name, problem.name))
         elif omega.is_higher and attitude is not None and attitude.is_first:
-            name = "first-order-attitude"
-        if name:
-            found.append((name, judged.problem.name))
+            found.append(("first-order-attitude", problem.name))
     return found
 
 
 def _conserves_momentum(results: Sequence[Judged]) -> bool:
-    free = [each for each in results if each.problem.scene.torque.is_zero]
-    for judged in free:
+    found = []
+    for judged in (each for each in results if each.problem.scene.torque.is_zero):
         problem, motion = judged.problem, judged.finest
         drift = np.abs(drift_of(problem.scene, problem.times, motion).named["momentum"]).max()
-        if not drift <= _CONSERVED * motion.rounding * problem.most_steps:
-            return False
-    return bool(free)
+        found.append(drift <= _CONSERVED * motion.rounding * problem.most_steps)
+    return bool(found) and all(found)

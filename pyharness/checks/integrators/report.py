@@ -47,23 +47,22 @@ _FLOOR = 1e-17  # smaller errors, and 0, are drawn here
 
 def integrator_report(found: Verdict, seed: str) -> Report:
     """Return the report of the checks of an integrator, with a picture."""
-    title: list[str] = [
-        f"{found.command}: against the true solution of random scenes (seed: {seed})",
-        *map(str, references(found.checks)),
-    ]
+    told = f"{found.command}: against the true solution of random scenes (seed: {seed})"
+    title = [told, *map(str, references(found.checks))]
     tables = [_orders(found), _drifts(found), _findings(found)]
     failed = listed_singly([check for check in found.checks if not check.passed])
     text: list[Section] = [title, failed, *tables, [verdict(found.checks)]]
     page = summary_page("verify --integrator", found.checks, title, depth=2, more=tables)
+    orders = [
+        (judged.problem.name, each) for judged in found.judged for each in judged.convergences
+    ]
+    convergence = [
+        {"problem": name, "part": each.part, "control": found.control} | asdict(each)
+        for name, each in orders
+    ]
     report = checks_report(
         "verify", found.checks, text, page, integrator=found.command, seed=seed,
-        findings=list(map(asdict, found.findings)),
-        convergence=[
-            {"problem": judged.problem.name, "part": each.part, "control": found.control}
-            | asdict(each)
-            for judged in found.judged
-            for each in judged.convergences
-        ],
+        findings=list(map(asdict, found.findings)), convergence=convergence,
     )  # fmt: skip
     return report._replace(pictures={"integrator": lambda: integrator_picture(found)})
 
@@ -87,12 +86,9 @@ def _orders(found: Verdict) -> Section:
 def _drifts(found: Verdict) -> Section:
     if found.drift is None:
         return []
-    rows = [
-        [_MEANINGS[name], float(np.abs(values).max()), growth_power(found.drift.times, values)]
-        for name, values in found.drift.named.items()
-    ]
-    last = found.drift.times[-1]
-    return [f"without torque, up to {last:g} s; L: angular momentum", Table(_DRIFTS, rows)]
+    times, named = found.drift.times, found.drift.named.items()
+    rows = [[_MEANINGS[x], float(np.abs(y).max()), growth_power(times, y)] for x, y in named]
+    return [f"without torque, up to {times[-1]:g} s; L: angular momentum", Table(_DRIFTS, rows)]
 
 
 def _findings(found: Verdict) -> Section:
@@ -116,16 +112,14 @@ def integrator_picture(found: Verdict) -> Picture:
     rows: list[list[Any]] = []
     for part, axes in zip(PARTS, panels, strict=False):
         for judged in found.judged:
-            each = judged.order_of(part)
+            each, name = judged.order_of(part), judged.problem.name
             if each is None:
                 continue
-            number = int(judged.problem.name.rpartition("-")[2])
-            marker = _MARKERS[number % len(_MARKERS)]
-            axes.loglog(each.settings, _inside(each.errors), marker=marker, markersize=4.5,
-                        markerfacecolor="none", label=judged.problem.name,
-                        **_STYLES[judged.problem.kind])  # fmt: skip
+            marker = _MARKERS[int(name.rpartition("-")[2]) % len(_MARKERS)]
+            style = {"markersize": 4.5, "markerfacecolor": "none", **_STYLES[judged.problem.kind]}
+            axes.loglog(each.settings, _inside(each.errors), marker=marker, label=name, **style)
             pairs = zip(each.settings, each.errors, strict=True)
-            rows += [[judged.problem.name, part, x, error] for x, error in pairs]
+            rows += [[name, part, x, error] for x, error in pairs]
         unit = "relative" if part == "omega" else "rad"
         axes.set_title(f"error of {part}, {unit}", fontsize=10)
         axes.set_xlabel("tolerance" if found.control == "tolerance" else "step size, s")

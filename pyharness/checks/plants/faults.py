@@ -122,11 +122,12 @@ class PlantedTwin(Program):
     def _computed(
         self, scene: Scene, listing: Listing, implementation: str, *options: Any
     ) -> Trajectory:
+        found: Trajectory
         if self.both or implementation == "python":
-            lipschitz, may_stop, _ = options
-            found: Trajectory = self.module.run(scene, listing, lipschitz, may_stop)
-            return found
-        return super()._computed(scene, listing, implementation, *options)
+            found = self.module.run(scene, listing, *options[:2])
+        else:
+            found = super()._computed(scene, listing, implementation, *options)
+        return found
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
@@ -135,30 +136,25 @@ def twin(program: str, name: str, both: bool = True) -> Fault:
 
     @contextmanager
     def planted(size: float) -> Iterator[PlantedTwin]:
-        wrong = fault.wrong.replace("SIZE", repr(size)) if size else fault.right
+        right, package = fault.right, f"planted_{next(_COUNT)}"
+        wrong = fault.wrong.replace("SIZE", repr(size)) if size else right
+        assert thesis.__file__ is not None
         with tempfile.TemporaryDirectory() as folder:
-            module = _altered(program, fault.file, fault.right, wrong, Path(folder))
+            target, ignore = Path(folder) / package, shutil.ignore_patterns("__pycache__")
+            shutil.copytree(Path(thesis.__file__).parent, target, ignore=ignore)
+            for path in target.glob("*.py"):
+                text = path.read_text().replace("pyharness.thesis", package)
+                if path.name == fault.file:
+                    times = text.count(right)
+                    assert times == 1, f"{right!r} stands {times} times in {fault.file}"
+                    text = text.replace(right, wrong)
+                path.write_text(text)
+            with patch.object(sys, "path", [folder, *sys.path]):
+                importlib.invalidate_caches()
+                module = importlib.import_module(f"{package}.{program.replace('-', '_')}")
             known = PROGRAM_REGISTRY[program]
             faulty = PlantedTwin(known.name, known.order, known.source, module, both)
             with patch.dict(PROGRAM_REGISTRY, {program: faulty}):
                 yield faulty
 
     return planted
-
-
-def _altered(program: str, file: str, right: str, wrong: str, folder: Path) -> ModuleType:
-    """Return a program's twin from a copy of the sources with `right` in `file` replaced."""
-    package = f"planted_{next(_COUNT)}"
-    target = folder / package
-    ignore = shutil.ignore_patterns("__pycache__")
-    assert thesis.__file__ is not None
-    shutil.copytree(Path(thesis.__file__).parent, target, ignore=ignore)
-    for path in target.glob("*.py"):
-        text = path.read_text().replace("pyharness.thesis", package)
-        if path.name == file:
-            assert text.count(right) == 1, f"{right!r} stands {text.count(right)} times in {file}"
-            text = text.replace(right, wrong)
-        path.write_text(text)
-    with patch.object(sys, "path", [str(folder), *sys.path]):
-        importlib.invalidate_caches()
-        return importlib.import_module(f"{package}.{program.replace('-', '_')}")

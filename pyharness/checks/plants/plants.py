@@ -60,8 +60,7 @@ def _plus(found: Any, size: float) -> Any:
 
 def _off(found: Array, size: float) -> Array:
     """Return an array, each element enlarged by `size` times the largest."""
-    wrong: Array = found + size * np.abs(found).max(initial=0.0) * np.sign(found)
-    return wrong
+    return np.asarray(found + size * np.abs(found).max(initial=0.0) * np.sign(found))
 
 
 def _bit_off(found: Array, size: float) -> Array:
@@ -73,8 +72,7 @@ def _bit_off(found: Array, size: float) -> Array:
 
 def _third_off(found: Array, size: float) -> Array:
     """Return vectors whose third component is multiplied by 1 - `size`."""
-    wrong: Array = found * [1.0, 1.0, 1.0 - size]
-    return wrong
+    return np.asarray(found * [1.0, 1.0, 1.0 - size])
 
 
 def _swapped(found: Array, size: float) -> Array:
@@ -104,9 +102,11 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
     def planted(size: float) -> AbstractContextManager[Any]:
         entry = extension.extension().solve_packed
-        kernel = SimpleNamespace(
-            solve_packed=lambda packed, *rest: change(packed, entry(packed, *rest), size)
-        )
+
+        def solve_packed(packed: Array, *rest: Any) -> _Answer:
+            return change(packed, entry(packed, *rest), size)
+
+        kernel = SimpleNamespace(solve_packed=solve_packed)
         return patch("pyharness.engine.solver.extension", lambda: kernel)
 
     return planted
@@ -141,9 +141,10 @@ def _too_large(packed: Array, answer: _Answer, size: float) -> _Answer:
     return (wrong if packed[Places.METHOD] in _FIXED else omega, status, steps, found)
 
 
-def _shorter_compiled(
-    size: float, run: Callable[..., Trajectory], scene: Scene, *rest: Any
-) -> Trajectory:
+_Run = Callable[..., Trajectory]
+
+
+def _shorter_compiled(size: float, run: _Run, scene: Scene, *rest: Any) -> Trajectory:
     """Return a compiled run with a smaller step size, but the times of the original steps."""
     shorter = replace(scene, step_size=(1.0 - size) * scene.step_size)
     found, labels = run(shorter, *rest), run(scene, *rest)
@@ -153,30 +154,23 @@ def _shorter_compiled(
 
 
 def _shorter_both(
-    size: float, run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any,
-    **named: Any,
-) -> Trajectory:  # fmt: skip
+    size: float, run: _Run, program: Program, scene: Scene, *rest: Any, **named: Any
+) -> Trajectory:
     part = 1.0 - size
     found = run(program, replace(scene, step_size=part * scene.step_size), *rest, **named)
     return replace(found, time=found.time / part, recorded_time=found.recorded_time / part)
 
 
 def _label_both(
-    size: float, run: Callable[..., Trajectory], program: Program, scene: Scene, *rest: Any,
-    **named: Any,
-) -> Trajectory:  # fmt: skip
+    size: float, run: _Run, program: Program, scene: Scene, *rest: Any, **named: Any
+) -> Trajectory:
     found = run(program, scene, *rest, **named)
     return replace(found, time=found.time - size * scene.step_size)
 
 
-def _earlier(time: Array, size: float) -> Array:
-    return time - size * time[:1] if len(time) else time
-
-
 def _shifted(
-    size: float, solve: Callable[..., Trajectory], scene: Scene, times: Sequence[float],
-    *rest: float,
-) -> Trajectory:  # fmt: skip
+    size: float, solve: _Run, scene: Scene, times: Sequence[float], *rest: float
+) -> Trajectory:
     """Return results for later times, labelled with `times`; only the true solution reveals it."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
@@ -254,7 +248,8 @@ PLANTS = (
     Plant("quick-refuses", "the solver for few digits refuses every scene",
           _prepared(_refuses), 1.0, ("prepared",)),
     Plant("label-in-fortran", "TIME shifted by half a step",
-          change_result(_COMPILED, change_attribute("recorded_time", _earlier)),
+          change_result(_COMPILED, change_attribute(
+              "recorded_time", lambda time, size: time - size * time[:1])),
           0.5, ("cells", "decks")),
     Plant("label-in-both", "the time of every row shifted by half a step, in both languages",
           instead(_PROGRAM, _label_both), 0.5, ("cells", "words")),
@@ -284,8 +279,8 @@ _DRAWS = 12
 def self_test(seed: str, record: Path) -> Iterator[Outcome]:
     """Yield the outcomes without a fault, then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
-    failed, example = _failed(chosen)
-    yield control(failed.total(), _note(failed, example))
+    failed, note = _failed(chosen)
+    yield control(failed.total(), note)
     for plant in PLANTS:
         yield outcome(plant, chosen)
 
@@ -293,18 +288,15 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
     """Return whether any checks detect a planted fault, apart from the golden record's."""
     with plant.planted(plant.size):
-        failed, example = _failed(replace(chosen, only=plant.kinds))
+        failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
-    return Outcome(plant.name, plant.fault, noticed > 0, noticed, _note(failed, example))
+    return Outcome(plant.name, plant.fault, noticed > 0, noticed, note)
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return the number of failed checks by kind, and one id, preferably not of the record."""
+    """Return numbers of failed checks by kind, and a note with an id, if possible of no record."""
     names = [check.id for check in verify(chosen) if not check.passed]
-    kinds = Counter(name.partition("/")[0] for name in names)
-    return kinds, min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")
-
-
-def _note(failed: Counter[str], example: str) -> str:
+    failed = Counter(name.partition("/")[0] for name in names)
+    example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")
     counts = ", ".join(f"{kind} {count}" for kind, count in failed.items())
-    return f"caught by {counts} ({example})" if failed else "nothing fails"
+    return failed, f"caught by {counts} ({example})" if failed else "nothing fails"

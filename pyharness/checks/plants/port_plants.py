@@ -64,8 +64,7 @@ def _next_float(x: float) -> float:
 
 def _single(row: Row) -> Row:
     with np.errstate(over="ignore"):
-        rounded: Row = np.array(row).astype(np.float32).tolist()
-    return rounded
+        return [float(np.float32(x)) for x in row]
 
 
 def _shifted(rows: list[Row]) -> list[Row]:
@@ -208,7 +207,13 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
     for plant in PLANTS:
         changed, notes = 0, []
         for cell, twin, answer in zip(cells, twins, answers, strict=True):
-            faulty = _faulty(process, plant, cell, answer)
+            right = json.loads(cell.request) if plant.in_request else answer
+            faulty = copy.deepcopy(right)
+            plant.change(faulty)
+            if plant.in_request:
+                has_changed = faulty != right
+                asked = json.dumps(faulty).encode()
+                faulty = _parsed(process.ask(asked)) if has_changed else answer
             # Compared as text, because NaN differs from itself, and zeros have a sign.
             if json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True):
                 continue
@@ -221,21 +226,9 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
                 notes += [] if check.passed else [f"{check.id}: {check.note}"]
         seen = f"noticed in {len(notes)} of {counted(changed, 'changed run')}"
         note = " ".join([seen, *(f"({each})" for each in notes[:1])])
-        if not changed:
-            note = "changes no answer in these runs"
-        is_seen = len(notes) == changed
-        yield Outcome(plant.name, plant.fault, is_seen, len(notes), note, changed > 0)
-
-
-def _faulty(
-    process: PortProcess, plant: PortPlant, cell: Cell, answer: dict[str, Any]
-) -> dict[str, Any]:
-    right = json.loads(cell.request) if plant.in_request else answer
-    wrong = copy.deepcopy(right)
-    plant.change(wrong)
-    if not plant.in_request:
-        return wrong
-    return answer if wrong == right else _parsed(process.ask(json.dumps(wrong).encode()))
+        note = note if changed else "changes no answer in these runs"
+        count = len(notes)
+        yield Outcome(plant.name, plant.fault, count == changed, count, note, changed > 0)
 
 
 def _parsed(line: bytes) -> dict[str, Any]:

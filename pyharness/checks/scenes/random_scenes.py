@@ -2,9 +2,10 @@
 
 import datetime
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pyharness.engine.rescaled import scaled
 from pyharness.engine.rotated import rotated
 from pyharness.model.listing import PROGRAMS, Listing, names_of, switches
 from pyharness.model.scene import Scene, Triple
-from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
 # Defects added later are drawn last, so that the draws of a seed do not change.
@@ -60,10 +61,8 @@ def draw(seed: str, number: int) -> Draw:
         scene = replace(NASTY[name](source), name=name)
     program = source.choice(PROGRAMS)
     early = [name for name in switches(program) if name not in _LATER]
-    defects, readings = (
-        frozenset(name for name in names if source.random() < share)
-        for names, share in ((early, 0.5), (names_of("reading", program), 0.3))
-    )
+    defects = frozenset(name for name in early if source.random() < 0.5)
+    readings = frozenset(x for x in names_of("reading", program) if source.random() < 0.3)
     found = Draw(
         scene=scene,
         listing=Listing(program, defects, readings),
@@ -144,7 +143,8 @@ def _near_separatrix(source: Random) -> Scene:
     spin = source.choice((-1.0, 1.0)) * source.uniform(0.5, 5.0)
     omega = _disturbed(source, spin, 10.0 ** -source.uniform(1.0, 12.0))
     axes = source.sample(range(3), 3)
-    return _scene(source, _pick(omega, axes), _pick(moments, axes), torque=False)
+    turned, moments = ([values[k] for k in axes] for values in (omega, moments))
+    return _scene(source, turned, moments, torque=False)
 
 
 def _disturbed(source: Random, spin: float, faint: float) -> list[float]:
@@ -156,7 +156,8 @@ def _violent(source: Random) -> Scene:
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(1.0, 4.0)
     constant, rate = _vector(source, size), _vector(source, size)
-    law = TorqueLaw(constant, rate, [_wave(source, size, 10.0 ** source.uniform(0.0, 4.0))])
+    frequency = 10.0 ** source.uniform(0.0, 4.0)
+    law = TorqueLaw(constant, rate, [(_vector(source, size), frequency)])
     return replace(scene, torque=law, step_size=1e-2 / size**0.5, steps=50)
 
 
@@ -167,7 +168,8 @@ def _from_rest(source: Random) -> Scene:
     law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
 
     def kept(values: Triple) -> Triple:
-        return _triple(x if k in axes else 0.0 for k, x in enumerate(values))
+        x, y, z = (w if k in axes else 0.0 for k, w in enumerate(values))
+        return x, y, z
 
     return rotated(replace(scene, omega=(0.0, 0.0, 0.0), torque=law), kept, body=False)
 
@@ -178,23 +180,23 @@ def _slow_waves(source: Random) -> Scene:
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))
     start = 0.0 if source.random() < 0.5 else 10.0 ** -source.uniform(0.0, 6.0)
-    return replace(scene, omega=_times(start, scene.omega), torque=law)
+    return replace(scene, omega=np.multiply(start, scene.omega).tolist(), torque=law)
 
 
 def _many_speeds(source: Random) -> Scene:
     """Return a random scene with waves of 1e-6 to 630 rad/s, some as both sine and cosine."""
     scene = _plain(source)
-    some: list[list[Wave]] = [[], []]
+    some: list[list[tuple[list[float], float]]] = [[], []]
     for _ in range(source.randint(2, 6)):
         amplitude = _largest(scene) * 10.0 ** source.uniform(-3.0, 1.5)
         frequency = 10.0 ** source.uniform(-6.0, 2.8)
-        some[source.randrange(2)].append(_wave(source, amplitude, frequency))
+        some[source.randrange(2)].append((_vector(source, amplitude), frequency))
     sines, cosines = some
     if source.random() < 0.2:
         # The same frequencies in sines and cosines, which methods may combine.
         cosines = sines
     start, law = source.choice((0.0, 0.01, 1.0)), TorqueLaw(sines=sines, cosines=cosines)
-    return replace(scene, omega=_times(start, scene.omega), torque=law)
+    return replace(scene, omega=np.multiply(start, scene.omega).tolist(), torque=law)
 
 
 def _far_scale(source: Random) -> Scene:
@@ -205,7 +207,8 @@ def _far_scale(source: Random) -> Scene:
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
-    return replace(rotated(found, lambda each: _times(mass, each), body=True), omega=found.omega)
+    heavier = rotated(found, lambda v: (mass * v[0], mass * v[1], mass * v[2]), body=True)
+    return replace(heavier, omega=found.omega)
 
 
 def _sensitive(source: Random) -> Scene:
@@ -220,9 +223,8 @@ def _sensitive(source: Random) -> Scene:
         law = _law(source, size, source.randrange(1, 8), (0.1, 30.0))
     axes, steps = source.sample(range(3), 3), source.randint(10, 60)
     step_size = min(50.0, source.uniform(1.0, 14.0) / max(rate, 1e-3)) / steps
-    return Scene(
-        "", _pick(omega, axes), _pick(body, axes), None, law, step_size=step_size, steps=steps
-    )
+    turned, moments = ([values[k] for k in axes] for values in (omega, body))
+    return Scene("", turned, moments, None, law, step_size=step_size, steps=steps)
 
 
 def _long(source: Random) -> Scene:
@@ -246,9 +248,8 @@ def _extreme(source: Random) -> Scene:
     law, omega, sizes = ([any_size() for _ in range(3)] for _ in range(3))
     moments = [abs(x) or 1.0 for x in sizes]
     torque = TorqueLaw(law) if source.random() < 0.5 else TorqueLaw()
-    return Scene(
-        "", omega, moments, None, torque, step_size=10.0 ** source.uniform(-100.0, 2.0), steps=20
-    )
+    step_size = 10.0 ** source.uniform(-100.0, 2.0)
+    return Scene("", omega, moments, None, torque, step_size=step_size, steps=20)
 
 
 def _unsorted_body(source: Random) -> Triple:
@@ -295,13 +296,11 @@ def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, floa
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)
-    sine, cosine = (_wave(source, size, 10.0 ** source.uniform(low, high)) for _ in range(2))
-    return TorqueLaw(
-        constant if kinds & 1 else (0.0, 0.0, 0.0),
-        rate if kinds & 2 else (0.0, 0.0, 0.0),
-        [sine] if kinds & 4 else [],
-        [cosine] if kinds & 8 else [],
-    )
+    drawn = ((10.0 ** source.uniform(low, high), _vector(source, size)) for _ in range(2))
+    sine, cosine = ((amplitude, frequency) for frequency, amplitude in drawn)
+    parts: dict[str, Any] = {"constant": constant, "rate": rate}
+    parts |= {"sines": [sine], "cosines": [cosine]}
+    return TorqueLaw(**{name: x for k, (name, x) in enumerate(parts.items()) if kinds >> k & 1})
 
 
 def _scene(
@@ -313,17 +312,15 @@ def _scene(
 ) -> Scene:
     """Return a scene with random torque and steps, from `moments` (kg m2) or `coefficients`."""
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
-
-    def wave(most: float) -> list[Wave]:
-        return [_wave(source, size, source.uniform(0.1, most))]
-
-    laws: tuple[Callable[[], TorqueLaw], ...] = (
-        TorqueLaw,
-        lambda: TorqueLaw(_vector(source, size)),
-        lambda: TorqueLaw(_vector(source, size), _vector(source, size)),
-        lambda: TorqueLaw(sines=wave(30.0), cosines=wave(300.0)),
-    )
-    law = laws[source.randrange(4) if torque else 0]()
+    kind = source.randrange(4) if torque else 0
+    if kind < 3:
+        # None, a constant, or a constant and a rate.
+        vectors: list[Any] = [_vector(source, size) for _ in range(kind)]
+        law = TorqueLaw(*vectors)
+    else:
+        drawn = ((source.uniform(0.1, most), _vector(source, size)) for most in (30.0, 300.0))
+        sine, cosine = ((amplitude, frequency) for frequency, amplitude in drawn)
+        law = TorqueLaw(sines=[sine], cosines=[cosine])
     step_size, steps = 10.0 ** source.uniform(-3.0, -1.3), source.randint(10, 60)
     return Scene("plain", omega, moments, coefficients, law, step_size=step_size, steps=steps)
 
@@ -332,22 +329,5 @@ def _largest(scene: Scene) -> float:
     return max(scene.moments or (1.0,))
 
 
-def _vector(source: Random, size: float) -> Triple:
-    return _triple(source.uniform(-size, size) for _ in range(3))
-
-
-def _wave(source: Random, size: float, frequency: float) -> Wave:
-    return _vector(source, size), frequency
-
-
-def _times(factor: float, values: Triple) -> Triple:
-    return _triple(factor * x for x in values)
-
-
-def _pick(values: list[float], axes: list[int]) -> Triple:
-    return _triple(values[k] for k in axes)
-
-
-def _triple(values: Iterable[float]) -> Triple:
-    first, second, third = values
-    return first, second, third
+def _vector(source: Random, size: float) -> list[float]:
+    return [source.uniform(-size, size) for _ in range(3)]

@@ -25,31 +25,23 @@ from pyharness.model.torque_law import TorqueLaw
 # A torque over the size of the moments, as a function of t, omega and attitude, for symbols or
 # numbers.
 Term = Callable[[Any, Any, Any], Any]
+Body = tuple[float, list[float], float]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
 # Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
-READY = (
-    "damping",
-    "drag",
-    "rate_control",
-    "attitude_control",
-    "wheels",
-    "gravity_gradient",
-    "magnetic_dipole",
-    "magnetic_damping",
-    "in_space",
-    "table",
-    "pulses",
-)
 TIMED = ("table", "pulses")  # ready terms that depend on time alone
+READY = (
+    *("damping", "drag", "rate_control", "attitude_control", "wheels", "gravity_gradient"),
+    *("magnetic_dipole", "magnetic_damping", "in_space", *TIMED),
+)
 
 
 def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Scene, float]:
     """Return a random scene under one to three terms of `names`, and its end time (s)."""
     chosen = source.sample(names, min(len(names), source.choice((1, 1, 2, 2, 3))))
-    size, moments, speed = _body(source)
+    size, _, speed = body = _body(source)
     terms = [term(source, name, size, speed) for name in chosen]
     turning = any(name in TURNING for name in chosen)
 
@@ -60,19 +52,18 @@ def draw(source: Random, names: tuple[str, ...] = STEADY + TURNING) -> tuple[Sce
         return torque(t, omega, None)
 
     with_attitude = turning or source.random() < 0.3
-    return _moving(source, chosen, moments, speed, torque if turning else still, with_attitude)
+    return _moving(source, chosen, body, torque if turning else still, with_attitude)
 
 
 def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, float]:
     """Return a random scene under one or two ready-made terms of `names`, and its end time (s)."""
     chosen = source.sample(names, source.choice((1, 2)))
-    _, moments, speed = _body(source)
+    _, moments, speed = body = _body(source)
     torque = sum(ready(source, name, moments, speed) for name in chosen)
-    assert isinstance(torque, StateTorque)
-    return _moving(source, chosen, moments, speed, torque, with_attitude=True)
+    return _moving(source, chosen, body, torque, with_attitude=True)
 
 
-def _body(source: Random) -> tuple[float, list[float], float]:
+def _body(source: Random) -> Body:
     """Return the size of random possible moments, the moments (kg m2), and a speed (rad/s)."""
     size = 10.0 ** source.uniform(-2.0, 1.0)
     while True:
@@ -83,14 +74,10 @@ def _body(source: Random) -> tuple[float, list[float], float]:
 
 
 def _moving(
-    source: Random,
-    chosen: list[str],
-    moments: list[float],
-    speed: float,
-    torque: StateTorque | Callable[..., Any],
-    with_attitude: bool,
+    source: Random, chosen: list[str], body: Body, torque: Any, with_attitude: bool
 ) -> tuple[Scene, float]:
     """Return a scene with random omega and, if wanted, attitude, and its end time (s)."""
+    _, moments, speed = body
     omega = [source.uniform(-speed, speed) for _ in range(3)]
     attitude = [source.gauss(0.0, 1.0) for _ in range(4)] if with_attitude else None
     scene = Scene(" + ".join(chosen), omega, moments, torque=torque, attitude=attitude)
@@ -105,7 +92,7 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
     several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
     rate = speed * 10.0 ** source.uniform(-1.0, 0.5)
     field = TorqueLaw(vector, sines=[([part, 0.0, part], rate)], frame="space")
-    made: dict[str, Callable[[], Any]] = {
+    made: dict[str, Callable[[], StateTorque]] = {
         "damping": lambda: damping(several),
         "drag": lambda: drag([0.1 * part, 0.2 * part / speed**2]),
         "rate_control": lambda: rate_control(several, [speed * x for x in vector]),
@@ -118,8 +105,7 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
         "table": lambda: _of_time(source, part * speed, 1.0 / speed, 12),
         "pulses": lambda: _of_time(source, part * speed, 1.0 / speed, 6),
     }
-    found: StateTorque = made[name]()
-    return found
+    return made[name]()
 
 
 def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:

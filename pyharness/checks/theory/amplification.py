@@ -126,21 +126,14 @@ def _runge_kutta(listing: Listing) -> Amplification:
     """
     first, base = np.full((2, 2, _HIGHEST), Fraction(0), dtype=object)
     first[0, 0] = base[1, 0] = Fraction(1)
-    half = Fraction(1, 2)
-
-    def stored(before: Fractions, slope: Fractions, length: Fraction) -> Fractions:
-        start = before if listing.has("stage-base") else base
-        return np.asarray(start + length * slope)
-
-    k1 = _times_z(first)
-    first = stored(first, k1, half)
-    k2 = _times_z(first)
-    second = stored(first, k2, half)
-    k3 = _times_z(second)
-    third = stored(second, k3, Fraction(1))
-    k4 = _times_z(third)
+    stages, slopes = [first], []
+    for length in (Fraction(1, 2), Fraction(1, 2), Fraction(1)):
+        slopes.append(_times_z(stages[-1]))
+        start = stages[-1] if listing.has("stage-base") else base
+        stages.append(start + length * slopes[-1])
+    k1, k2, k3, k4 = *slopes, _times_z(stages[-1])
     result = base + (k1 + 2 * (k2 + k3) + k4) / 6
-    kept = first if listing.has("base-not-restored") else result
+    kept = stages[1] if listing.has("base-not-restored") else result
     matrix = np.array([kept, result], dtype=object)
     if listing.has("base-not-restored"):
         return Amplification(matrix)

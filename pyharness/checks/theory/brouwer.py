@@ -72,11 +72,9 @@ class Orbit:
         drift = steps * noise.truncation
         # The result is rounded once more. A, B and C have two rounding errors each, which change
         # the conserved quantities by at most four rounding errors of the energy at any time.
-        found = {
-            name: (walk + (0.0 if noise.conserves else drift) + ROUNDING) * self.gains[name]
-            + 4.0 * ROUNDING
-            for name in ("energy", "momentum")
-        }
+        lost = walk + (0.0 if noise.conserves else drift) + ROUNDING
+        conserved = ("energy", "momentum")
+        found = {name: lost * self.gains[name] + 4.0 * ROUNDING for name in conserved}
         # An error in step k of n shifts the frequency for n - k steps. The sum of (n - k)**2 is
         # near n**3 / 3.
         shear = self.gains["frequency"] * noise.step
@@ -160,10 +158,8 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     stiffness = float(np.abs(body.jacobians).sum(axis=2).max())
     spread = float(np.abs(matrix).sum(axis=1).max())
     eye = np.eye(3 * stages)
-    resolvent = max(
-        float(np.abs(np.linalg.inv(eye - step * np.kron(matrix, each))).sum(axis=1).max())
-        for each in body.jacobians[::8]
-    )
+    inverses = [np.linalg.inv(eye - step * np.kron(matrix, each)) for each in body.jacobians[::8]]
+    resolvent = max(float(np.abs(each).sum(axis=1).max()) for each in inverses)
     state = body.largest
     at_node = step * spread * ((stages + 3.0) * rate + stiffness * state) * resolvent
     total = step * ((stages + 4.0) * rate + stiffness * (state + at_node))

@@ -131,9 +131,7 @@ def solved(program: str, step: float) -> Solved:
     # Six right-hand sides, three regular and three random.
     rough = np.random.default_rng(count).normal(size=(3, count))
     sides = np.array([np.ones(count), places / count, (-1.0) ** places, *rough])
-    factors, found, ier = extension().solve_linear(
-        np.asfortranarray(matrix), np.asfortranarray(sides.T)
-    )
+    factors, found, ier = extension().solve_linear(*map(np.asfortranarray, (matrix, sides.T)))
     twin, twin_ier = leqt1f(matrix, sides.tolist())
     differing = int((np.array(twin) != found.T).sum()) + (ier != twin_ier)
     exact = fractions(matrix)
@@ -152,17 +150,42 @@ def solved(program: str, step: float) -> Solved:
     growth = float(norm(sizes / columns) / norm(scaled))
     # The bounds take `sizes` in the matrix's order of rows.
     sizes = sizes[np.argsort(order)]
+    powers = np.array([Fraction(step) ** k for k in range(1, count + 1)], dtype=object)
 
     def errors(solutions: Array) -> list[float]:
-        pairs = zip(solutions.T, sides, strict=True)
-        every = [_errors(exact, solver, sizes, Fraction(step), x, b) for x, b in pairs]
-        largest: list[float] = np.array(every).max(axis=0).tolist()
-        return largest
+        """Return the largest ratios of three errors to their bounds, and a relative error.
+
+        The ratios are for the residual, the elements of X, and the increment of an unknown over the
+        step. The last value is the error of the increment, over `step` times the largest element of
+        the right-hand side.
+        """
+        every = []
+        for solution, side in zip(solutions.T, sides, strict=True):
+            x, b = fractions(solution), fractions(side)
+            truth = solver @ b
+            allowed = gamma(3 * count) * (sizes @ abs(x))
+            reach = abs(solver) @ allowed
+            total, power = 0.0, step
+            for c in solution:
+                total, power = total + c * power, power * step
+            # At most three roundings in a power of the step size, one in its product with the
+            # coefficient c, and n in the sum.
+            bound = powers @ (reach + gamma(count + 4) * abs(x))
+            missed = abs(Fraction(total) - powers @ truth)
+            pairs = (abs(exact @ x - b), allowed), (abs(truth - x), reach), ([missed], [bound])
+            ratios = [max(map(_share, wrong, most)) for wrong, most in pairs]
+            every.append([*ratios, float(missed / (powers[0] * abs(b).max()))])
+        return [max(each) for each in zip(*every, strict=True)]
 
     residual, forward, increment, increment_error = errors(found)
-    operands = [matrix, factors, sides, found, [step, step ** len(matrix)]]
-    holds = _theorem_holds(exact, lower, upper, order, operands)
-    if not holds:
+    # The hypotheses of theorem 9.4: no operation underflows or overflows, and L and U are factors
+    # of the rows in `order`, within the errors of theorem 9.3.
+    operands = [matrix, factors, sides, found, [step, step**count]]
+    elements = np.abs(np.concatenate([np.ravel(each) for each in operands]))
+    elements = elements[elements != 0.0]
+    is_safe = count <= 4 and _RANGE[0] <= elements.min() and elements.max() <= _RANGE[1]
+    missed = abs(exact[list(order)] - lower @ upper) <= gamma(count) * (abs(lower) @ abs(upper))
+    if not (is_safe and sorted(order) == list(range(count)) and missed.all()):
         residual = forward = increment = math.inf
     _, yardstick, *_ = errors(np.linalg.solve(np.array(matrix), sides.T))
     return Solved(
@@ -220,10 +243,8 @@ def declared_singular_below(program: str) -> float:
     from pyharness.model.extension import extension
 
     def singular(step: float) -> bool:
-        matrix = collocation.collocation_matrix(points(program, step))
-        *_, ier = extension().solve_linear(
-            np.asfortranarray(matrix), np.ones((len(matrix), 1), order="F")
-        )
+        matrix = np.asfortranarray(collocation.collocation_matrix(points(program, step)))
+        *_, ier = extension().solve_linear(matrix, np.ones((len(matrix), 1), order="F"))
         return bool(ier == SINGULAR)
 
     low, high = 1e-20, 1.0
@@ -233,62 +254,6 @@ def declared_singular_below(program: str) -> float:
             break
         low, high = (middle, high) if singular(middle) else (low, middle)
     return low
-
-
-def _errors(
-    matrix: Fractions,
-    solver: Fractions,
-    sizes: Fractions,
-    step: Fraction,
-    found: Array,
-    side: Array,
-) -> tuple[float, ...]:
-    """Return the ratios of three errors of a solution X to their bounds, and a relative error.
-
-    The ratios are for the residual, the elements of X, and the increment of an unknown over the
-    step. The last value is the error of the increment, over `step` (s) times the largest element of
-    `side`. `solver` is the exact inverse, `sizes` is abs(L) abs(U) in the matrix's order of rows.
-    """
-    count = len(matrix)
-    x, b = fractions(found), fractions(side)
-    truth = solver @ b
-    allowed = gamma(3 * count) * (sizes @ abs(x))
-    reach = abs(solver) @ allowed
-    total, power = 0.0, float(step)
-    for c in found:
-        total, power = total + c * power, power * float(step)
-    powers = np.array([step**k for k in range(1, count + 1)], dtype=object)
-    # At most three roundings in a power of the step size, one in its product with the coefficient
-    # c, and n in the sum.
-    bound = powers @ (reach + gamma(count + 4) * abs(x))
-    missed = abs(Fraction(total) - powers @ truth)
-    return (
-        max(map(_share, abs(matrix @ x - b), allowed)),
-        max(map(_share, abs(truth - x), reach)),
-        _share(missed, bound),
-        float(missed / (step * abs(b).max())),
-    )
-
-
-def _theorem_holds(
-    matrix: Fractions,
-    lower: Fractions,
-    upper: Fractions,
-    order: Sequence[int],
-    operands: Sequence[ArrayLike],
-) -> bool:
-    """Return whether the hypotheses of Higham's theorem 9.4 hold.
-
-    `lower` and `upper` must be LU factors of the rows in `order`, within the errors of theorem 9.3,
-    and no operation on `operands` may underflow or overflow.
-    """
-    sizes = np.abs(np.concatenate([np.ravel(each) for each in operands]))
-    sizes = sizes[sizes != 0.0]
-    is_safe = len(matrix) <= 4 and _RANGE[0] <= sizes.min() and sizes.max() <= _RANGE[1]
-    missed = abs(matrix[list(order)] - lower @ upper)
-    allowed = gamma(len(matrix)) * (abs(lower) @ abs(upper))
-    is_factored = sorted(order) == list(range(len(matrix))) and (missed <= allowed).all()
-    return bool(is_safe and is_factored)
 
 
 def _share(error: Fraction, bound: Fraction) -> float:

@@ -188,11 +188,9 @@ def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | 
     0, and None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
-    if spun == 0.0:
-        return math.inf
-    if rate == 0.0:
+    if spun != 0.0 and rate == 0.0:
         return None
-    shift = 0.25 * share**2 * spun * rate / min(others)
+    shift = 0.25 * share**2 * spun * rate / min(others) if spun else 0.0
     return OFF / shift if shift else math.inf
 
 
@@ -275,11 +273,8 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"
     vertex = math.sqrt(abs(product))
-    places: Places = []
-    for factor, name in sorted(along.items()):
-        omega = {one: vertex * factor, other: math.copysign(vertex / factor, product)}
-        places.append((name, _three(omega)))
-    return told, places
+    found = {f: {one: vertex * f, other: math.copysign(vertex / f, product)} for f in along}
+    return told, [(along[factor], _three(found[factor])) for factor in sorted(along)]
 
 
 def _three(components: dict[int, float]) -> Triple:
@@ -301,11 +296,9 @@ def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
         f"{across[0]:.6g}, w{other + 1} w{axis + 1} = {across[1]:.6g}; {_SHOWN} w{axis + 1}"
     )
     vertex = math.sqrt(math.hypot(*across))
-    places: Places = []
-    for spin in (vertex * factor for factor in _ALONG):
-        omega = {axis: spin, one: across[0] / spin, other: across[1] / spin}
-        places.append(("hyperbola", _three(omega)))
-    return told, places
+    spins = [vertex * factor for factor in _ALONG]
+    found = [{axis: spin, one: across[0] / spin, other: across[1] / spin} for spin in spins]
+    return told, [("hyperbola", _three(each)) for each in found]
 
 
 def _points(products: Sequence[float]) -> tuple[str, Places]:

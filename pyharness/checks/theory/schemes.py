@@ -81,7 +81,8 @@ class FixedStep:
     name: str  # of the program or method
     order: int  # of the global error of the program or method
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
-    roundings: float  # bound of the error of a step's last additions, in units of 2**-53 of omega
+    # bound of the error of a step's last additions, in units of 2**-53 of omega
+    roundings: float = 1.0
 
 
 def constant(omega: Array) -> Array:
@@ -183,18 +184,15 @@ def gauss(stages: int) -> Scheme:
     return scheme
 
 
-_ALL = (
-    FixedStep("two-term", 2, collocation("two-term"), 2.0),
-    FixedStep("four-term", 2, collocation("four-term"), 4.0),
-    FixedStep("runge-kutta", 4, runge_kutta_4, 1.0),
-    FixedStep("improved-euler", 2, improved_euler, 1.0),
-    FixedStep("taylor-3", 2, taylor_3, 1.0),
-    FixedStep("rk4", 4, runge_kutta_4, 1.0),
-    FixedStep("gauss-1", 2, gauss(1), 1.0),
-    FixedStep("gauss-2", 4, gauss(2), 1.0),
-    FixedStep("gauss-4", 8, gauss(4), 1.0),
-)
-SCHEMES = {each.name: each for each in _ALL}
+SCHEMES = {
+    "two-term": FixedStep("two-term", 2, collocation("two-term"), 2.0),
+    "four-term": FixedStep("four-term", 2, collocation("four-term"), 4.0),
+    "runge-kutta": FixedStep("runge-kutta", 4, runge_kutta_4),
+    "improved-euler": FixedStep("improved-euler", 2, improved_euler),
+    "taylor-3": FixedStep("taylor-3", 2, taylor_3),
+    "rk4": FixedStep("rk4", 4, runge_kutta_4),
+    **{f"gauss-{n}": FixedStep(f"gauss-{n}", 2 * n, gauss(n)) for n in (1, 2, 4)},
+}
 
 
 def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:

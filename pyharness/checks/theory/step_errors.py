@@ -92,7 +92,13 @@ class Forecaster:
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
-        self._wandering = self._of_one_step()
+        # The mean relative final error from one step's rounding. A component's rounding error is
+        # proportional to the component, and 0 if it never changes.
+        changes = (self._rates() != 0.0).any(axis=0)
+        carried = along.propagators * (along.omega * changes)[:, None, :]
+        squares = along.over_time(np.square(carried).sum(axis=2)) / float(along.times[-1])
+        size = math.sqrt(float(squares.max())) / along.flow.largest
+        self._wandering = _MEAN_ROUNDING * ROUNDING * self.method.roundings * size
 
     def predict(self, steps: int) -> Forecast:
         """Return the predicted errors of `steps` equal steps."""
@@ -113,7 +119,15 @@ class Forecaster:
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
-        rounding = self._rounding(h, steps)
+        norms, mean = here.norms, float(here.over_time(here.norms)) / float(here.times[-1])
+        rounding = here.flow.rounding + self.method.roundings * ROUNDING * steps * mean
+        if self.method.name in PARTS:
+            rates = self._rates()
+            constant, varying = solver_roundings(self.method.name)
+            travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
+            # Bound of the relative change of the right-hand sides in a step.
+            differing = min(1.0, h * here.fastest)
+            rounding += ROUNDING * travelled * (constant + varying * differing)
         wandering = self._wandering * math.sqrt(steps)
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
@@ -132,35 +146,9 @@ class Forecaster:
             low, high = (middle, high) if is_above else (low, middle)
         return time / high
 
-    def _of_one_step(self) -> float:
-        """Return the mean relative final error from one step's rounding.
-
-        A component's rounding error is proportional to the component, and 0 if it never changes.
-        """
-        here = self._path
-        changes = (self._rates() != 0.0).any(axis=0)
-        carried = here.propagators * (here.omega * changes)[:, None, :]
-        squares = here.over_time(np.square(carried).sum(axis=2)) / float(here.times[-1])
-        size = math.sqrt(float(squares.max())) / here.flow.largest
-        return _MEAN_ROUNDING * ROUNDING * self.method.roundings * size
-
     def _rates(self) -> Array:
         on = self._path.scene.right_hand_side()
         return np.array([on(0.0, omega) for omega in self._path.omega.tolist()])
-
-    def _rounding(self, h: float, steps: int) -> float:
-        here = self._path
-        norms, largest = here.norms, here.flow.largest
-        mean = float(here.over_time(norms)) / float(here.times[-1])
-        total = here.flow.rounding + self.method.roundings * ROUNDING * steps * mean
-        if self.method.name in PARTS:
-            rates = self._rates()
-            constant, varying = solver_roundings(self.method.name)
-            travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
-            # Bound of the relative change of the right-hand sides in a step.
-            differing = min(1.0, h * here.fastest)
-            total += ROUNDING * travelled * (constant + varying * differing)
-        return total
 
     def _series(self, singular: bool) -> Array:
         scheme, order = self.method.scheme, self.method.order

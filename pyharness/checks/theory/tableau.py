@@ -46,20 +46,19 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     if weighting == "collocation":
         nodes = grid(points, n)
         tests, quadrature = np.eye(n), np.ones(n)
+    elif weighting == "subdomain":
+        part, quadrature = _gauss(n + 1)
+        nodes = ((np.arange(n)[:, None] + part) / n).ravel()
+        quadrature = np.tile(quadrature / n, n)
+        tests = np.repeat(np.eye(n), n + 1, axis=0)
     else:
-        if weighting == "subdomain":
-            part, quadrature = _gauss(n + 1)
-            nodes = ((np.arange(n)[:, None] + part) / n).ravel()
-            quadrature = np.tile(quadrature / n, n)
-            tests = np.repeat(np.eye(n), n + 1, axis=0)
-        else:
-            degree = 3 * n if weighting == "galerkin" else 3 * n - 1
-            nodes, quadrature = _gauss(degree // 2 + 1)
-            # These polynomials span the same space as the weight functions t ... t**n (Galerkin) or
-            # 1 ... t**(n-1) (least squares).
-            tests = basis(nodes, n)
-            if weighting == "galerkin":
-                tests = tests * nodes[:, None]
+        degree = 3 * n if weighting == "galerkin" else 3 * n - 1
+        nodes, quadrature = _gauss(degree // 2 + 1)
+        # These polynomials span the same space as the weight functions t ... t**n (Galerkin) or
+        # 1 ... t**(n-1) (least squares).
+        tests = basis(nodes, n)
+        if weighting == "galerkin":
+            tests = tests * nodes[:, None]
     weighted = fractions((tests * quadrature[:, None]).T)
     # Computed in fractions, because in floats the tableau would depend on the LAPACK in use.
     projection = inverse(weighted @ fractions(basis(nodes, n))) @ weighted

@@ -94,9 +94,8 @@ def _limit(truth: Truth, tried: MethodRun) -> float:
 
 def _allowed(method: str, tolerance: float, flow: Conditioning, time: float) -> float:
     """Return the largest error of the attitude (rad) that a method may have at `time` (s)."""
-    if method in FORMS:
-        return ATTITUDE
-    return flow.angle_limit(tolerance * lively(flow.amplification), time)
+    made = tolerance * lively(flow.amplification)
+    return ATTITUDE if method in FORMS else flow.angle_limit(made, time)
 
 
 POLICY = Policy(_limit, FLOW, refusable)
@@ -221,10 +220,8 @@ def _solid_angle(scene: Scene, period: float) -> float:
 
 def _check_rotated(turn: Turn, name: Name) -> Check:
     scene, method, time, tolerance = scene_of(name), name.subject, 5.0, 1e-12
-    plain, other = (
-        solve(each, [time], method, tolerance, attitude=True).attitude
-        for each in (scene, turn.scene(scene))
-    )
+    run = partial(solve, times=[time], method=method, tolerance=tolerance, attitude=True)
+    plain, other = run(scene).attitude, run(turn.scene(scene)).attitude
     assert plain is not None
     assert other is not None
     apart = 2.0 * float(np.linalg.norm(turn.back(other) - plain))

@@ -35,9 +35,8 @@ _PREPARED = ("quick", "auto")
 _BODY = (40.0, 30.0, 20.0)
 _START = (0.3, 1.1, 2.7)
 _PUSHED = TorqueLaw((10.0, -20.0, 15.0))
-_DRIVEN = TorqueLaw(
-    (3.0, 2.0, -4.0), (0.0, 1.0, 2.0), (((20.0, 0.0, 5.0), 7.0),), (((0.0, 30.0, 0.0), 11.0),)
-)
+_SINE, _COSINE = ((20.0, 0.0, 5.0), 7.0), ((0.0, 30.0, 0.0), 11.0)
+_DRIVEN = TorqueLaw((3.0, 2.0, -4.0), (0.0, 1.0, 2.0), [_SINE], [_COSINE])
 
 
 _FREE = Scene("free", _START, moments=_BODY, step_size=0.01, steps=300)
@@ -104,29 +103,23 @@ def _attempts() -> Iterator[Attempt]:
         for method in (*_ADAPTIVE, *FIXED_STEP):
             if method == "closed-form" and circumstance != "free":
                 continue
-            for tolerance in _tolerances(method, scene, time):
+            if method in (*FIXED_STEP, "closed-form"):
+                tolerances = [METHODS[method].finest]
+            else:
+                tolerances = finest_and_middling(method, scene, time)
+            for tolerance in tolerances:
                 ways: dict[str, Callable[[float, float, Name], Check]]
                 ways = {what: partial(_check_rotated, each) for what, each in SYMMETRIES.items()}
-                ways["back"] = _back
-                if method not in FIXED_STEP:
-                    ways["split"] = _split
+                ways |= (
+                    {"back": _back} if method in FIXED_STEP else {"back": _back, "split": _split}
+                )
                 own = replace(name, subject=method, quantity=f"{tolerance:.0e}")
                 for way, make in ways.items():
-                    place = replace(own, circumstance=way)
-                    yield Attempt(place, partial(make, time, tolerance))
+                    yield Attempt(replace(own, circumstance=way), partial(make, time, tolerance))
         for listing in LISTINGS:
             own = replace(name, subject=listing.program, quantity=listing.label)
-            for what, symmetry in SYMMETRIES.items():
-                place = replace(own, circumstance=what)
-                yield Attempt(place, partial(_program, listing, symmetry))
-
-
-def _tolerances(name: str, scene: Scene, time: float) -> list[float]:
-    if name in FIXED_STEP:
-        return [1.0]
-    if name == "closed-form":
-        return [METHODS[name].finest]
-    return finest_and_middling(name, scene, time)
+            for way, each in SYMMETRIES.items():
+                yield Attempt(replace(own, circumstance=way), partial(_program, listing, each))
 
 
 def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name) -> Check:

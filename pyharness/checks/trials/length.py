@@ -90,12 +90,14 @@ def _taylor(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
     return found.omega, found.steps * np.array(times) / times[-1]
 
 
+_taylor_noise = partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT)
+
+
 def _gauss(stages: int) -> Runner:
     def run(scene: Scene, times: Sequence[float]) -> tuple[Array, Array]:
         step = _PARTS[stages] / _rate(scene)
-        rows, _, n_rows, status, evaluations = extension().gauss_solution(
-            scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
-        )
+        given = scene.euler_coefficients, *normalized(scene)[1:], scene.omega, times, stages, step
+        rows, _, n_rows, status, evaluations = extension().gauss_solution(*given)
         if (n_rows, status) != (len(times), COMPLETE):
             raise InputError(
                 f"gauss-{stages} exceeded its work limit after {evaluations} right-hand sides"
@@ -114,13 +116,7 @@ INTEGRATORS = {
     # The truncation error of a series keeps its sign, and steps lock to the periodic motion, so
     # that rounding recurs in every revolution. The last two terms are at most SLACK times the local
     # tolerance; each later term is at most half of the previous one.
-    "taylor": Integrator(
-        _taylor,
-        partial(brouwer.taylor_noise, order=Series.MOST_ORDER, left_out=_LEFT_OUT),
-        1e6,
-        10**5.5,
-        preference=True,
-    ),
+    "taylor": Integrator(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
     # Steps of at most one radian of the fastest rate. A step takes ten times as long as a Taylor
     # step.
     "gauss-8": Integrator(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),

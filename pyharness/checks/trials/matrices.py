@@ -83,9 +83,8 @@ def _counted(listing: Listing, name: Name) -> Check:
     assert ier is not None
     count = int((ier == SINGULAR).sum())
     singular = singular_below(listing.program) / scene.step_size
-    if listing.has("dt-accumulates"):
-        expected = min(scene.steps, math.floor(singular))
-    else:
+    expected = min(scene.steps, math.floor(singular))
+    if not listing.has("dt-accumulates"):
         expected = scene.steps if singular >= 1.0 else 0
     note = f"IER = 129 in {count} of {scene.steps} steps"
     return name.bounded(abs(count - expected), 0.0, SINGULARITY, note)

@@ -50,8 +50,9 @@ def _attempts() -> Iterator[Attempt]:
         yield Attempt(named("regions", listing.program, label), partial(_attempt, listing))
 
 
-def _attempt(listing: Listing, name: Name) -> Iterator[Attempt]:
-    yield Attempt(replace(name, setting="polynomial"), partial(_polynomial, listing))
+def _attempt(listing: Listing, name: Name) -> Iterator[Check | Attempt]:
+    told = amplification(listing).text()
+    yield replace(name, setting="polynomial").described(None, told)
     for kind, (coefficients, omega) in _STEADY.items():
         for step in _STEPS:
             scene = steady_scene(coefficients, omega, step)
@@ -66,7 +67,15 @@ def _attempt(listing: Listing, name: Name) -> Iterator[Attempt]:
                 probe = partial(later_steps, scene, listing)
                 yield _probed(name, f"{count}-steps-{kind}-{step:g}", probe, scene)
     if listing.program != "runge-kutta":
-        yield from _collocation(listing, name)
+        for count in _COUNTS:
+            for z in _COMPLEX:
+                setting = f"step-{count}-at-{z:.2g}".replace("+0j", "")
+                yield _probed(name, setting, partial(complex_step, listing, count, z))
+            note = f"weight of s^2: {weight_of_squares(listing, count)}, 1/3 is true"
+            for case in (5, 6):
+                scene = case_scene(case)
+                probe = partial(moving_step, scene, listing, count)
+                yield _probed(name, f"step-{count}-case-{case}", probe, scene, note)
     elif listing.defects == {"base-not-restored"}:
         return  # two eigenvalues of similar size: no single growth rate
     for kind, direction in _DIRECTIONS.items():
@@ -74,18 +83,6 @@ def _attempt(listing: Listing, name: Name) -> Iterator[Attempt]:
     for case in (2, 3, 4):
         own = replace(name, setting=f"spin-case-{case}", scene=case_scene(case))
         yield Attempt(own, partial(_spin, listing))
-
-
-def _collocation(listing: Listing, name: Name) -> Iterator[Attempt]:
-    for count in _COUNTS:
-        for z in _COMPLEX:
-            setting = f"step-{count}-at-{z:.2g}".replace("+0j", "")
-            yield _probed(name, setting, partial(complex_step, listing, count, z))
-        for case in (5, 6):
-            scene = case_scene(case)
-            note = f"weight of s^2: {weight_of_squares(listing, count)}, 1/3 is true"
-            probe = partial(moving_step, scene, listing, count)
-            yield _probed(name, f"step-{count}-case-{case}", probe, scene, note)
 
 
 def _probed(
@@ -97,10 +94,6 @@ def _probed(
         return name.bounded(found.difference, found.limit, ROUNDED, seen)
 
     return Attempt(replace(name, setting=setting, scene=scene), make)
-
-
-def _polynomial(listing: Listing, name: Name) -> Check:
-    return name.described(None, amplification(listing).text())
 
 
 def _spin(listing: Listing, name: Name) -> Check:

@@ -22,9 +22,8 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
 
-_DRIVEN = replace(
-    ORDINARY, torque=TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
-)
+_LAW = TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
+_DRIVEN = replace(ORDINARY, torque=_LAW)
 # Squares and cubes of the factor must be in the range of binary64 too.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
 _OVERFLOW = Basis(

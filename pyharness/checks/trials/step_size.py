@@ -108,28 +108,26 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
     """Return omega's relative error at the end, not finite for an incomplete run, and a note."""
     largest = _path(case).flow.largest
-    note = ""
-    if listing is not None:
-        run = unstopped(listing).rows(scene)
-        if run.ended != "complete":
-            return math.inf, f"{run.ended} after {run.steps} steps"
-        omega = run.omega[-1]
-        singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
-        note = f"IER = 129 in {singular} of {run.steps} steps" if singular else ""
-    else:
-        omega = run_method(name, scene, TIME, None).omega
-    return float(np.abs(omega - _truth(case)).max()) / largest, note
+
+    def error(omega: Array) -> float:
+        return float(np.abs(omega - _truth(case)).max()) / largest
+
+    if listing is None:
+        return error(run_method(name, scene, TIME, None).omega), ""
+    run = unstopped(listing).rows(scene)
+    if run.ended != "complete":
+        return math.inf, f"{run.ended} after {run.steps} steps"
+    singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
+    note = f"IER = 129 in {singular} of {run.steps} steps" if singular else ""
+    return error(run.omega[-1]), note
 
 
 def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     """Return the check, against linear stability if it applies, of the smallest divergent step."""
     scene, method = case_scene(case), name.subject
-    if listing is None:
-        runner: Runner = method_candidate(method, 1.0).rows
-        scheme = Listing.corrected("runge-kutta" if SCHEMES[method].order == 4 else "two-term")
-    else:
-        runner = unstopped(listing).rows
-        scheme = listing
+    alike = "runge-kutta" if SCHEMES[method].order == 4 else "two-term"
+    scheme = listing or Listing.corrected(alike)
+    runner: Runner = (unstopped(listing) if listing else method_candidate(method, 1.0)).rows
     if case not in _SPINNING:
         found = smallest_divergent(scene, TIME, runner, SMALLEST * 1e2)
         return name.described(found, _from(found, TIME))

@@ -152,9 +152,6 @@ def _linear(seed: int) -> bytes:
     return bytes(factors.tobytes() + x.tobytes() + str(ier).encode())
 
 
-TRIAL = Trial(
-    "threads",
-    "the same calls from eight threads",
-    "No bit may differ, since calls share no state.",
-    _run,
-)
+TITLE = "the same calls from eight threads"
+BOUND = "No bit may differ, since calls share no state."
+TRIAL = Trial("threads", TITLE, BOUND, _run)

@@ -98,18 +98,14 @@ def summed(scene: Scene, time: float) -> Truth:
 def _wave(frequency: float) -> Circumstance:
     """Return a scene with waves of one `frequency` (rad/s) about all axes, for 500 radians."""
     size = 10.0 * frequency
-    law = TorqueLaw(
-        sines=(((4.0 * size, 0.0, 2.0 * size), frequency),),
-        cosines=(((0.0, 3.0 * size, 0.0), frequency),),
-    )
+    sine, cosine = ((4.0 * size, 0.0, 2.0 * size), frequency), ((0.0, 3.0 * size, 0.0), frequency)
+    law = TorqueLaw(sines=[sine], cosines=[cosine])
     return Circumstance(Scene("wave", _START, moments=_BODY, torque=law), 500.0 / frequency)
 
 
 def _spun(frequency: float, time: float, programs: bool) -> Circumstance:
-    law = TorqueLaw(
-        sines=(((0.0, 0.0, 3.0 * frequency), frequency),),
-        cosines=(((0.0, 0.0, 2.0 * frequency), frequency),),
-    )
+    sine, cosine = (((0.0, 0.0, factor * frequency), frequency) for factor in (3.0, 2.0))
+    law = TorqueLaw(sines=[sine], cosines=[cosine])
     scene = Scene("axial wave", _START, moments=_SYMMETRIC, torque=law, steps=100)
     return Circumstance(scene, time, axial, _LONG, programs)
 

@@ -12,7 +12,7 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, case_scene, solve
 from pyharness.checks.theory.rotations import SteadyRotation, rates, steady_rotations
-from pyharness.checks.theory.rotations_picture import growth_of_bodies, polhodes
+from pyharness.checks.theory.rotations_report import growth_of_bodies, polhodes
 from pyharness.cli.main import main
 from pyharness.engine.linearised import jacobians
 from pyharness.model.scene import Triple

@@ -9,8 +9,7 @@ import pytest
 from pyharness import InputError, Scene, solve, torques
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import draw, draw_ready
-from pyharness.checks.theory.conditioning import conditioning
-from pyharness.checks.theory.state_conditioning import conditioning_at
+from pyharness.checks.theory.conditioning import conditioning, conditioning_at
 from pyharness.model.state_torque import of_law
 
 

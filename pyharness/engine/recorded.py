@@ -1,4 +1,4 @@
-"""The equations of motion with a recorded torque, as the kernel reads them."""
+"""Scenes, and the equations of motion with a recorded torque, as the kernels read them."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.system import system_of
-from pyharness.model.codes import Operations
+from pyharness.engine.problem import normalized, normalized_in_space, remainders
+from pyharness.engine.system import is_recorded, system_of
+from pyharness.model.codes import Methods, Operations, Places
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import InputError
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape, evaluate, float_outputs
@@ -142,3 +145,41 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
     pairs[: len(integers)] = integers
     return pairs.view(np.float64)
+
+
+def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
+    """Return a scene and its method's settings as one array, in the order of `Places`."""
+    packed = _settings(code, scene.step_size, tolerance, effort)
+    if is_recorded(scene):
+        return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+    if scene.torque.in_space:
+        # The packed array has the moments, and therefore not their ratios.
+        coefficients, _, constant, rate, sines, cosines = normalized_in_space(scene)
+    else:
+        coefficients, constant, rate, sines, cosines = normalized(scene)
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
+    packed[Places.CONSTANT : Places.RATE] = constant
+    packed[Places.RATE : Places.EFFORT] = rate
+    packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
+    packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
+    packed[Places.MOMENTS_LOW : Places.ROUNDED] = scene.moments_low
+    packed[Places.ROUNDED] = isinstance(scene, PrincipalScene)
+    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
+
+
+def packed_tape(tape: Tape, step_size: float, tolerance: float, effort: float) -> Array:
+    """Return equations of motion and settings as one array."""
+    return np.concatenate(
+        [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
+    )
+
+
+def _settings(code: int, step_size: float, tolerance: float, effort: float) -> Array:
+    packed = np.zeros(Places.WAVES)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = step_size
+    packed[Places.EFFORT] = effort
+    return packed

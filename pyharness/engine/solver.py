@@ -11,9 +11,9 @@ import numpy as np
 
 from pyharness.engine.compiled_call import CompiledCall, compiled_call
 from pyharness.engine.many_prepared import many_starts, many_states
-from pyharness.engine.packed import packed_scene
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan
 from pyharness.engine.problem import estimate_or_none
+from pyharness.engine.recorded import packed_scene
 from pyharness.engine.registry import FIXED_STEP, GAUSS
 from pyharness.engine.sensitivity import (
     closed_form_estimate,

@@ -91,12 +91,12 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver that imports `name` when called; with `arguments`, `name` is its factory."""
+    """Return a solver that imports `name` when called; `arguments` are its first ones."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
-        trajectory: Trajectory = (solver(*arguments) if arguments else solver)(*given)
-        return trajectory
+        found: Trajectory = solver(*arguments, *given)
+        return found
 
     return solve
 
@@ -132,7 +132,7 @@ def _gauss(stages: int) -> Method:
 
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
-    solve = _from("fixed_step", "fixed_step", name)
+    solve = _from("gauss", "fixed_step", name)
     return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
 
 

@@ -140,9 +140,7 @@ def keyboard() -> Iterator[_Keyboard]:
 def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rooms = [
-        f"engine.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many_scenes")
-    ]
+    rooms = [f"engine.{each}" for each in ("taylor", "closed_form", "gauss", "many_scenes")]
     for each in (*rooms, "thesis.compiled", "thesis.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

@@ -102,20 +102,13 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
-    source = f"scipy.integrate.solve_ivp; {source}"
+    # The others' interpolants are less accurate than their steps.
+    gives_steps = scipy in ("DOP853", "LSODA")
+    source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
-        scipy.lower(),
-        title,
-        source,
-        FINEST[scipy],
-        _SCIPY_DEFAULT,
-        scipy_method(scipy),
-        # The others' interpolants are less accurate than their steps.
-        gives_steps=scipy in ("DOP853", "LSODA"),
-        attitude=True,
-        state_torque=True,
-        scipy=scipy,
-    )
+        scipy.lower(), title, source, FINEST[scipy], _SCIPY_DEFAULT, solve, scipy=scipy,
+        gives_steps=gives_steps, attitude=True, state_torque=True,
+    )  # fmt: skip
 
 
 def _gauss(stages: int) -> Method:
@@ -136,6 +129,7 @@ def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int
     return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
 
 
+_SERIES: Any = dict.fromkeys(("gives_steps", "attitude", "space_torque", "state_torque"), True)
 REGISTRY = {
     method.name: method
     for method in (
@@ -146,10 +140,7 @@ REGISTRY = {
             1e-15,
             _DEFAULT,
             _from("solve", "by_plan"),
-            gives_steps=True,
-            attitude=True,
-            space_torque=True,
-            state_torque=True,
+            **_SERIES,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
         _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
@@ -162,10 +153,7 @@ REGISTRY = {
             1e-15,
             _DEFAULT,
             _from("taylor", "taylor"),
-            gives_steps=True,
-            attitude=True,
-            space_torque=True,
-            state_torque=True,
+            **_SERIES,
         ),
         Method(
             "reference",
@@ -217,10 +205,9 @@ REGISTRY = {
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# The methods with a prepared solver for a torque that depends on the state.
+# The methods with a prepared solver for a torque that depends on the state; they alone integrate a
+# scene's own states.
 PREPARED_FOR_STATE = ("auto", "taylor")
-# The methods that integrate a scene's own states.
-WITH_STATES = ("auto", "taylor")
 # SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
@@ -271,32 +258,28 @@ def check_prepared(scene: Scene, method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if the method can't solve the scene because of its torque or inertia."""
     torque, chosen = scene.torque, REGISTRY[method]
-    if scene.states and method not in WITH_STATES:
+    if scene.states and method not in PREPARED_FOR_STATE:
         raise InputError(
             f"method {method} can't solve a scene with states of its own; "
-            f"allowed: {', '.join(WITH_STATES)}"
+            f"allowed: {', '.join(PREPARED_FOR_STATE)}"
         )
-    kind = "a torque about the axes of space"
-    able: list[str] = []
+    kind, needed = "a torque about the axes of space", ""
     if isinstance(torque, StateTorque):
         kind = "a recorded torque, which is no TorqueLaw"
         if torque.needs_attitude:
             kind = "a torque that depends on the attitude"
         if torque.tape is None and not chosen.scipy:
-            kind, able = "an opaque torque", list(SCIPY_METHODS)
+            kind, needed = "an opaque torque", "scipy"
         elif chosen.weak_torque and scene.changing is not None:
-            kind = "an inertia that changes with time"
-            able = [each.name for each in REGISTRY.values() if each.state_torque]
+            kind, needed = "an inertia that changes with time", "state_torque"
         elif not (chosen.state_torque or (chosen.weak_torque and not torque.needs_attitude)):
-            able = [each.name for each in REGISTRY.values() if each.state_torque]
+            needed = "state_torque"
     elif scene.changing is not None and not chosen.state_torque:
-        kind = "an inertia that changes with time"
-        able = [each.name for each in REGISTRY.values() if each.state_torque]
+        kind, needed = "an inertia that changes with time", "state_torque"
     elif torque.in_space and not chosen.space_torque and scene.changing is None:
-        able = [each.name for each in REGISTRY.values() if each.space_torque]
-    if able:
-        raise InputError(
-            f"method {method} can't solve a scene with {kind}; allowed: {', '.join(able)}"
-        )
+        needed = "space_torque"
+    if needed:
+        able = ", ".join(each.name for each in REGISTRY.values() if getattr(each, needed))
+        raise InputError(f"method {method} can't solve a scene with {kind}; allowed: {able}")
     if torque.needs_attitude and not attitude:
         raise InputError(f"{kind} needs the attitude; give attitude=True, or --attitude FORM")

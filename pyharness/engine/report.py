@@ -1,6 +1,5 @@
 """The reports of the commands `run` and `plan`, and the picture of a trajectory."""
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,25 +76,27 @@ def trajectory_report(
         np.column_stack([steps, rows[:, kept]]),
     )
 
+    bounds: list[str] = []
+    if bound is not None:
+        bounds.append(f"reference: error of any omega at most {bound.text()}")
+        if bound.turned is not None:
+            bounds.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
+        bounds += [f"WARNING: {bound.warning}"] if bound.warning else []
+
     def record() -> dict[str, Any]:
         from pyharness.model import records
 
+        names = ("time", "recorded_time", "omega", "velocity", "attitude")
+        arrays = {name: getattr(trajectory, name) for name in names}
+        states = {name: x.tolist() for name, x in trajectory.states.items()}
         return {
             "scene": records.scene_record(scene),
             "method": method,
             "listing": None if listing is None else records.listing_record(listing),
             **({} if word is None else {"word": word}),
             "trajectory": {
-                "time": trajectory.time.tolist(),
-                "recorded_time": trajectory.recorded_time.tolist(),
-                "omega": trajectory.omega.tolist(),
-                "velocity": None if velocity is None else velocity.tolist(),
-                "attitude": None if attitude is None else attitude.tolist(),
-                **(
-                    {"states": {name: x.tolist() for name, x in trajectory.states.items()}}
-                    if trajectory.states
-                    else {}
-                ),
+                **{name: None if x is None else x.tolist() for name, x in arrays.items()},
+                **({"states": states} if states else {}),
                 "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },
@@ -110,21 +111,12 @@ def trajectory_report(
         text=[
             [*heading(scene, filter(None, [listing])), title],
             [counted],
-            [ending(trajectory), *estimates(trajectory), *_bounds(bound)],
+            [ending(trajectory), *estimates(trajectory), *bounds],
         ],
         record=record,
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
     )
-
-
-def _bounds(bound: "ErrorBound | None") -> list[str]:
-    if bound is None:
-        return []
-    lines = [f"reference: error of any omega at most {bound.text()}"]
-    if bound.turned is not None:
-        lines.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
-    return lines + ([f"WARNING: {bound.warning}"] if bound.warning else [])
 
 
 def _shown(attitude: Array, form: str) -> Array:
@@ -172,13 +164,13 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
     """Return the report of a plan: the method, the computed parts, and the reasons."""
     table = Table(
         words("part computed why"),
-        [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],
+        [[part, "yes" if kept else "no", why] for part, kept, why in plan.decisions],
     )
 
     def record() -> dict[str, Any]:
         from pyharness.model.records import scene_record
 
-        decisions = [asdict(each) for each in plan.decisions]
+        decisions = [each._asdict() for each in plan.decisions]
         found = {"method": plan.method, "closed_form": plan.closed_form, "decisions": decisions}
         supplied = assumption_records([(scene, [])])
         return {"scene": scene_record(scene), "plan": found, "assumptions": supplied}

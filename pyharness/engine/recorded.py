@@ -3,16 +3,17 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.problem import normalized, normalized_in_space, remainders
 from pyharness.engine.system import is_recorded, system_of
-from pyharness.model.codes import Methods, Operations, Places
+from pyharness.model.codes import Methods, Operations, Places, Statuses
 from pyharness.model.constant_body import with_constant_body
-from pyharness.model.errors import InputError
+from pyharness.model.errors import SLIDING, InputError, TimedError
+from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
@@ -36,6 +37,11 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
+# The largest order in fortran/modern/tape_series.f90, plus 1.
+_N_TERMS = 29
+# The first trial step, in the user's unit of time. Its length hardly matters, because the series
+# gives any shorter step, or one up to 16 times longer.
+LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
@@ -183,3 +189,41 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
     packed[Places.STEP] = step_size
     packed[Places.EFFORT] = effort
     return packed
+
+
+class Step(NamedTuple):
+    """A step of length `h`, 0 if no step is short enough.
+
+    `terms`, shape (order + 1, n), include powers of `h`; `state`, shape (n,), is their sum.
+    `expansions` is the number of series computed.
+    """
+
+    h: float
+    terms: Array
+    state: Array
+    expansions: int
+
+
+def taylor_step(
+    tape: Array,
+    t: float,
+    state: Array,
+    tolerances: Array,
+    relative: float,
+    trial: float,
+    longest: float,
+) -> Step:
+    """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
+
+    `tolerances`, shape (n,), are the largest errors of the components; the relative tolerance
+    determines the order. `trial` is a guess of the step, with the sign of the `longest` step. Raise
+    InputError where a switch would change back and forth without end.
+    """
+    h, terms, end, order, expansions, status = extension().tape_step(
+        tape, t, state, tolerances, relative, trial, longest, _N_TERMS
+    )
+    if status == Statuses.SLIDING:
+        raise TimedError(SLIDING, t)
+    if status != COMPLETE:
+        h = 0.0
+    return Step(h, terms[: order + 1], end, expansions)

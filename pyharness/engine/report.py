@@ -1,10 +1,13 @@
 """The reports of the commands `run` and `plan`, and the picture of a trajectory."""
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.assumptions import assumption_records
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
@@ -177,3 +180,26 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
 
     head = [*heading(scene), f"method: {plan.method}"]
     return Report("plan", text=[head, [table]], record=record, data=table)
+
+
+def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> "ErrorBound | None":
+    """Return the proved or estimated error of a trajectory by `reference`; None if not finite."""
+    from pyharness.truth.bounded import error_bound
+
+    start = None if found.attitude is None else scene.attitude or IDENTITY
+    scene = replace(scene, attitude=start)
+    largest = max(*map(abs, scene.omega), float(np.abs(found.omega).max(initial=0.0)))
+    claimed = math.inf if found.error is None else found.error
+    bound = error_bound(
+        scene,
+        found.time,
+        found.omega,
+        claimed * (largest or 1.0),
+        found.attitude,
+        claimed,
+        any_torque=True,
+        effort=effort,
+    )
+    if bound.angle is not None and not math.isfinite(bound.angle):
+        bound = bound._replace(angle=None, angle_basis=None)
+    return bound if math.isfinite(bound.value) else None

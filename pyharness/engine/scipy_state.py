@@ -13,8 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, RightHandSide, Run, rows_of
-from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
+from pyharness.engine.scipy_run import (
+    FINEST_STEP,
+    NoNumberError,
+    RightHandSide,
+    Run,
+    Span,
+    bounds_of,
+    rows_of,
+    series_beside,
+)
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.system import slopes_of
 from pyharness.model.dense_output import DenseOutput, Pieces

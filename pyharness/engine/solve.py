@@ -291,14 +291,16 @@ def ascending_times(times: object) -> tuple[list[float], bool]:
     """Return ascending times (s), and whether they were descending; or raise InputError."""
     if unit_of(times):
         number("times", times)
-    if _are_ascending_floats(times):
-        return times.tolist(), False  # type: ignore[attr-defined]
+    most = most_steps()
+    if isinstance(times, np.ndarray) and (times.dtype, times.ndim) == (np.float64, 1):
+        is_finite = 0 < len(times) <= most and np.isfinite(times).all()
+        if is_finite and (np.diff(times) > 0.0).all():
+            return times.tolist(), False
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
         times = times.tolist()
     entries = number_list("times", times, "allowed: a number, or numbers in order")
-    most = most_steps()
     values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:
         raise InputError("times: none is given; give at least one time")
@@ -314,12 +316,3 @@ def ascending_times(times: object) -> tuple[list[float], bool]:
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
         raise InputError("times: not strictly monotonic; give increasing or decreasing times")
     return values, turned
-
-
-def _are_ascending_floats(times: object) -> bool:
-    return (
-        isinstance(times, np.ndarray)
-        and (times.dtype, times.ndim) == (np.float64, 1)
-        and 0 < len(times) <= most_steps()
-        and bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all())
-    )

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.engine.recorded import kernel_tape
+from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.engine.singular import SingularError, undefined_operation
 from pyharness.engine.system import is_recorded
-from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import with_constant_body

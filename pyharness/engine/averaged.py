@@ -102,26 +102,21 @@ def averaged(
     torque must be a polynomial in omega and time, times waves; any other may change within a
     macro-step.
     """
-    coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
-    if coordinates is None:
-        raise InputError(
-            "averaged: without torque, omega would not rotate about a principal axis; allowed: a "
-            "body that is no sphere, and a motion that is not on the separatrix"
-        )
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
-        return _Run(scene, coordinates, times, tolerance, effort).trajectory()
+        return _Run(scene, times, tolerance, effort).trajectory()
 
 
 class _Run:
     def __init__(
-        self,
-        scene: Scene,
-        coordinates: Coordinates,
-        times: Sequence[float],
-        tolerance: float,
-        effort: float,
+        self, scene: Scene, times: Sequence[float], tolerance: float, effort: float
     ) -> None:
+        coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
+        if coordinates is None:
+            raise InputError(
+                "averaged: without torque, omega would not rotate about a principal axis; allowed: "
+                "a body that is no sphere, and a motion that is not on the separatrix"
+            )
         self.scene, self.coordinates, self.times = scene, coordinates, times
         self.tolerance, self.effort = tolerance, effort
         self.torque, self.varies = torque_of(scene)

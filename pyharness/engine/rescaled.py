@@ -10,16 +10,20 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.engine.steps import transformed_steps
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
 from pyharness.model.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pyharness.engine.registry import Method
 
 # The exponents of rescaled time are multiples of this number, so that those of nested square roots
 # are whole numbers.
@@ -71,9 +75,26 @@ def is_ordinary(omega: Triple) -> bool:
     return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
 
 
-def has_ordinary_rows(found: Trajectory) -> bool:
-    """Return whether a trajectory has all rows, and no omega above 2**300 rad/s."""
-    return found.has_all_rows and float(np.abs(found.omega).max(initial=0.0)) <= _LARGE
+def integrate(
+    method: "Method", scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
+) -> Trajectory:
+    """Return the trajectory on one side of 0, computed in a suitable unit of time."""
+    if not method.is_fixed_step and not is_ordinary(scene.omega):
+        # The method does not use the step size, but in the new unit it might not be finite.
+        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
+    factor = 1.0 if method.any_scale or scene.states else rescaling_factor(scene, times[-1])
+    if factor == 1.0:
+        return method.solve(scene, times, tolerance, effort, *more)
+    faster = [t / factor for t in times]
+    try:
+        found = method.solve(scaled(scene, factor), faster, tolerance, effort, *more)
+    except TimedError as refusal:
+        raise refusal.slower(factor) from refusal.__cause__
+    largest = float(np.abs(found.omega).max(initial=0.0))
+    if isinstance(scene.torque, StateTorque) and not (found.has_all_rows and largest <= _LARGE):
+        # The torque causes a larger omega than estimated.
+        return method.solve(scene, times, tolerance, effort, *more)
+    return unscaled(found, times, factor)
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:

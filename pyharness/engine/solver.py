@@ -204,7 +204,7 @@ class Solver(BoundKernel[Result]):
 
         It is `plan.method`, unless the kernel chose `quick` or `taylor`, or used `plan.fallback`.
         """
-        steps = self._counted()
+        steps = 0 if self._ending is None else self._ending[1]  # negative if it chose `quick`
         if not steps:
             return self.plan.method
         if self.plan.method == RK4_OR_TAYLOR:
@@ -240,12 +240,7 @@ class Solver(BoundKernel[Result]):
     @property
     def steps(self) -> int:
         """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
-        return abs(self._counted())
-
-    def _counted(self) -> int:
-        """Return the steps of the last call, negative if the kernel chose `quick`."""
-        ending = self._ending
-        return 0 if ending is None else ending[1]
+        return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
         ending = self._ending

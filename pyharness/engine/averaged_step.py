@@ -84,13 +84,8 @@ def fast_nodes(count: int) -> Fast:
     divided = np.zeros_like(waves)
     divided[:, 1:-1] = waves[:, 1:-1] / (1j * np.arange(1, waves.shape[1] - 1))
     integral = np.fft.irfft(divided, n=count, axis=1)
-    return Fast(
-        angles,
-        np.cos(angles),
-        np.sin(angles),
-        np.full(count, 1.0 / count),
-        integral - integral[:, :1],
-    )
+    mean = np.full(count, 1.0 / count)
+    return Fast(angles, np.cos(angles), np.sin(angles), mean, integral - integral[:, :1])
 
 
 def between_nodes(count: int, at: Array) -> Array:

@@ -150,12 +150,8 @@ def _lanes(
     with np.errstate(all="ignore"):
         if kind == "moments":
             first, second, third = moments = np.where(rows[kind] > 0.0, rows[kind], np.nan).T
-            differences = (
-                (second - third) / first,
-                (third - first) / second,
-                (first - second) / third,
-            )
-            columns = [*differences, *(1.0 / moments)]
+            differences = np.array([second - third, third - first, first - second])
+            columns = [*(differences / moments), *(1.0 / moments)]
         elif kind == "coefficients":
             columns = [*rows[kind].T, *np.ones((3, 1))]
         else:

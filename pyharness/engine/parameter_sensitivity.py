@@ -117,7 +117,11 @@ def sensitivities_at(
         return {}
     times, attitude = found.time, found.attitude is not None
     if scene.states or has_switches(scene.torque):
-        return _differentiate(scene, names, states)
+        slopes = {
+            name: [_extrapolate(name, *move, states) for move in _moves(scene, name)]
+            for name in names
+        }
+        return {name: np.stack(each, 2) for name, each in slopes.items()}
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
     # Closed forms alone take no evaluations.
@@ -212,20 +216,6 @@ def _by_periods(
     change = k * (shear @ starts + forced) + 0.5 * k * (k - 1.0) * drift
     found = transition[place[:-1]] @ change + rows[place[:-1]]
     return {name: columns[name] for name in names}, found
-
-
-def _differentiate(scene: Scene, names: Sequence[str], states: States) -> dict[str, Array]:
-    """Return the derivatives of n states by each parameter, (n, m, k) for k values.
-
-    Raise InputError if the states do not depend smoothly on a parameter, as where a switch is only
-    touched, or if one is not the number of a torque that can be changed.
-    """
-    return {
-        name: np.stack(
-            [_extrapolate(name, moved, size, states) for moved, size in _moves(scene, name)], 2
-        )
-        for name in names
-    }
 
 
 def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states: States) -> Array:

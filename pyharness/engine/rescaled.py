@@ -40,14 +40,6 @@ def scaled(scene: Scene, factor: float) -> Scene:
     Raise InputError if the torque depends on the state and can't be rescaled, or if the inertia
     changes with time.
     """
-    is_constant = scene.changing is None
-    tape = _tape(scene.torque, factor) if isinstance(scene.torque, StateTorque) else None
-    if is_constant and tape is not None:
-        first, second, third = (factor * each for each in scene.omega)
-        torque = StateTorque(tape, None, scene.torque.needs_attitude)
-        step = scene.step_size / factor
-        return replace(scene, omega=(first, second, third), torque=torque, step_size=step)
-    law = scene.law
 
     def times(values: Triple, power: int) -> Triple:
         # The square of the factor may overflow.
@@ -56,18 +48,21 @@ def scaled(scene: Scene, factor: float) -> Scene:
             values = first * factor, second * factor, third * factor
         return values
 
-    return replace(
-        scene,
-        omega=times(scene.omega, 1),
-        torque=replace(
+    torque = scene.torque
+    tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
+    if tape is not None and scene.changing is None:
+        torque = StateTorque(tape, None, torque.needs_attitude)
+    else:
+        law = scene.law
+        torque = replace(
             law,
             constant=times(law.constant, 2),
             rate=times(law.rate, 3),
             sines=tuple((times(a, 2), f * factor) for a, f in law.sines),
             cosines=tuple((times(a, 2), f * factor) for a, f in law.cosines),
-        ),
-        step_size=scene.step_size / factor,
-    )
+        )
+    step_size = scene.step_size / factor
+    return replace(scene, omega=times(scene.omega, 1), torque=torque, step_size=step_size)
 
 
 def is_ordinary(omega: Triple) -> bool:

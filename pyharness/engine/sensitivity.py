@@ -1,6 +1,7 @@
 """Sensitivity of a motion to rounding errors."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -88,7 +89,9 @@ def closed_form_estimate(
 def motion_growth(scene: Scene, t_end: float) -> float | None:
     """Return the error amplification of a motion until `t_end` (s), or None if unknown."""
     if isinstance(scene.torque, StateTorque):
-        return _recorded_growth(scene, t_end)
+        with suppress(InputError):
+            return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
+        return None
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)
         if growth is not None:
@@ -100,10 +103,3 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
         *normalized(near_one), near_one.omega, [t_end / factor], _COARSE, effort=work
     )
     return estimate_or_none(work[3]) if n_rows else None
-
-
-def _recorded_growth(scene: Scene, t_end: float) -> float | None:
-    try:
-        return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
-    except InputError:
-        return None

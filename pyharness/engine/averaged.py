@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pyharness.engine.averaged_coordinates import Coordinates, fastest_of, torque_of
-from pyharness.engine.averaged_step import MacroStep, NotResolvedError
+from pyharness.engine.averaged_step import MacroStep, NotResolvedError, fast_nodes
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.sensitivity import is_sensitive
 from pyharness.model.array_type import Array
@@ -195,9 +195,10 @@ class _Run:
     def _forecast(self) -> float:
         """Return a first guess of the length (rad) of the next macro-step."""
         point = self.point
-        slopes = self.forward * MacroStep.mean_slopes(
-            self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
-        )
+        fast, times = fast_nodes(_FEWEST_ANGLES), np.full(_FEWEST_ANGLES, self.begin[0])
+        slopes = self.forward * self.coordinates.slopes(
+            point[:, None], times, fast.cosine, fast.sine, self.torque, 0.0
+        ).mean(axis=-1)
         square = float(point[0] * point[0] + point[1] * point[1])
         low = float(min(point[2], point[2] + self.coordinates.bend * square))
         # Relative changes per radian of the distance from the separatrix, of x and y, and of the

@@ -178,18 +178,6 @@ class MacroStep:
         self.stroboscopic, self._waves = mean, waves
         self.error = self._measured()
 
-    @staticmethod
-    def mean_slopes(
-        coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
-    ) -> Array:
-        """Return d/dpsi of a point, averaged over psi, shape (4,)."""
-        fast = fast_nodes(angles)
-        times = np.full(angles, time)
-        found: Array = coordinates.slopes(
-            point[:, None], times, fast.cosine, fast.sine, torque, 0.0
-        ).mean(axis=-1)
-        return found
-
     def _check(self, mean: Array) -> None:
         """Set the largest modulus; raise NotResolvedError unless it is below 1."""
         self.modulus = float(self.coordinates.modulus(mean).max())

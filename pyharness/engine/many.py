@@ -46,6 +46,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, finite
 
+_PLAIN, _TILTED = -2, -1  # kinds of scenes about principal axes, and with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
@@ -258,15 +259,12 @@ def _solve(
                 f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
                 "scenes without arrays"
             )
-        if any(_is_special(each) for each in scene):
-            if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
-                is_solved_alone(each, {}) for each in scene
-            ):
-                return _solve_groups(scene, t_end, step, out, **settings)
-            check_alike(scene)
-            own, axes, turns = about_principal(from_scenes(scene))
-        else:
-            own = from_scenes(scene)
+        kinds = [_kind_of(each, row) for row, each in enumerate(scene)]
+        if len(set(kinds)) > 1 or max(kinds, default=_PLAIN) >= 0:
+            return _solve_groups(scene, kinds, t_end, step, out, **settings)
+        own = from_scenes(scene)
+        if kinds[0] == _TILTED:
+            own, axes, turns = about_principal(own)
         step_size = scene[0].step_size
     if step is not None:
         step_size = finite("step", step)
@@ -287,14 +285,15 @@ def _solve(
     return found
 
 
-def _is_special(scene: Scene) -> bool:
+def _kind_of(scene: Scene, row: int) -> int:
+    """Return a number that scenes for one kernel call share."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    return scene.inertia is not None or is_solved_alone(scene, {})
+    return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 
 
 def _solve_groups(
-    scenes: Sequence[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
-    **settings: Any,
+    scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
+    out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of scenes that one kernel call can't solve."""
     check_alike(scenes)
@@ -306,8 +305,7 @@ def _solve_groups(
     found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
     expect_bodies(n)
     groups: dict[int, list[int]] = {}
-    for row, each in enumerate(scenes):
-        kind = row if is_solved_alone(each, {}) else -1 if each.inertia is not None else -2
+    for row, kind in enumerate(kinds):
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]

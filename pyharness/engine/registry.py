@@ -38,10 +38,10 @@ class Method:
     title: str
     source: str
     finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
+    solve: Integrator  # called with checked times on one side of 0, in order away from 0
     # Default tolerance, 1e-9 or the smallest that the method meets in ordinary scenes within a
     # fraction of its work limit; 1 if the method takes no tolerance.
-    default: float
-    solve: Integrator  # called with checked times on one side of 0, in order away from 0
+    default: float = _DEFAULT
     gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
     # Takes a fifth argument, whether `sol` has the steps.
     gives_steps: bool = False
@@ -106,7 +106,7 @@ def _scipy(scipy: str, title: str, source: str) -> Method:
     gives_steps = scipy in ("DOP853", "LSODA")
     source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
-        scipy.lower(), title, source, FINEST[scipy], _SCIPY_DEFAULT, solve, scipy=scipy,
+        scipy.lower(), title, source, FINEST[scipy], solve, _SCIPY_DEFAULT, scipy=scipy,
         gives_steps=gives_steps, attitude=True, state_torque=True,
     )  # fmt: skip
 
@@ -117,8 +117,8 @@ def _gauss(stages: int) -> Method:
         f"Gauss collocation of order {2 * stages}, steps halved until two agree",
         "fortran/modern/gauss_collocation.f90; Hairer, McLachlan and Razakarivony 2008",
         _GAUSS_FINEST[stages - 1],
-        _DEFAULT if stages > 1 else _ONE_STAGE_DEFAULT,
         _from("gauss", "gauss", stages),
+        _DEFAULT if stages > 1 else _ONE_STAGE_DEFAULT,
         order=2 * stages,
     )
 
@@ -126,7 +126,7 @@ def _gauss(stages: int) -> Method:
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
     solve = _from("gauss", "fixed_step", name)
-    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
+    return Method(name, title, source, 1.0, solve, 1.0, order=order, evaluations=evaluations)
 
 
 _SERIES: Any = dict.fromkeys(("gives_steps", "attitude", "space_torque", "state_torque"), True)
@@ -138,7 +138,6 @@ REGISTRY = {
             "closed form where there is one, else Taylor series",
             "pyharness.engine.plan",
             1e-15,
-            _DEFAULT,
             _from("solve", "by_plan"),
             **_SERIES,
         ),
@@ -151,7 +150,6 @@ REGISTRY = {
             "Taylor series by recurrence, step and order adapted",
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
-            _DEFAULT,
             _from("taylor", "taylor"),
             **_SERIES,
         ),
@@ -160,7 +158,6 @@ REGISTRY = {
             "known solution, or Taylor series in decimal arithmetic",
             "pyharness.truth.reference",
             2.0**-52,
-            _DEFAULT,
             _reference,
             any_scale=True,
             attitude=True,
@@ -171,7 +168,6 @@ REGISTRY = {
             "known solution: sphere, or any body without torque by elliptic functions",
             "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
             1e-14,
-            _DEFAULT,
             _from("closed_form", "known_solution"),
             any_scale=True,
             attitude=True,
@@ -181,7 +177,6 @@ REGISTRY = {
             "two-scale averaging, for weak torques over very many revolutions",
             "ours; Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics 61",
             1e-13,
-            _DEFAULT,
             _from("averaged", "averaged"),
             weak_torque=True,
         ),
@@ -195,7 +190,6 @@ REGISTRY = {
             "fortran/modern/scaled_runge_kutta.f90",
             # At smaller tolerances the rounding errors of its many steps would matter.
             1e-12,
-            _DEFAULT,
             _no_rows,
             gives_rows=False,
         ),

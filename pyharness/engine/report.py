@@ -56,20 +56,16 @@ def trajectory_report(
     is the arithmetic of a thesis program, None for binary64. `bound` is the error bound of the
     method `reference`.
     """
-    columns = [*_TIMES, *_OMEGA]
-    parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
-    velocity = trajectory.velocity
-    if velocity is not None:
-        columns += _VELOCITY
-        parts.append(velocity)
-    attitude = trajectory.attitude
-    if attitude is not None:
-        columns += _ATTITUDE[form]
-        parts.append(_shown(attitude, form))
-    for name, values in trajectory.states.items():
-        columns.append(Column(name, _NUMBER, name=name))
-        parts.append(values)
-    rows = np.column_stack(parts)
+    times = np.column_stack([trajectory.time, trajectory.recorded_time])
+    blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
+    if trajectory.velocity is not None:
+        blocks.append((_VELOCITY, trajectory.velocity))
+    if trajectory.attitude is not None:
+        blocks.append((_ATTITUDE[form], _shown(trajectory.attitude, form)))
+    states = trajectory.states
+    blocks += [((Column(name, _NUMBER, name=name),), states[name]) for name in states]
+    columns = [column for each, _ in blocks for column in each]
+    rows = np.column_stack([values for _, values in blocks])
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
     # The nine elements of a matrix fill the width of a terminal; all else but time is omitted.
@@ -91,7 +87,6 @@ def trajectory_report(
 
         names = ("time", "recorded_time", "omega", "velocity", "attitude")
         arrays = {name: getattr(trajectory, name) for name in names}
-        states = {name: x.tolist() for name, x in trajectory.states.items()}
         return {
             "scene": records.scene_record(scene),
             "method": method,
@@ -99,7 +94,7 @@ def trajectory_report(
             **({} if word is None else {"word": word}),
             "trajectory": {
                 **{name: None if x is None else x.tolist() for name, x in arrays.items()},
-                **({"states": states} if states else {}),
+                **({"states": {name: x.tolist() for name, x in states.items()}} if states else {}),
                 "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },

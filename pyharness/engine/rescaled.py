@@ -192,7 +192,7 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
         operations.append(operation)
         return N_INPUTS + len(operations) - 1
 
-    def at(slot: int, power: int) -> int:
+    def copy_slot(slot: int, power: int) -> int:
         """Return a new slot that has the original value of `slot`, times 2**power."""
         if exponents[slot] == power:
             return places[slot]
@@ -221,10 +221,10 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
                     power = powers[0] + (powers[1] if kind == "product" else -powers[1])
             elif kind == "select":
                 power = powers[1]
-                other = at(operands[2], power)
+                other = copy_slot(operands[2], power)
                 found = Operation(kind, (places[operands[0]], places[operands[1]], other))
             else:
-                found = Operation(kind, tuple(at(slot, 0) for slot in operands))
+                found = Operation(kind, tuple(copy_slot(slot, 0) for slot in operands))
             places.append(append(found))
             exponents.append(power)
         return Tape(tuple(operations), tuple(combine(each, 2 * exponent) for each in tape.outputs))

@@ -25,10 +25,10 @@ from pyharness.engine.many_scenes import (
 )
 from pyharness.engine.parameter_sensitivity import checked_names
 from pyharness.engine.parameters import tape_of_bodies
-from pyharness.engine.prepared import prepare
 from pyharness.engine.recorded import packed_tape
 from pyharness.engine.registry import check_prepared, check_torque, requested_tolerance
 from pyharness.engine.solve import solve
+from pyharness.engine.solver import prepare
 from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spread, threads_of
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for

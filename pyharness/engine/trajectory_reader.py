@@ -112,21 +112,19 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         stop = Stop(**header["stop"])
         _require(stop.variable in STOP_VARIABLES and type(stop.quotient) is float)
         stop = replace(stop, step=_count(stop.step))
+    rows["ended"] = header["ended"]
     for name in ("error", "growth", "tolerance"):
         _require(header[name] is None or type(header[name]) is float)
+        rows[name] = header[name]
     return Trajectory(
         **rows,
-        own=own,
-        axes=axes,
         steps=_count(header["steps"]),
         evaluations=_count(header["evaluations"]),
-        ended=header["ended"],
+        own=own,
+        axes=axes,
         stop=stop,
         moments=_moments(header["moments"]),
         scene=scene,
-        error=header["error"],
-        growth=header["growth"],
-        tolerance=header["tolerance"],
         t_events=t_events,
         y_events=y_events,
         sensitivities=sensitivities,

@@ -8,10 +8,10 @@ from pyharness.checks.compare.comparison import compare_programs as compare_prog
 from pyharness.checks.compare.findings import Comparison as Comparison
 from pyharness.engine.compiled_call import get_include as get_include
 from pyharness.engine.many import solve_many as solve_many
-from pyharness.engine.prepared import prepare as prepare
 from pyharness.engine.scene_reader import read_scene as read_scene
 from pyharness.engine.solve import solve as solve
 from pyharness.engine.solver import Solver as Solver
+from pyharness.engine.solver import prepare as prepare
 from pyharness.engine.stepper import Stepper as Stepper
 from pyharness.engine.table_terms import inertia_table as inertia_table
 from pyharness.engine.taylor_ivp import Taylor as Taylor

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pyharness.engine.prepared import prepare
 from pyharness.engine.problem import closed_form
+from pyharness.engine.solver import prepare
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 

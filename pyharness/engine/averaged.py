@@ -10,13 +10,12 @@ Schroedinger equations, Numerische Mathematik 129.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from pyharness.engine.averaged_coordinates import Coordinates
-from pyharness.engine.averaged_step import MacroStep, NotResolvedError
-from pyharness.engine.averaged_torque import fastest_of, torque_of
+from pyharness.engine.averaged_coordinates import Coordinates, fastest_of, torque_of
+from pyharness.engine.averaged_step import MacroStep, NotResolvedError, fast_nodes
 from pyharness.engine.problem import rows_trajectory
 from pyharness.engine.sensitivity import is_sensitive
 from pyharness.model.array_type import Array
@@ -25,9 +24,9 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-_PHASES = 8  # angles psi, in a revolution, of initial perturbations
+# Cosines and sines of the angles psi, in a revolution, of initial perturbations.
+_PSI = np.cos(0.25 * math.pi * np.arange(8)), np.sin(0.25 * math.pi * np.arange(8))
 _MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
-
 
 NODES = 20  # in a macro-step
 _TURN = 2.0 * math.pi
@@ -63,50 +62,32 @@ class Done(NamedTuple):
     error: Array  # shape (4,); error of the point at the end
     transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
 
-    @classmethod
-    def from_start(
-        cls, coordinates: Coordinates, start: Array, error: Array, transition: Array
-    ) -> Self:
-        """Return a completed macro-step, with `by_omega` computed at its start."""
-        phases = 2.0 * math.pi / _PHASES * np.arange(_PHASES)
-        cosine, sine = np.cos(phases), np.sin(phases)
-        omega = coordinates.omega(start[:, None], cosine, sine)[0]
-        by_omega = coordinates.by_omega(np.array(omega), cosine, sine)
-        return cls(start, by_omega, error, transition)
-
 
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
     """Return the largest error of omega (rad/s) and amplification, at up to five ends of steps."""
-    count = len(done)
-    error, growth = _estimate_end(coordinates, coefficients, done, omega, angle)
-    for n in range(1, count, -(-count // _MOST_ENDS)):
-        start = done[n].start[:, None]
-        there = np.concatenate(coordinates.omega(start, np.ones(1), np.zeros(1))[0])
-        other_error, other_growth = _estimate_end(coordinates, coefficients, done[:n], there, 0.0)
-        error, growth = max(error, other_error), max(growth, other_growth)
-    return error, growth
-
-
-def _estimate_end(
-    coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
-) -> tuple[float, float]:
-    """Return the error of omega (rad/s) and the amplification at the end of the last step."""
     a, b, c = coefficients
-    x, y, z = omega
-    cosine, sine = np.cos([angle]), np.sin([angle])
-    # Derivatives of omega at the end by the point, and by the time at which it is reached.
-    back = np.empty((3, 4))
-    back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
-    back[:, 3] = -a * y * z, -b * z * x, -c * x * y
-    growth, measured = 1.0, np.zeros(3)
-    for each in reversed(done):
-        measured = measured + back @ each.error
-        back = back @ each.transition
-        amplified = np.abs(back[:, :3] @ each.by_omega)
-        growth = max(growth, float(amplified.sum(axis=-1).max()))
-    return float(np.abs(measured).max()), growth
+    error, growth, count = 0.0, 1.0, len(done)
+    for n in (count, *range(1, count, -(-count // _MOST_ENDS))):
+        if n < count:
+            start = done[n].start[:, None]
+            omega = np.concatenate(coordinates.omega(start, np.ones(1), np.zeros(1))[0])
+            angle = 0.0
+        x, y, z = omega
+        cosine, sine = np.cos([angle]), np.sin([angle])
+        # Derivatives of omega at the end by the point, and by the time at which it is reached.
+        back = np.empty((3, 4))
+        back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
+        back[:, 3] = -a * y * z, -b * z * x, -c * x * y
+        measured = np.zeros(3)
+        for each in reversed(done[:n]):
+            measured = measured + back @ each.error
+            back = back @ each.transition
+            amplified = np.abs(back[:, :3] @ each.by_omega)
+            growth = max(growth, float(amplified.sum(axis=-1).max()))
+        error = max(error, float(np.abs(measured).max()))
+    return error, growth
 
 
 def averaged(
@@ -121,26 +102,21 @@ def averaged(
     torque must be a polynomial in omega and time, times waves; any other may change within a
     macro-step.
     """
-    coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
-    if coordinates is None:
-        raise InputError(
-            "averaged: without torque, omega would not rotate about a principal axis; allowed: a "
-            "body that is no sphere, and a motion that is not on the separatrix"
-        )
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
-        return _Run(scene, coordinates, times, tolerance, effort).trajectory()
+        return _Run(scene, times, tolerance, effort).trajectory()
 
 
 class _Run:
     def __init__(
-        self,
-        scene: Scene,
-        coordinates: Coordinates,
-        times: Sequence[float],
-        tolerance: float,
-        effort: float,
+        self, scene: Scene, times: Sequence[float], tolerance: float, effort: float
     ) -> None:
+        coordinates = Coordinates.from_omega(scene.euler_coefficients, scene.omega)
+        if coordinates is None:
+            raise InputError(
+                "averaged: without torque, omega would not rotate about a principal axis; allowed: "
+                "a body that is no sphere, and a motion that is not on the separatrix"
+            )
         self.scene, self.coordinates, self.times = scene, coordinates, times
         self.tolerance, self.effort = tolerance, effort
         self.torque, self.varies = torque_of(scene)
@@ -160,10 +136,7 @@ class _Run:
                 "has no correct digit; use a shorter time",
                 times[-1],
             )
-        self._check_waves()
-
-    def _check_waves(self) -> None:
-        self.fastest = fastest_of(self.scene.torque)  # rad/s
+        self.fastest = fastest_of(scene.torque)  # rad/s
         slow = _FASTEST * self.pace
         if self.fastest > slow:
             raise InputError(
@@ -190,8 +163,9 @@ class _Run:
                 rows.append(np.array(self.coordinates.omega(*step.at(angles))[0]))
                 angle = float(angles[-1])
             n_rows = inside
-            propagated = step.propagated(angle)
-            self.done.append(Done.from_start(self.coordinates, self.point, *propagated))
+            omega = np.array(self.coordinates.omega(self.point[:, None], *_PSI)[0])
+            by_omega = self.coordinates.by_omega(omega, *_PSI)
+            self.done.append(Done(self.point, by_omega, *step.propagated(angle)))
             if n_rows == len(self.times):
                 break
             self.begin = whole, math.fsum((*self.begin, *parts, -whole))
@@ -221,9 +195,10 @@ class _Run:
     def _forecast(self) -> float:
         """Return a first guess of the length (rad) of the next macro-step."""
         point = self.point
-        slopes = self.forward * MacroStep.mean_slopes(
-            self.coordinates, self.torque, point, self.begin[0], _FEWEST_ANGLES
-        )
+        fast, times = fast_nodes(_FEWEST_ANGLES), np.full(_FEWEST_ANGLES, self.begin[0])
+        slopes = self.forward * self.coordinates.slopes(
+            point[:, None], times, fast.cosine, fast.sine, self.torque, 0.0
+        ).mean(axis=-1)
         square = float(point[0] * point[0] + point[1] * point[1])
         low = float(min(point[2], point[2] + self.coordinates.bend * square))
         # Relative changes per radian of the distance from the separatrix, of x and y, and of the
@@ -265,10 +240,15 @@ class _Run:
                 if needed > angles:
                     angles = needed
                     continue
-                if self._is_accurate(step):
+                # The relative error of the slow components, and the error of the phase (rad).
+                slow = float((np.abs(step.error[:3]).max(axis=1) / step.scale[:3]).max())
+                late = float(np.abs(step.error[3]).max() * self.pace)
+                allowed = _SHARE * self.tolerance
+                is_slow = slow <= max(_FLOOR, allowed / self.phase)
+                if is_slow and late <= max(_FLOOR * self.phase, allowed):
                     longer = _LONGER if attempt == 0 else _HARDLY_LONGER
                     self.longest = longer * abs(step.length)
-                    self.inside = max(self.inside, self._relative(step).sum())
+                    self.inside = max(self.inside, slow + late)
                     self.largest = max(self.largest, self.coordinates.largest(step.stroboscopic))
                     return step
             if revolutions == _FEWEST:
@@ -299,14 +279,3 @@ class _Run:
                 self.begin[0],
             )
         return max(_FEWEST_ANGLES, 4 * math.ceil(0.25 * _DIGITS / width))
-
-    def _is_accurate(self, step: MacroStep) -> bool:
-        slow, late = self._relative(step)
-        allowed = _SHARE * self.tolerance
-        is_slow = slow <= max(_FLOOR, allowed / self.phase)
-        return bool(is_slow and late <= max(_FLOOR * self.phase, allowed))
-
-    def _relative(self, step: MacroStep) -> Array:
-        """Return the relative error of the slow components, and the error of the phase (rad)."""
-        slow = np.abs(step.error[:3]).max(axis=1) / step.scale[:3]
-        return np.array([slow.max(), np.abs(step.error[3]).max() * self.pace])

@@ -84,13 +84,8 @@ def fast_nodes(count: int) -> Fast:
     divided = np.zeros_like(waves)
     divided[:, 1:-1] = waves[:, 1:-1] / (1j * np.arange(1, waves.shape[1] - 1))
     integral = np.fft.irfft(divided, n=count, axis=1)
-    return Fast(
-        angles,
-        np.cos(angles),
-        np.sin(angles),
-        np.full(count, 1.0 / count),
-        integral - integral[:, :1],
-    )
+    mean = np.full(count, 1.0 / count)
+    return Fast(angles, np.cos(angles), np.sin(angles), mean, integral - integral[:, :1])
 
 
 def between_nodes(count: int, at: Array) -> Array:
@@ -182,18 +177,6 @@ class MacroStep:
             raise NotResolvedError
         self.stroboscopic, self._waves = mean, waves
         self.error = self._measured()
-
-    @staticmethod
-    def mean_slopes(
-        coordinates: Coordinates, torque: Torque, point: Array, time: float, angles: int
-    ) -> Array:
-        """Return d/dpsi of a point, averaged over psi, shape (4,)."""
-        fast = fast_nodes(angles)
-        times = np.full(angles, time)
-        found: Array = coordinates.slopes(
-            point[:, None], times, fast.cosine, fast.sine, torque, 0.0
-        ).mean(axis=-1)
-        return found
 
     def _check(self, mean: Array) -> None:
         """Set the largest modulus; raise NotResolvedError unless it is below 1."""

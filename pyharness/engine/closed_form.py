@@ -39,12 +39,9 @@ def _largest_estimate(
     if error is None or growth is None or growth < _CALM:
         return error, growth
     rows = {*np.linspace(0, len(times) - 1, _MOST_ROWS).astype(int).tolist()}
-    for row in rows - {len(times) - 1}:
-        other, larger = closed_form_estimate(scene, scene.omega, times[row], noise)
-        if other is None or larger is None:
-            return None, None
-        error, growth = max(error, other), max(growth, larger)
-    return error, growth
+    both = [closed_form_estimate(scene, scene.omega, times[row], noise) for row in rows]
+    errors, growths = zip(*both, strict=True)
+    return (None, None) if None in errors else (max(errors), max(growths))
 
 
 def known_solution(

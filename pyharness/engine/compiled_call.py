@@ -1,8 +1,17 @@
-"""Calls of prepared solvers from compiled code, without Python."""
+"""Calls of prepared solvers from compiled code, and with arguments that C does not accept."""
 
+import math
+import reprlib
 from ctypes import PYFUNCTYPE, c_double, c_int, c_void_p
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
+
+from pyharness.model.attitude import IDENTITY, unit_quaternion
+from pyharness.model.errors import InputError
+from pyharness.model.scene import Scene
+from pyharness.model.values import number, three_floats
 
 
 class CompiledCall(NamedTuple):
@@ -44,3 +53,33 @@ def get_include() -> str:
     ['pyharness.h']
     """
     return str(Path(__file__).parent.parent / "include")
+
+
+def check_call(
+    scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
+) -> tuple[tuple[float, ...], float]:
+    """Return a start and `t_end` (s) from arguments that C does not accept."""
+    start, time = three_floats("omega", omega0), number("t_end", t_end)
+    if scene.changing is not None and math.isfinite(time):
+        scene.changing.check([time])
+    if with_attitude:
+        usual = scene.attitude or IDENTITY
+        return (*start, *(usual if third is None else unit_quaternion("attitude", third)[0])), time
+    if third is not None and (found := _no_buffer(third)):
+        raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
+    return start, time
+
+
+def _no_buffer(out: object) -> str:
+    """Return a description of `out` if three floats can't be written into it, else ""."""
+    if not isinstance(out, np.ndarray):
+        try:
+            return reprlib.repr(out)
+        except ValueError:  # Python refuses to print an integer of too many digits
+            return "a number of too many digits to be shown"
+    flags = out.flags
+    if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
+        return f"{out.dtype} of shape {out.shape}"
+    if not flags.writeable:
+        return "an array that is read-only"
+    return "" if flags.c_contiguous and flags.aligned else f"an array with strides {out.strides}"

@@ -11,31 +11,30 @@ import numpy as np
 
 from pyharness.engine.many_alone import (
     NO_ATTITUDE,
-    Details,
-    checked_copies,
     is_solved_alone,
+    prepare_details,
     solve_one_by_one,
+    solve_with_states,
 )
 from pyharness.engine.many_scenes import (
     BODIES,
     PARAMETER,
     TORQUES,
-    Axes,
-    Bodies,
     about_principal,
     check_alike,
+    checked_copies,
     from_scene,
     from_scenes,
     rows_of_scene,
+    solve_bodies,
 )
-from pyharness.engine.many_states import solve_with_states
 from pyharness.engine.parameters import check_values
 from pyharness.engine.plan import FINEST
-from pyharness.engine.registry import REGISTRY, check_attitude, requested_tolerance
+from pyharness.engine.registry import REGISTRY, requested_tolerance
 from pyharness.engine.solve import ascending_times
 from pyharness.engine.solver import CODES, PREPARED
 from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
-from pyharness.model.attitude import scalar_first
+from pyharness.model.attitude import rotated, scalar_first, turned_back
 from pyharness.model.codes import Methods
 from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
@@ -47,6 +46,7 @@ from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
 from pyharness.model.values import Number, Numbers, boolean, finite
 
+_PLAIN, _TILTED = -2, -1  # kinds of scenes about principal axes, and with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))
 
 
@@ -175,95 +175,80 @@ def solve_many(
         values, turned = ascending_times(times)
         rows = np.array(values[::-1] if turned else values)
     if parameters is not None:
-        scene, own = _with_parameters(scene, parameters)
-        arrays |= own
+        if not isinstance(scene, Scene):
+            raise InputError("parameters: given beside many scenes; allowed: with one scene")
+        if not isinstance(parameters, Mapping):
+            found = kind_of(parameters)
+            raise InputError(f"parameters: {found}; allowed: a dict of names and arrays")
+        check_values(scene, parameters)
+        # A torque of time alone is a law, which has no names.
+        scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
+        arrays |= {f"{PARAMETER}{name}": value for name, value in parameters.items()}
+    settings: Any = {"method": method, "tolerance": tolerance, "effort": effort}
     if isinstance(scene, Scene) and scene.states:
         refused = {"events": events, "sensitivities": sensitivities, "out": out}
-        tolerance = requested_tolerance(method, tolerance)
+        settings["tolerance"] = requested_tolerance(method, tolerance)
         with bar_of_bodies(boolean("progress", progress)):
             return solve_with_states(
-                scene, t_end, rows, arrays, states, refused=refused, method=method,
-                tolerance=tolerance, effort=effort, estimates=boolean("estimates", estimates),
-                threads=threads,
+                scene, t_end, rows, arrays, states, refused=refused,
+                estimates=boolean("estimates", estimates), threads=threads, **settings,
             )  # fmt: skip
     if states is not None:
         raise InputError("states: the scene has no states of its own; allowed: a scene with some")
     if scene and (events is not None or sensitivities is not None):
-        details = Details(
-            scene, t_end if rows is None else rows, arrays, method=method, tolerance=tolerance,
-            effort=effort, events=events, sensitivities=sensitivities, has_rows=rows is not None,
+        details = prepare_details(
+            scene, t_end if rows is None else rows, arrays, events=events,
+            sensitivities=sensitivities, has_rows=rows is not None, **settings,
         )  # fmt: skip
-    bodies, ends, spread_arrays = (
-        (scene, t_end, arrays) if rows is None else _at_each_time(rows, scene, arrays)
-    )
+    bodies, ends = scene, t_end
+    if rows is not None:  # a body for each body and time
+        if isinstance(scene, Scene):
+            copies = checked_copies(arrays)
+            n = count_bodies(copies)
+            arrays |= {
+                name: each if len(each) == 1 else np.repeat(each, len(rows), axis=0)
+                for name, each in copies.items()
+            }
+        else:
+            n, bodies = len(scene), [each for each in scene for _ in rows]
+        ends = np.tile(rows, n)
     with bar_of_bodies(boolean("progress", progress)):
-        found = _solved(
-            bodies, ends, spread_arrays, out, step, method=method, tolerance=tolerance,
-            effort=effort, estimates=boolean("estimates", estimates), threads=threads,
+        solved = _solve(
+            bodies, ends, arrays, out, step, estimates=boolean("estimates", estimates),
+            threads=threads, **settings,
         )  # fmt: skip
     if rows is not None:
-        found = found.with_times(rows)
+        solved = solved.with_times(rows)
     if details is None:
         # `out` may have the details of an earlier call.
-        has_details = found.t_events is not None or found.sensitivities is not None
-        return replace(found, **_NO_DETAILS) if has_details else found
+        has_details = solved.t_events is not None or solved.sensitivities is not None
+        return replace(solved, **_NO_DETAILS) if has_details else solved
     with bar_of_bodies(progress):
-        return details.added_to(found)
+        return details(solved)
 
 
-def _with_parameters(
-    scene: Scene | Sequence[Scene], parameters: Mapping[str, Any]
-) -> tuple[Scene, dict[str, Array]]:
-    """Return a scene whose torque is recorded, and arrays of parameters; check their names."""
-    if not isinstance(scene, Scene):
-        raise InputError("parameters: given beside many scenes; allowed: with one scene")
-    if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters: {kind_of(parameters)}; allowed: a dict of names and arrays")
-    check_values(scene, parameters)
-    # A torque of time alone is a law, which has no names.
-    scene = replace(scene, torque=getattr(scene.torque, "named", None) or scene.torque)
-    return scene, {f"{PARAMETER}{name}": value for name, value in parameters.items()}
-
-
-def _at_each_time(
-    times: Array, scene: Scene | Sequence[Scene], arrays: dict[str, Any]
-) -> tuple[Scene | Sequence[Scene], Array, dict[str, Any]]:
-    """Return scenes or arrays and final times with a body for each body and time."""
-    if not isinstance(scene, Scene):
-        return [each for each in scene for _ in times], np.tile(times, len(scene)), arrays
-    rows = checked_copies(arrays)
-    n = count_bodies(rows)
-    spread_rows = {
-        name: each if len(each) == 1 else np.repeat(each, len(times), axis=0)
-        for name, each in rows.items()
-    }
-    return scene, np.tile(times, n), {**arrays, **spread_rows}
-
-
-def _solved(
+def _solve(
     scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any],
-    out: "Ensemble | Array | None", step: Number | None, *, method: str, tolerance: Number | None,
-    effort: float, estimates: bool, threads: int,
+    out: "Ensemble | Array | None", step: Number | None, **settings: Any,
 ) -> Ensemble:  # fmt: skip
     own = {name: value for name, value in arrays.items() if value is not None}
     kind = only_one({name: own[name] for name in BODIES if name in own})
+    method, effort, threads = settings["method"], settings["effort"], settings["threads"]
     ready: dict[str, Any] = {}
-    axes: Axes | None = None
+    axes = turns = None
     if isinstance(scene, Scene):
         if kind:  # the arrays give other bodies
             if scene.changing is not None:
                 scene = replace(scene, changing=None, moments=(1.0, 1.0, 1.0))
             scene = in_double(scene)
         if is_solved_alone(scene, {name: own[name] for name in TORQUES if name in own}):
-            _, asked = _chosen(method, tolerance)
-            return solve_one_by_one(
-                scene, t_end, arrays, out,
-                method=method, tolerance=asked, effort=checked_effort(effort),
-                estimates=estimates, threads=threads_of(threads),
-            )  # fmt: skip
+            settings["tolerance"] = _choose_kernel(method, settings["tolerance"])[1]
+            settings |= {"effort": checked_effort(effort), "threads": threads_of(threads)}
+            return solve_one_by_one(scene, t_end, arrays, out, **settings)
         step_size = scene.step_size
         if kind == "inertia" or (scene.inertia is not None and not kind):
-            own, axes = about_principal({"inertia": scene.inertia, **from_scene(scene), **own})
+            given = {"inertia": scene.inertia, **from_scene(scene), **own}
+            own, axes, turns = about_principal(given)
         else:
             if scene.inertia is not None:  # the arrays give other bodies
                 scene = replace(scene, inertia=None, moments=(1.0, 1.0, 1.0))
@@ -274,46 +259,41 @@ def _solved(
                 f"{name} is given beside many scenes; allowed: arrays with one scene, or many "
                 "scenes without arrays"
             )
-        if any(_is_special(each) for each in scene):
-            if (len(scene) > 1 and not all(each.inertia is not None for each in scene)) or any(
-                is_solved_alone(each, {}) for each in scene
-            ):
-                return _solve_groups(
-                    scene, t_end, step, out, method=method, tolerance=tolerance, effort=effort,
-                    estimates=estimates, threads=threads,
-                )  # fmt: skip
-            check_alike(scene)
-            own, axes = about_principal(from_scenes(scene))
-        else:
-            own = from_scenes(scene)
+        kinds = [_kind_of(each, row) for row, each in enumerate(scene)]
+        if len(set(kinds)) > 1 or max(kinds, default=_PLAIN) >= 0:
+            return _solve_groups(scene, kinds, t_end, step, out, **settings)
+        own = from_scenes(scene)
+        if kinds[0] == _TILTED:
+            own, axes, turns = about_principal(own)
         step_size = scene[0].step_size
     if step is not None:
         step_size = finite("step", step)
-    code, asked = _chosen(method, tolerance)
+    code, tolerance = _choose_kernel(method, settings["tolerance"])
     own["t_end"] = t_end
-    work, is_rounded = checked_effort(effort), axes is not None
-    bodies = Bodies(ready, own, step_size, code, asked, work, is_rounded)
-    if bodies.attitude is not None:
-        check_attitude(method)
-    found = bodies.solve(threads_of(threads), out, estimates)
+    found, omega0, times = solve_bodies(
+        ready, own, (code, tolerance, step_size, checked_effort(effort)), method=method,
+        is_rounded=axes is not None, threads=threads, out=out,
+        with_estimates=settings["estimates"],
+    )  # fmt: skip
     if axes is not None:
-        axes.give_back(found.omega, found.attitude)
-        if found.error is not None and bodies.attitude is not None:
-            # The initial omega was rounded after the rotation to principal axes.
-            found.error[:] += (
-                ROUNDING * np.max(np.abs(bodies.omega0), axis=1) * np.abs(bodies.times)
-            )
+        found.omega[:] = rotated(found.omega, axes)
+        if found.attitude is not None and turns is not None:
+            found.attitude[:] = turned_back(found.attitude, turns)
+            if found.error is not None:
+                # The initial omega was rounded after the rotation to principal axes.
+                found.error[:] += ROUNDING * np.max(np.abs(omega0), axis=1) * np.abs(times)
     return found
 
 
-def _is_special(scene: Scene) -> bool:
+def _kind_of(scene: Scene, row: int) -> int:
+    """Return a number that scenes for one kernel call share."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    return scene.inertia is not None or is_solved_alone(scene, {})
+    return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 
 
 def _solve_groups(
-    scenes: Sequence[Scene], t_end: Any, step: Number | None, out: "Ensemble | Array | None",
-    **settings: Any,
+    scenes: Sequence[Scene], kinds: Sequence[int], t_end: Any, step: Number | None,
+    out: "Ensemble | Array | None", **settings: Any,
 ) -> Ensemble:  # fmt: skip
     """Return the final states of scenes that one kernel call can't solve."""
     check_alike(scenes)
@@ -325,8 +305,7 @@ def _solve_groups(
     found = place_for(out, n, scenes[0].attitude is not None, settings["estimates"])
     expect_bodies(n)
     groups: dict[int, list[int]] = {}
-    for row, each in enumerate(scenes):
-        kind = row if is_solved_alone(each, {}) else -1 if each.inertia is not None else -2
+    for row, kind in enumerate(kinds):
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
@@ -342,7 +321,7 @@ def _solve_groups(
     return found
 
 
-def _chosen(method: str, tolerance: Number | None) -> tuple[int, float]:
+def _choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:
     """Return the kernel's code of a method and the tolerance, or raise InputError."""
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
     asked = requested_tolerance(method, tolerance)

@@ -3,9 +3,10 @@
 That kernel takes no torque of the state or about the axes of space, and no changing inertia.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,26 @@ from numpy.typing import NDArray
 
 from pyharness.engine.event_functions import event_functions
 from pyharness.engine.many_prepared import solve_each, solve_lanes, solve_row
-from pyharness.engine.many_scenes import BODIES, PARAMETER, rows_of_bodies, scene_of_row
-from pyharness.engine.packed import packed_tape
+from pyharness.engine.many_scenes import (
+    BODIES,
+    PARAMETER,
+    TORQUES,
+    checked_copies,
+    keep_with,
+    rows_of_bodies,
+    scene_of_row,
+)
 from pyharness.engine.parameter_sensitivity import checked_names
 from pyharness.engine.parameters import tape_of_bodies
-from pyharness.engine.prepared import prepare
+from pyharness.engine.recorded import packed_tape
 from pyharness.engine.registry import check_prepared, check_torque, requested_tolerance
 from pyharness.engine.solve import solve
-from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spread, unit_quaternions
+from pyharness.engine.solver import prepare
+from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spread, threads_of
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for
-from pyharness.model.errors import InputError
+from pyharness.model.errors import InputError, TimedError, kind_of
+from pyharness.model.extension import ENDS
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.progress import count_done, expect_bodies, for_each_piece
 from pyharness.model.scene import Scene, Triple
@@ -33,7 +43,6 @@ from pyharness.model.values import Number
 
 _REST: Triple = (0.0, 0.0, 0.0)
 _ONES: Triple = (1.0, 1.0, 1.0)
-_MOST_KEPT = 8  # prepared solvers
 NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes with an attitude"
 
 
@@ -89,7 +98,10 @@ def solve_one_by_one(
         found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
     # Bodies that differ in their starts alone share one solver.
-    shared = None if rows else _kept_solver(scene, method, tolerance, effort, with_attitude)
+    shared = None
+    if not rows:  # preparation takes long
+        key = method, tolerance, effort, with_attitude
+        shared = keep_with(scene, key, lambda: prepare(at_rest, method, tolerance, **settings))
     lanes = _lanes(scene, rows, tolerance, effort, with_attitude) if rows else None
     # `omega` or `attitude` may share memory with `out`.
     attitudes = np.full((n, 4), np.nan) if with_attitude else None
@@ -138,12 +150,8 @@ def _lanes(
     with np.errstate(all="ignore"):
         if kind == "moments":
             first, second, third = moments = np.where(rows[kind] > 0.0, rows[kind], np.nan).T
-            differences = (
-                (second - third) / first,
-                (third - first) / second,
-                (first - second) / third,
-            )
-            columns = [*differences, *(1.0 / moments)]
+            differences = np.array([second - third, third - first, first - second])
+            columns = [*(differences / moments), *(1.0 / moments)]
         elif kind == "coefficients":
             columns = [*rows[kind].T, *np.ones((3, 1))]
         else:
@@ -156,146 +164,162 @@ def _lanes(
     return packed, np.column_stack([spread(each, max(map(len, columns))) for each in columns])
 
 
-_kept: dict[tuple[int, str, float, float, bool], tuple[Scene, Any]] = {}
-
-
-def _kept_solver(
-    scene: Scene, method: str, tolerance: float, effort: float, with_attitude: bool
-) -> Any:
-    """Return the prepared solver of a scene, cached because preparation takes long."""
-    # An entry keeps its scene alive, so that no other object gets its identity.
-    key = id(scene), method, tolerance, effort, with_attitude
-    if key not in _kept:
-        if len(_kept) >= _MOST_KEPT:
-            _kept.clear()
-        settings: Any = {"effort": effort, "attitude": with_attitude}
-        at_rest = replace(scene, omega=_REST, attitude=None)
-        _kept[key] = scene, prepare(at_rest, method, tolerance, **settings)
-    return _kept[key][1]
-
-
 _METHODS = ("auto", "taylor", "closed-form")
 
 
-class Details:
-    """A request for the events and sensitivities of many bodies."""
+def prepare_details(
+    scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any], *, method: str,
+    tolerance: Number | None, effort: float, events: object,
+    sensitivities: Iterable[str] | None, has_rows: bool,
+) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
+    """Return a function that adds events and sensitivities to a result; check the request.
 
-    def __init__(
-        self, scene: Scene | Sequence[Scene], t_end: Any, arrays: dict[str, Any], *, method: str,
-        tolerance: Number | None, effort: float, events: object,
-        sensitivities: Iterable[str] | None, has_rows: bool,
-    ) -> None:  # fmt: skip
-        """Check the request; copy the arrays, which may be overwritten.
+    `t_end` has the times of all bodies if `has_rows`. The arrays are copied.
+    """
+    if method not in _METHODS:
+        where = "sensitivities" if events is None else "events"
+        raise InputError(f"{where}: the method is {method}; allowed: {', '.join(_METHODS)}")
+    times = t_end[None] if has_rows else rows_of("t_end", t_end).copy()
+    scene_of: Callable[[int], Scene]
+    if isinstance(scene, Scene):
+        rows = checked_copies(arrays)
+        if only_one({name: arrays[name] for name in BODIES}):  # the arrays give other bodies
+            scene = replace(scene, changing=None, inertia=None, moments=_ONES)
+        first, scene_of = scene, partial(scene_of_row, scene, rows)
+        for i in range(max(map(len, rows.values()), default=0)):
+            with suppress(InputError, IndexError):  # until a body is valid
+                first = scene_of(i)
+                break
+    else:
+        scenes = list(scene)
+        first, scene_of = scenes[0], scenes.__getitem__
+    attitude = first.attitude is not None
+    functions = [] if events is None else event_functions(events, attitude)
+    for each in functions:
+        if np.isfinite(each.limit):
+            raise InputError(
+                f"{each.name} is terminal; allowed in solve_many: events that are not; or call "
+                "solve for each body"
+            )
+    names = None
+    if sensitivities is not None:
+        names = checked_names(first, sensitivities, method, attitude)
+    tolerance = requested_tolerance(method, tolerance)
 
-        `t_end` has the times of all bodies if `has_rows`.
-        """
-        if method not in _METHODS:
-            where = "sensitivities" if events is None else "events"
-            raise InputError(f"{where}: the method is {method}; allowed: {', '.join(_METHODS)}")
-        self.has_rows = has_rows
-        self.times = t_end[None] if has_rows else rows_of("t_end", t_end).copy()
-        self.rows: dict[str, Array] = {}
-        self.scenes: list[Scene] = []
-        if isinstance(scene, Scene):
-            self.rows = checked_copies(arrays)
-            if only_one({name: arrays[name] for name in BODIES}):  # the arrays give other bodies
-                scene = replace(scene, changing=None, inertia=None, moments=(1.0, 1.0, 1.0))
-            self.scene = scene
-            first = self._any_scene()
-        else:
-            self.scenes = list(scene)
-            first = self.scene = self.scenes[0]
-        self.attitude = first.attitude is not None
-        self.events = events
-        self.n_events = 0
-        if events is not None:
-            functions = event_functions(events, self.attitude)
-            for each in functions:
-                if np.isfinite(each.limit):
-                    raise InputError(
-                        f"{each.name} is terminal; allowed in solve_many: events that are not; "
-                        "or call solve for each body"
-                    )
-            self.n_events = len(functions)
-        self.names: tuple[str, ...] | None = None
-        if sensitivities is not None:
-            self.names = checked_names(first, sensitivities, method, self.attitude)
-        self.settings: dict[str, Any] = {
-            "method": method, "tolerance": requested_tolerance(method, tolerance),
-            "effort": effort, "attitude": self.attitude,
-        }  # fmt: skip
-
-    def added_to(self, found: Ensemble) -> Ensemble:
-        """Return the result with the events and sensitivities."""
+    def add(found: Ensemble) -> Ensemble:
         n = len(found.omega)
-        times: list[list[Array | None]] = [[None] * n for _ in range(self.n_events)]
-        states: list[list[Array | None]] = [[None] * n for _ in range(self.n_events)]
-        slopes: list[dict[str, Array] | None] = [None] * n
+        t_events: list[list[Array | None]] = [[None] * n for _ in functions]
+        y_events: list[list[Array | None]] = [[None] * n for _ in functions]
+        slopes: dict[str, Array] = {}
         refusals: dict[int, str] = {}
         expect_bodies(n)
-        has_result = found.has_result
-        for i in range(n):
+        for i, has_result in enumerate(found.has_result):
             count_done(1)
-            if not has_result[i].all():
+            if not has_result.all():
                 continue
             try:
                 one = solve(
-                    self._scene_of(i), row_of(self.times, i), events=self.events,
-                    sensitivities=self.names, **self.settings,
+                    scene_of(i), row_of(times, i), method, tolerance, effort=effort,
+                    attitude=attitude, events=events, sensitivities=names,
                 )  # fmt: skip
             except InputError as refusal:
                 refusals[i] = str(refusal)
                 continue
-            for k, own in enumerate(one.t_events or []):
-                times[k][i] = own
-            for k, own in enumerate(one.y_events or []):
-                states[k][i] = own
-            if one.sensitivities is not None:
-                rows = slice(None) if self.has_rows else 0
-                slopes[i] = {name: each[rows] for name, each in one.sensitivities.items()}
+            both = zip(one.t_events or [], one.y_events or [], strict=True)
+            for k, own in enumerate(both):
+                t_events[k][i], y_events[k][i] = own
+            for name, each in (one.sensitivities or {}).items():
+                last = each if has_rows else each[0]
+                if name not in slopes:
+                    slopes[name] = np.full((n, *last.shape), np.nan)
+                if slopes[name][i].shape == last.shape:
+                    slopes[name][i] = last
+        unknown = np.full((n, *times.shape[1:], 3, 0), np.nan)
         return replace(
             found,
-            t_events=None if self.events is None else times,
-            y_events=None if self.events is None else states,
+            t_events=None if events is None else t_events,
+            y_events=None if events is None else y_events,
             sensitivities=None
-            if self.names is None
-            else _stacked(self.names, slopes, self.times.shape[1:]),
+            if names is None
+            else {name: slopes.get(name, unknown) for name in names},
             refusals=refusals,
         )
 
-    def _scene_of(self, i: int) -> Scene:
-        return self.scenes[i] if self.scenes else scene_of_row(self.scene, self.rows, i)
-
-    def _any_scene(self) -> Scene:
-        """Return the scene of the first valid body, or else the common scene."""
-        for i in range(max(map(len, self.rows.values()), default=0)):
-            try:
-                return self._scene_of(i)
-            except (InputError, IndexError):
-                continue
-        return self.scene
+    return add
 
 
-def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return copies of the arrays, with one row for each body or for all."""
-    rows = rows_of_bodies(arrays)
-    for name, shape in (("coefficients", 3), ("omega", 3), ("attitude", 4)):
-        if arrays[name] is not None:
-            rows[name] = rows_of(name, arrays[name], shape)
-    if "attitude" in rows:
-        rows["attitude"] = unit_quaternions(rows["attitude"])
-    return {name: each.copy() for name, each in rows.items()}
+def solve_with_states(
+    scene: Scene, t_end: Any, times: Array | None, arrays: dict[str, Any], states: object, *,
+    refused: Mapping[str, object], estimates: bool, threads: int, **settings: Any,
+) -> Ensemble:  # fmt: skip
+    """Return the final states of bodies with own states, at `t_end` or at common `times` (s).
 
+    One integration reaches all times. `refused` are arguments that must be None.
+    """
+    for name, value in refused.items():
+        if value is not None:
+            raise InputError(f"{name}: the scene has states of its own; allowed: solve")
+    check_prepared(scene, settings["method"])
+    check_torque(scene, settings["method"], attitude=True)
+    is_solved_alone(scene, {name: arrays[name] for name in TORQUES})
+    rows = checked_copies(arrays)
+    given = {each.name: each.start for each in scene.states}
+    if states is None:
+        states = {}
+    if not isinstance(states, Mapping):
+        raise InputError(f"states: {kind_of(states)}; allowed: a dict of names and arrays")
+    for name in states:
+        if name not in given:
+            raise InputError(f"states: {name!r}; allowed: {', '.join(given)}")
+    starts = {name: rows_of(f"states: {name}", states.get(name, x)) for name, x in given.items()}
+    ends = rows_of("t_end", t_end) if times is None else times[None]
+    n = count_bodies({**rows, **starts, "t_end": ends})
+    shape = (n,) if times is None else (n, len(times))
+    has_attitude = "attitude" in rows or scene.has_attitude
+    own = np.full((*shape, len(starts)), np.nan)
+    found = Ensemble(
+        omega=np.full((*shape, 3), np.nan),
+        status=np.full(shape, Statuses.REFUSED, np.int8),
+        attitude=np.full((*shape, 4), np.nan) if has_attitude else None,
+        estimates=np.full((*shape, 2), np.nan) if estimates else None,
+        times=times,
+        own=own,
+        names=tuple(starts),
+    )
 
-def _stacked(
-    names: Sequence[str], slopes: Sequence[dict[str, Array] | None], rows: tuple[int, ...]
-) -> dict[str, Array]:
-    known = next((each for each in slopes if each is not None), None)
-    found = {}
-    for name in names:
-        shape = (*rows, 3, 0) if known is None else known[name].shape
-        found[name] = np.full((len(slopes), *shape), np.nan)
-        for i, each in enumerate(slopes):
-            if each is not None and each[name].shape == shape:
-                found[name][i] = each[name]
+    def solve_body(i: int) -> None:
+        """Solve body `i`; a body with invalid numbers remains REFUSED."""
+        try:
+            initial = tuple(
+                each._replace(start=float(row_of(starts[each.name], i))) for each in scene.states
+            )
+            body = replace(scene_of_row(scene, rows, i), states=initial)
+            one = solve(body, row_of(ends, i), **settings)
+        except TimedError:
+            found.status[i] = Statuses.GAVE_UP
+            return
+        except InputError:
+            return
+        row, last = (i, -1) if times is None else ((i, slice(len(one.time))), slice(None))
+        found.status[i] = ENDS.index(one.ended)
+        if not one.has_all_rows:
+            if times is None:
+                return
+            # The rows before the end of an integration that did not reach all times are complete.
+            found.status[row] = Statuses.COMPLETE
+        assert one.own is not None
+        found.omega[row], own[row] = one.omega[last], one.own[last]
+        if found.attitude is not None and one.attitude is not None:
+            found.attitude[row] = one.attitude[last]
+        if found.estimates is not None:
+            found.estimates[row] = np.array([one.error, one.growth], float)
+
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
+        for i in range(piece.start, piece.stop):
+            if given_up[0]:
+                return
+            solve_body(i)
+            count_done(1)
+
+    for_each_piece(enter, n, threads_of(threads))
     return found

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyharness.engine.many_scenes import Bodies, rows_of_scene
+from pyharness.engine.many_scenes import rows_of_scene, solve_bodies
 from pyharness.model.arrays import (
     buffer_of,
     check_rows,
@@ -85,8 +85,8 @@ def many_states(
     if code in _SIDE_BY_SIDE and not isinstance(solver.plan.scene, PrincipalScene):
         scene, (tolerance, _, effort) = solver.plan.scene, solver.settings
         own = {"omega": starts, "t_end": times, "attitude": turns}
-        bodies = Bodies(rows_of_scene(scene), own, scene.step_size, code, tolerance, effort, False)
-        found = bodies.solve(threads_of(threads), out, with_estimates=False)
+        settings = code, tolerance, scene.step_size, effort
+        found, *_ = solve_bodies(rows_of_scene(scene), own, settings, threads=threads, out=out)
     else:
         found = place_for(out, n, with_attitude=True)
         if out is not None:  # the starts may share memory with it
@@ -120,14 +120,14 @@ def solve_row(
         else:
             found.omega[i], found.attitude[i] = solver(start, time, row_of(turns, i))
         found.status[i] = ENDS.index(solver.status)
-        estimates = solver.error, solver.growth
+        if found.estimates is not None:
+            found.estimates[i] = np.array([solver.error, solver.growth], float)
     except InputError:
         found.omega[i], found.status[i] = np.nan, Statuses.REFUSED
         if found.attitude is not None:
             found.attitude[i] = np.nan
-        estimates = None, None
-    if found.estimates is not None:
-        found.estimates[i] = [np.nan if each is None else each for each in estimates]
+        if found.estimates is not None:
+            found.estimates[i] = np.nan
 
 
 def solve_side_by_side(

@@ -1,25 +1,26 @@
 """Conversion of scenes to the arrays of `solve_many`."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.engine.parameters import torque_with_values
+from pyharness.engine.registry import check_attitude
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
     row_of,
     rows_of,
     spread,
+    threads_of,
     unit_quaternions,
     waves_of,
 )
-from pyharness.model.attitude import IDENTITY, quaternions_of_axes, rotated, turned_back
+from pyharness.model.attitude import quaternions_of_axes, rotated, turned_back
 from pyharness.model.codes import Methods, Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError
@@ -38,48 +39,21 @@ _MOST_KEPT = 8  # scenes whose arrays are kept
 BODIES = ("moments", "inertia", "coefficients")
 PARAMETER = "parameters: "  # before the names of parameters of a torque
 TORQUES = ("torque_constant", "torque_rate", "sines", "cosines")
+_WAVES = ("sines", "cosines")
+# The shapes of rows, in the order in which `solve_many` checks its arrays.
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "omega": (3,), "moments": (3,), "coefficients": (3,), "inertia": (3, 3),
+    "torque_constant": (3,), "torque_rate": (3,), "sines": (4,), "cosines": (4,), "t_end": (),
+    "attitude": (4,),
+}  # fmt: skip
 
 
-class Axes:
-    """The principal axes of n bodies, or one set for all, and conversions to and from them."""
-
-    def __init__(self, axes: Array) -> None:
-        """Store the axes as columns, (n, 3, 3)."""
-        self.axes = axes
-
-    @cached_property
-    def turns(self) -> Array:
-        """The axes as quaternions, (n, 4)."""
-        return quaternions_of_axes(self.axes)
-
-    def about_principal(self, given: dict[str, Any], names: Iterable[str]) -> None:
-        """Convert `omega` and `attitude` of `given`, if in `names`, to principal axes."""
-        if "omega" in names:
-            rows = rows_of("omega", given["omega"], 3)
-            self._check("omega", rows)
-            given["omega"] = rotated(rows, self.axes.transpose(0, 2, 1))
-        if "attitude" in names:
-            attitudes = unit_quaternions(rows_of("attitude", given["attitude"], 4))
-            self._check("attitude", attitudes)
-            conjugate = self.turns * np.array([1.0, -1.0, -1.0, -1.0])
-            given["attitude"] = turned_back(attitudes, conjugate)
-
-    def give_back(self, omega: Array, attitude: Array | None) -> None:
-        """Convert final omegas, (n, 3), and attitudes, (n, 4), back in place."""
-        omega[:] = rotated(omega, self.axes)
-        if attitude is not None:
-            attitude[:] = turned_back(attitude, self.turns)
-
-    def _check(self, name: str, rows: Array) -> None:
-        if len(self.axes) != 1:
-            check_rows(name, rows, len(self.axes))
-
-
-def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Axes]:
+def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
     """Return arrays of bodies with inertia matrices as arrays about principal axes, and these.
 
     The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
-    matrix that is not symmetric and positive definite.
+    matrix that is not symmetric and positive definite. The axes are columns, (n, 3, 3), and
+    quaternions, (n, 4), if there are attitudes.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -115,7 +89,7 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Axes]:
             components[i, row] = [nearest_float(part / moment) for part, moment in parts]
     coefficients[~is_right | (status == Statuses.REFUSED)] = np.nan
     last = 2 + sines.shape[1]
-    found = {
+    found: dict[str, Any] = {
         **rows,
         "coefficients": coefficients,
         "torque_constant": components[:, 0],
@@ -124,14 +98,17 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Axes]:
         "cosines": np.concatenate([components[:, last:], cosines[..., 3:]], axis=2),
     }
     found = {name: np.ascontiguousarray(each) for name, each in found.items()}
-    about = Axes(np.ascontiguousarray(axes))
-    about.about_principal(found, rows)
-    return found, about
-
-
-def _filled(laws: list[Any]) -> list[Any]:
-    most = max(map(len, laws))
-    return [waves + [[0.0] * 4] * (most - len(waves)) for waves in laws]
+    axes, turns = np.ascontiguousarray(axes), None
+    for name in ("omega", "attitude"):
+        if name in rows and n != 1:
+            check_rows(name, rows[name], n)
+    if "omega" in rows:
+        found["omega"] = rotated(found["omega"], axes.transpose(0, 2, 1))
+    if "attitude" in rows:
+        turns = quaternions_of_axes(axes)
+        conjugate = turns * np.array([1.0, -1.0, -1.0, -1.0])
+        found["attitude"] = turned_back(unit_quaternions(found["attitude"]), conjugate)
+    return found, axes, turns
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
@@ -149,7 +126,20 @@ def from_scene(scene: Scene) -> dict[str, Any]:
     }
 
 
-_kept: dict[int, tuple[Scene, dict[str, Any]]] = {}
+_kept: dict[tuple[Any, ...], tuple[Scene, Any]] = {}
+
+
+def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+    """Return `make()`, kept for this scene and `key`."""
+    # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
+    # its scene alive, so that no other object gets its identity.
+    full = id(scene), *key
+    found = _kept.get(full)
+    if found is None:
+        if len(_kept) >= _MOST_KEPT:
+            _kept.clear()
+        found = _kept[full] = scene, make()
+    return found[1]
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
@@ -157,26 +147,24 @@ def rows_of_scene(scene: Scene) -> dict[str, Any]:
 
     They are cached, because for few bodies their conversion takes longer than the solution.
     """
-    # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
-    # its scene alive, so that no other object gets its identity.
-    found = _kept.get(id(scene))
-    if found is not None:
-        return found[1]
-    rows: dict[str, Any] = checked_rows(from_scene(scene))
-    rows["merged"] = with_merged_rows(rows["torque_constant"], rows["sines"], rows["cosines"])
-    if len(_kept) >= _MOST_KEPT:
-        _kept.clear()
-    _kept[id(scene)] = scene, rows
-    return rows
+
+    def convert() -> dict[str, Any]:
+        rows = checked_rows(from_scene(scene))
+        return {**rows, "merged": with_merged_rows(*(rows[name] for name in _MERGED))}
+
+    found: dict[str, Any] = keep_with(scene, (), convert)
+    return found
 
 
 def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
     """Return float arrays with one row per body, or one for all; raise InputError otherwise."""
     rows = {}
-    for name, convert in _CONVERSIONS.items():
+    for name in (*_SHAPES, *(each for each in given if each.startswith(PARAMETER))):
         values = given.get(name)
-        if values is not None or (name == "t_end" and name in given):
-            rows[name] = convert(values)
+        if name in _WAVES and values is not None:
+            rows[name] = waves_of(name, values)
+        elif values is not None or (name == "t_end" and name in given):
+            rows[name] = rows_of(name, values, *_SHAPES.get(name, ()))
     return rows
 
 
@@ -201,46 +189,33 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
             "some bodies are given by coefficients and others are not; allowed: "
             "coefficients for all, or for none"
         )
-    return _stacked(rows)
-
-
-def _stacked(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {"attitude": None}
-    for name in (*BODIES, "omega", "torque_constant", "torque_rate"):
-        if name in rows[0]:
-            found[name] = np.array([row[name] for row in rows])
-    for name in ("sines", "cosines"):
-        found[name] = _filled([row[name] for row in rows])
-    if any(row["attitude"] is not None for row in rows):
-        found["attitude"] = np.array([row["attitude"] or IDENTITY for row in rows])
+    found: dict[str, Any] = {
+        name: np.array([row[name] for row in rows])
+        for name in (*BODIES, "omega", "torque_constant", "torque_rate")
+        if name in rows[0]
+    }
+    for name in _WAVES:
+        most = max(len(row[name]) for row in rows)
+        found[name] = [row[name] + [[0.0] * 4] * (most - len(row[name])) for row in rows]
+    if scenes[0].attitude is not None:
+        found["attitude"] = np.array([row["attitude"] for row in rows])
     return found
-
-
-# In the order in which `solve_many` checks its arrays.
-_CONVERSIONS: dict[str, Callable[[Any], Array]] = {
-    **{
-        name: lambda values, name=name: rows_of(name, values, 3)  # type: ignore[misc]
-        for name in ("omega", "moments", "coefficients", "torque_constant", "torque_rate")
-    },
-    "sines": partial(waves_of, "sines"),
-    "cosines": partial(waves_of, "cosines"),
-    "t_end": partial(rows_of, "t_end"),
-    "attitude": lambda values: rows_of("attitude", values, 4),
-}
 
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return the arrays of bodies and torques that are not None, with checked shapes."""
-    shapes = {"moments": (3,), "inertia": (3, 3), "torque_constant": (3,), "torque_rate": (3,)}
-    rows = {}
-    for name, values in arrays.items():
-        if values is not None and name in shapes:
-            rows[name] = rows_of(name, values, *shapes[name])
-        elif values is not None and name in ("sines", "cosines"):
-            rows[name] = waves_of(name, values)
-        elif name.startswith(PARAMETER):
-            rows[name] = rows_of(name, values)
-    return rows
+    others = ("omega", "attitude", "coefficients")
+    return checked_rows({name: each for name, each in arrays.items() if name not in others})
+
+
+def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
+    """Return copies of the arrays, with one row for each body or for all."""
+    rows = rows_of_bodies(arrays)
+    for name in ("coefficients", "omega", "attitude"):
+        rows |= checked_rows({name: arrays[name]})
+    if "attitude" in rows:
+        rows["attitude"] = unit_quaternions(rows["attitude"])
+    return {name: each.copy() for name, each in rows.items()}
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
@@ -248,11 +223,9 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {
-        name.removeprefix("torque_"): own.pop(name)
-        for name in ("torque_constant", "torque_rate", "sines", "cosines")
-        if name in own
+        name.removeprefix("torque_"): own.pop(name) for name in TORQUES if name in own
     }
-    for name in ("sines", "cosines"):
+    for name in _WAVES:
         if name in torque:
             torque[name] = [(wave[:3], float(wave[3])) for wave in torque[name]]
     if own.keys() & BODIES:
@@ -269,72 +242,67 @@ def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
     return replace(scene, torque=law, **own)
 
 
-class Bodies:
-    """The checked arguments of the kernel: arrays `own`, and for others a scene's `ready` rows."""
+def solve_bodies(
+    ready: dict[str, Any], own: dict[str, Any], settings: tuple[int, float, float, float], *,
+    method: str = "auto", is_rounded: bool = False, threads: int, out: "Ensemble | Array | None",
+    with_estimates: bool = False,
+) -> tuple[Ensemble, Array, Array]:  # fmt: skip
+    """Return the final states, and the initial omegas and times, by one call of the kernel.
 
-    def __init__(
-        self, ready: dict[str, Any], own: dict[str, Any], step: float, code: int, tolerance: float,
-        effort: float, is_rounded: bool,
-    ) -> None:  # fmt: skip
-        given = checked_rows(own)
-        self.n = count_bodies(given)
-        rows = {**ready, **given}
-        self.by_moments = "moments" in (given if "coefficients" in given else rows)
-        self.body = rows["moments" if self.by_moments else "coefficients"]
-        self.rate, self.times = rows["torque_rate"], rows["t_end"]
-        self.attitude = rows.get("attitude")
-        law: tuple[Array, Array, Array] | None = ready.get("merged")
-        if law is None or not given.keys().isdisjoint(_MERGED):
-            law = with_merged_rows(*(rows[name] for name in _MERGED))
-        self.constant, self.sines, self.cosines = law
-        self.omega0 = spread(rows["omega"], self.n)
-        self.step = step
-        self.is_rounded = is_rounded
-        if not step > 0.0:
-            raise InputError(f"step is {step:g}; allowed: above 0")
-        self.code, self.tolerance, self.effort = code, tolerance, effort
-        if code == Methods.CLOSED_FORM:
-            self._check_form()
-
-    def _check_form(self) -> None:
-        torques = (self.constant, self.rate, self.sines[..., :3], self.cosines[..., :3])
-        if any(each.any() for each in torques):
+    The bodies have arrays `own`, and for others a scene's `ready` rows; `settings` are the method's
+    code, tolerance, step and effort.
+    """
+    code, tolerance, step, effort = settings
+    given = checked_rows(own)
+    n = count_bodies(given)
+    rows = {**ready, **given}
+    by_moments = "moments" in (given if "coefficients" in given else rows)
+    body = rows["moments" if by_moments else "coefficients"]
+    rate, times, attitude = rows["torque_rate"], rows["t_end"], rows.get("attitude")
+    law: tuple[Array, Array, Array] | None = ready.get("merged")
+    if law is None or not given.keys().isdisjoint(_MERGED):
+        law = with_merged_rows(*(rows[name] for name in _MERGED))
+    constant, sines, cosines = law
+    omega = spread(rows["omega"], n)
+    if not step > 0.0:
+        raise InputError(f"step is {step:g}; allowed: above 0")
+    if code == Methods.CLOSED_FORM:
+        if any(each.any() for each in (constant, rate, sines[..., :3], cosines[..., :3])):
             raise InputError(
                 "closed-form can't solve bodies with a torque in one call; allowed: auto, taylor"
             )
-        if self.attitude is not None and not self.by_moments:
+        if attitude is not None and not by_moments:
             raise InputError(
                 "closed-form can't compute the attitude of bodies given by coefficients; "
                 "allowed: moments, or methods auto and taylor"
             )
+    if attitude is not None:
+        check_attitude(method)
+    threads = threads_of(threads)
+    found = place_for(out, n, attitude is not None, with_estimates)
+    if found.estimates is not None:
+        found.estimates[:] = _UNKNOWN
+    # The kernel may write a result before it reads the start again.
+    if np.may_share_memory(omega, found.omega):
+        omega = omega.copy()
+    if attitude is not None and np.may_share_memory(attitude, found.attitude):
+        attitude = attitude.copy()
 
-    def solve(self, threads: int, out: "Ensemble | Array | None", with_estimates: bool) -> Ensemble:
-        """Return the final states."""
-        found = place_for(out, self.n, self.attitude is not None, with_estimates)
-        if found.estimates is not None:
-            found.estimates[:] = _UNKNOWN
-        # The kernel may write a result before it reads the start again.
-        if np.may_share_memory(self.omega0, found.omega):
-            self.omega0 = self.omega0.copy()
-        attitude = self.attitude
-        if attitude is not None and np.may_share_memory(attitude, found.attitude):
-            self.attitude = attitude.copy()
-        for_each_piece(partial(self._enter, found), self.n, threads)
-        if found.estimates is not None:
-            found.estimates[~(found.estimates >= 0.0)] = np.nan
-        return found
-
-    def _enter(self, found: Ensemble, piece: slice, given_up: NDArray[np.int32]) -> None:
-        def part(array: Array) -> Array:
+    def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
+        def part(array: Array | None) -> Array:
+            if array is None:
+                return _NOTHING
             return (array if len(array) in (0, 1, piece.stop - piece.start) else array[piece]).T
 
         extension().solve_ensemble(
-            self.code, self.tolerance, self.step, self.effort,
-            self.by_moments + 2 * self.is_rounded,
-            part(self.body), part(self.constant), part(self.rate), part(self.sines),
-            part(self.cosines), part(self.omega0), part(self.times),
-            _NOTHING if self.attitude is None else part(self.attitude), given_up,
-            found.omega[piece].T,
+            code, tolerance, step, effort, by_moments + 2 * is_rounded, part(body), part(constant),
+            part(rate), part(sines), part(cosines), part(omega), part(times), part(attitude),
+            given_up, found.omega[piece].T,
             _NOTHING if found.attitude is None else found.attitude[piece].T, found.status[piece],
             found.estimates_of(piece),
         )  # fmt: skip
+
+    for_each_piece(enter, n, threads)
+    if found.estimates is not None:
+        found.estimates[~(found.estimates >= 0.0)] = np.nan
+    return found, omega, times

@@ -1,29 +1,39 @@
-"""Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series."""
+"""Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series.
+
+For scenes whose rates jump, or that have states of their own, they are central differences with
+decreasing steps, extrapolated (Ridders 1982): a perturbation moves the time of a switch, which the
+linearised equations of a smooth torque leave out.
+"""
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.engine.closed_form import period_of
-from pyharness.engine.differences import States, slopes_by_differences
 from pyharness.engine.parameters import (
     ATTITUDE,
+    INERTIA_ELEMENTS,
     OMEGA,
+    TORQUE,
     initial_state,
     parameters_of,
+    torque_with_values,
     varied_equations,
 )
 from pyharness.engine.recorded import kernel_tape
 from pyharness.model.array_type import Array
+from pyharness.model.attitude import IDENTITY, product
 from pyharness.model.errors import InputError, TimedError, kind_of, unknown
 from pyharness.model.extension import COMPLETE, GAVE_UP, extension
-from pyharness.model.scene import Scene
+from pyharness.model.scene import ImpossibleBodyWarning, Scene
 from pyharness.model.state_torque import has_switches, is_opaque
-from pyharness.model.tape import Tape
 from pyharness.model.trajectory import Trajectory
+from pyharness.model.values import triple
 
 # Largest tolerance of the derivatives of one period, and smallest tolerance of any.
 _OF_PERIOD, _FINEST = 1e-13, 1e-15
@@ -36,6 +46,16 @@ _THREE = (0.0, 0.0, 0.0)  # stands for omega and attitude, which have three colu
 # the period once; a torque changes it with time.
 _CONSTANT = "torque.constant"
 _PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
+
+_FIRST = 0.02  # first difference, relative to the parameter
+_LEVELS, _RATIO = 13, 2.0
+_ENOUGH = 1e-11  # estimated error, relative, at which no smaller differences are tried
+# Largest estimated error, relative to the largest derivative by a parameter.
+_ALLOWED = 1e-7
+_SMALL = 1e-10  # or so large a change of the state, relative, by that of the parameter
+
+# A function that returns the states at the times, shape (n, m), of a scene.
+States = Callable[[Scene], Array]
 
 
 def checked_names(
@@ -97,12 +117,21 @@ def sensitivities_at(
         return {}
     times, attitude = found.time, found.attitude is not None
     if scene.states or has_switches(scene.torque):
-        return slopes_by_differences(scene, names, states)
+        slopes = {
+            name: [_extrapolate(name, *move, states) for move in _moves(scene, name)]
+            for name in names
+        }
+        return {name: np.stack(each, 2) for name, each in slopes.items()}
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
     tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
     # Closed forms alone take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
-    period = _period(scene) if is_closed else 0.0
+    period = 0.0
+    # The derivatives of a function that is 0 by its parameters may depend on time.
+    if is_closed and not getattr(scene.torque, "named", None):
+        period = period_of(scene)
+        if not period * np.abs(_slope(scene)).max() > _VARIES * math.hypot(*scene.omega):
+            period = 0.0
     # The calculation from one period takes as long as an integration over two.
     if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):
         columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
@@ -118,7 +147,10 @@ def _by_series(
     """Return the columns by name, the derivatives, (n, 3 or 7, m), and those at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
-    packed, forcings = _packed(equations.tape, len(state), equations.forcings)
+    packed = kernel_tape(equations.tape, len(state))
+    # The forcings are numbers of combinations, which end with the outputs; the array counts them.
+    first = int(packed[3]) - len(equations.tape.outputs)
+    forcings = np.where(equations.forcings > 0, equations.forcings + first, 0).astype(np.int32)
     rows = np.empty((len(times), *starts.shape))
     is_before = times < 0.0
     for side in (is_before, ~is_before):
@@ -130,17 +162,19 @@ def _by_series(
             derivatives, n_rows, status = extension().tape_derivatives(
                 packed, state, starts, forcings, own, tolerance, effort
             )
-            _check(status, n_rows, own, derivatives)
+            reached = own[min(n_rows, len(own) - 1)]
+            if status == GAVE_UP:
+                raise TimedError(
+                    "sensitivities exceeded their work limit before t = {time} s; use a shorter "
+                    "time, a larger tolerance, or more effort",
+                    reached,
+                )
+            if status != COMPLETE or not np.isfinite(derivatives).all():
+                raise TimedError(
+                    "sensitivities overflow before t = {time} s; use a shorter time", reached
+                )
             rows[places] = derivatives.transpose(2, 0, 1)
     return equations.columns, rows, starts
-
-
-def _period(scene: Scene) -> float:
-    """Return the period of omega (s), or 0 if there is none, or omega is nearly constant."""
-    # The derivatives of a function that is 0 by its parameters may depend on time.
-    period = 0.0 if getattr(scene.torque, "named", None) else period_of(scene)
-    largest = math.hypot(*scene.omega)
-    return period if period * np.abs(_slope(scene)).max() > _VARIES * largest else 0.0
 
 
 def _slope(scene: Scene) -> Array:
@@ -184,23 +218,75 @@ def _by_periods(
     return {name: columns[name] for name in names}, found
 
 
-def _packed(
-    tape: Tape, n_unknowns: int, forcings: NDArray[np.int32]
-) -> tuple[Array, NDArray[np.int32]]:
-    """Return a tape as the kernel's array, and `forcings` as numbers of its combinations."""
-    packed = kernel_tape(tape, n_unknowns)
-    # The outputs are the last combinations, which the array counts here.
-    first = int(packed[3]) - len(tape.outputs)
-    return packed, np.where(forcings > 0, forcings + first, 0).astype(np.int32)
-
-
-def _check(status: int, n_rows: int, times: Array, derivatives: Array) -> None:
-    time = times[min(n_rows, len(times) - 1)]
-    if status == GAVE_UP:
-        raise TimedError(
-            "sensitivities exceeded their work limit before t = {time} s; use a shorter time, a "
-            "larger tolerance, or more effort",
-            time,
+def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states: States) -> Array:
+    """Return the derivative of the states by one number, (n, m), by Ridders' method."""
+    best, least, largest = np.zeros((0, 0)), np.inf, 0.0
+    row: list[Array] = []
+    for level in range(_LEVELS):
+        h = _FIRST * size / _RATIO**level
+        try:
+            with warnings.catch_warnings(action="ignore", category=ImpossibleBodyWarning):
+                after, before = states(moved(h)), states(moved(-h))
+        except InputError:  # such as a motion that ends where it slides; a smaller change may not
+            row = []
+            continue
+        largest = max(largest, np.abs(after).max())
+        found, factor = [(after - before) / (2.0 * h)], 1.0
+        for other in row:
+            factor *= _RATIO**2
+            found.append(found[-1] + (found[-1] - other) / (factor - 1.0))
+            error = max(np.abs(found[-1] - found[-2]).max(), np.abs(found[-1] - other).max())
+            if error <= least:
+                best, least = found[-1], error
+        if least <= _ENOUGH * np.abs(best).max(initial=0.0):
+            break
+        row = found
+    if not least <= _ALLOWED * np.abs(best).max(initial=0.0) + _SMALL * largest / size:
+        raise InputError(
+            f"sensitivities: the state does not depend smoothly on {name}; allowed: a torque whose "
+            "switches are crossed, and not only touched, or times before"
         )
-    if status != COMPLETE or not np.isfinite(derivatives).all():
-        raise TimedError("sensitivities overflow before t = {time} s; use a shorter time", time)
+    return best
+
+
+def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
+    """Yield a function of a change that returns the changed scene, and the size of changes."""
+    if name == ATTITUDE:
+        for axis in np.eye(3):
+            yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]
+        return
+    listed = list(scene.omega) if name == OMEGA else parameters_of(scene)[name]
+    assert listed is not None
+    if name.startswith(TORQUE) and len(listed) != 1:
+        raise InputError(
+            f"sensitivities: {name} of a scene with switches or states; allowed: keyword "
+            "arguments, constants of expressions, the body and the initial state"
+        )
+    largest = max(map(abs, listed)) or 1.0
+    for k, value in enumerate(listed):
+        size = largest if name == OMEGA else abs(value) or largest
+
+        def moved(h: float, k: int = k) -> Scene:
+            values = [x + h * (i == k) for i, x in enumerate(listed)]
+            if name == OMEGA:
+                return replace(scene, omega=triple(values))
+            if name.startswith(TORQUE):
+                changed = torque_with_values(scene.torque, {name.removeprefix(TORQUE): values[0]})
+                return replace(scene, torque=changed)
+            changes: dict[str, Any] = {name: values}
+            if name == "inertia":
+                matrix = np.zeros((3, 3))
+                for (i, j), x in zip(INERTIA_ELEMENTS, values, strict=True):
+                    matrix[i, j] = matrix[j, i] = x
+                changes = {name: matrix.tolist()}
+            return replace(scene, **changes)
+
+        yield moved, size
+
+
+def _turned(scene: Scene, turn: Array) -> Scene:
+    """Return the scene after a rotation about body axes by the vector `turn` (rad)."""
+    angle = float(np.linalg.norm(turn))
+    half = 0.5 * np.sinc(0.5 * angle / np.pi) * turn
+    small = (np.cos(0.5 * angle), *half)
+    return replace(scene, attitude=product(scene.attitude or IDENTITY, small))

@@ -1,7 +1,7 @@
 """Parameters of a scene, and partial derivatives of its equations."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -28,15 +28,11 @@ TORQUE = "torque."  # before the names of its parameters
 INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-class _Body(NamedTuple):
-    moments: Triple | None
-    coefficients: Triple | None
-    inertia: tuple[Triple, ...] | None
-    changing: Changing | None
+# The moments, coefficients, inertia matrix and changing inertia of a scene.
+_Body = tuple[Triple | None, Triple | None, tuple[Triple, ...] | None, Changing | None]
 
 
-@dataclass(frozen=True)
-class VariedEquations:
+class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
     The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
@@ -69,7 +65,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
     """Return the equations of motion with their derivatives by the named parameters."""
-    body = _Body(scene.moments, scene.coefficients, scene.inertia, scene.changing)
+    body = scene.moments, scene.coefficients, scene.inertia, scene.changing
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
     return _equations(body, tuple(_list_summands(scene.torque)), values, attitude)
@@ -252,20 +248,21 @@ def _rates(
     body: _Body, time: Any, omega: Any, torque: Any, given: Mapping[str, list[Any]]
 ) -> Sequence[Any]:
     """Return the derivative of omega, with the symbols `given` in place of parameters."""
-    if body.changing is not None:
-        return rates_of_changing(body.changing, time, omega, torque)
+    own, coefficients, inertia, changing = body
+    if changing is not None:
+        return rates_of_changing(changing, time, omega, torque)
     x, y, z = omega
-    if body.inertia is not None:
-        matrix = [list(row) for row in body.inertia]
+    if inertia is not None:
+        matrix = [list(row) for row in inertia]
         for (i, j), value in zip(INERTIA_ELEMENTS, given.get("inertia", ()), strict=False):
             matrix[i][j] = matrix[j][i] = value
         return rates_of_inertia(matrix, omega, torque)
     products = y * z, z * x, x * y
-    if body.moments is None:
-        factors = given.get("coefficients", body.coefficients)
+    if own is None:
+        factors = given.get("coefficients", coefficients)
         assert factors is not None
         return [c * p + n for c, p, n in zip(factors, products, torque, strict=True)]
-    a, b, c = given.get("moments", body.moments)
+    a, b, c = given.get("moments", own)
     differences = b - c, c - a, a - b
     return [
         (difference / moment) * p + n / moment

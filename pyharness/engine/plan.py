@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 from pyharness.engine.problem import closed_form
 from pyharness.engine.registry import REGISTRY, check_torque, requested_tolerance
@@ -20,8 +21,7 @@ RK4_OR_TAYLOR = "quick or taylor"
 _FEW_DIGITS = 1e-9
 
 
-@dataclass(frozen=True)
-class Decision:
+class Decision(NamedTuple):
     """The decision whether a part, such as ``torque``, is computed, and the reason."""
 
     part: str
@@ -93,59 +93,48 @@ def plan(
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:
-    scene = chosen.scene
+    scene, torque = chosen.scene, chosen.scene.torque
     closed = chosen.method == "closed-form"
     if closed:
         yield Decision("integration", False, f"closed form: {chosen.closed_form}")
     else:
         why = "requested" if closed_form(scene) else _why_no_form(scene)
         yield Decision("integration", True, why)
-    yield from _of_body(scene, closed)
-    yield from _of_torque(scene.torque)
-    for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
-        if part == "attitude" and scene.torque.needs_attitude:
-            fixed = scene.torque.in_space
-            why = "the torque is fixed in space" if fixed else "the torque depends on it"
-            yield Decision(part, True, why)
-        else:
-            yield Decision(part, wanted, "requested" if wanted else "not requested")
-    wanted, why = chosen.rows, "intermediate output requested" if chosen.rows else "only the end"
-    if wanted and closed:
-        wanted, why = False, "closed form"
-    yield Decision("dense output", wanted, why)
-    # No prepared solver uses the reference solution or SciPy.
-    yield Decision("reference", False, "not requested")
-    yield Decision("SciPy", False, "our own kernels solve it")
-
-
-def _of_body(scene: Scene, closed: bool) -> Iterator[Decision]:
     names = ("A w2 w3", "B w1 w3", "C w1 w2")
-    if scene.changing is not None:
-        for name in names:
-            yield Decision(name, True, "its inertia changes with time")
-        return
     equal = ("I2 = I3", "I3 = I1", "I1 = I2")
-    for name, value, product in zip(names, scene.euler_coefficients, equal, strict=True):
-        if value != 0.0:
+    values = (1.0, 1.0, 1.0) if scene.changing is not None else scene.euler_coefficients
+    for name, value, product in zip(names, values, equal, strict=True):
+        if scene.changing is not None:
+            yield Decision(name, True, "its inertia changes with time")
+        elif value != 0.0:
             yield Decision(name, True, f"coefficient {value:g}")
         elif closed:
             yield Decision(name, False, product)
         else:
             # The kernels sum three products side by side in one register.
             yield Decision(name, True, f"{product}: zero; costs no time beside the others")
-
-
-def _of_torque(torque: TorqueLaw | StateTorque) -> Iterator[Decision]:
     if isinstance(torque, StateTorque):
         count = "opaque" if torque.tape is None else f"{len(torque.tape.operations)} operations"
         yield Decision("torque", True, f"depends on the state: {count}")
-        return
-    yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
-    for name, terms in (("sines", torque.sines), ("cosines", torque.cosines)):
-        acts = any(any(amplitude) for amplitude, _ in terms)
-        yield Decision(name, acts, f"{len(terms)} in the law" if acts else "none act")
-    varies = "the law varies" if torque.varies else "constant: read once"
-    yield Decision("torque of time", torque.varies, varies)
+    else:
+        yield Decision("torque", not torque.is_zero, "zero" if torque.is_zero else "acts")
+        for name, terms in (("sines", torque.sines), ("cosines", torque.cosines)):
+            acts = any(any(amplitude) for amplitude, _ in terms)
+            yield Decision(name, acts, f"{len(terms)} in the law" if acts else "none act")
+        varies = "the law varies" if torque.varies else "constant: read once"
+        yield Decision("torque of time", torque.varies, varies)
+    for part, wanted in (("velocity", chosen.velocity), ("attitude", scene.attitude is not None)):
+        if part == "attitude" and torque.needs_attitude:
+            why = "the torque is fixed in space" if torque.in_space else "the torque depends on it"
+            yield Decision(part, True, why)
+        else:
+            yield Decision(part, wanted, "requested" if wanted else "not requested")
+    why = "intermediate output requested" if chosen.rows else "only the end"
+    is_kept = chosen.rows and not closed
+    yield Decision("dense output", is_kept, "closed form" if chosen.rows and closed else why)
+    # No prepared solver uses the reference solution or SciPy.
+    yield Decision("reference", False, "not requested")
+    yield Decision("SciPy", False, "our own kernels solve it")
 
 
 def _why_no_form(scene: Scene) -> str:

@@ -1,16 +1,20 @@
-"""The equations of motion with a recorded torque, as the kernel reads them."""
+"""Scenes, and the equations of motion with a recorded torque, as the kernels read them."""
 
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.problem import normalized, remainders
 from pyharness.engine.system import system_of
-from pyharness.model.codes import Operations
-from pyharness.model.errors import InputError
+from pyharness.model.codes import Methods, Operations, Places, Statuses
+from pyharness.model.constant_body import with_constant_body
+from pyharness.model.errors import SLIDING, InputError, TimedError
+from pyharness.model.extension import COMPLETE, extension
+from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape, evaluate, float_outputs
@@ -33,6 +37,11 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
+# The largest order in fortran/modern/tape_series.f90, plus 1.
+_N_TERMS = 29
+# The first trial step, in the user's unit of time. Its length hardly matters, because the series
+# gives any shorter step, or one up to 16 times longer.
+LONGEST_TRIAL = 1e3
 
 
 def inputs_of(times: Array, state: Array) -> list[Array]:
@@ -142,3 +151,75 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     pairs = np.zeros(len(integers) + len(integers) % 2, dtype=np.int32)
     pairs[: len(integers)] = integers
     return pairs.view(np.float64)
+
+
+def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
+    """Return a scene and its method's settings as one array, in the order of `Places`."""
+    packed = _settings(code, scene.step_size, tolerance, effort)
+    if code == Methods.TAPE:
+        return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+    coefficients, constant, rate, sines, cosines = normalized(scene)
+    packed[Places.N_SINES] = sines.shape[1]
+    packed[Places.N_COSINES] = cosines.shape[1]
+    packed[Places.COEFFICIENTS : Places.CONSTANT] = coefficients
+    packed[Places.CONSTANT : Places.RATE] = constant
+    packed[Places.RATE : Places.EFFORT] = rate
+    packed[Places.COEFFICIENTS_LOW : Places.MOMENTS] = remainders(scene)
+    packed[Places.MOMENTS : Places.MOMENTS_LOW] = scene.moments or (1.0, 1.0, 1.0)
+    packed[Places.MOMENTS_LOW : Places.ROUNDED] = scene.moments_low
+    packed[Places.ROUNDED] = isinstance(scene, PrincipalScene)
+    return np.concatenate([packed, sines.T.ravel(), cosines.T.ravel()])
+
+
+def packed_tape(tape: Tape, step_size: float, tolerance: float, effort: float) -> Array:
+    """Return equations of motion and settings as one array."""
+    return np.concatenate(
+        [_settings(Methods.TAPE, step_size, tolerance, effort), kernel_tape(tape)]
+    )
+
+
+def _settings(code: int, step_size: float, tolerance: float, effort: float) -> Array:
+    packed = np.zeros(Places.WAVES)
+    packed[Places.METHOD] = code
+    packed[Places.TOLERANCE] = tolerance
+    packed[Places.STEP] = step_size
+    packed[Places.EFFORT] = effort
+    return packed
+
+
+class Step(NamedTuple):
+    """A step of length `h`, 0 if no step is short enough.
+
+    `terms`, shape (order + 1, n), include powers of `h`; `state`, shape (n,), is their sum.
+    `expansions` is the number of series computed.
+    """
+
+    h: float
+    terms: Array
+    state: Array
+    expansions: int
+
+
+def taylor_step(
+    tape: Array,
+    t: float,
+    state: Array,
+    tolerances: Array,
+    relative: float,
+    trial: float,
+    longest: float,
+) -> Step:
+    """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
+
+    `tolerances`, shape (n,), are the largest errors of the components; the relative tolerance
+    determines the order. `trial` is a guess of the step, with the sign of the `longest` step. Raise
+    InputError where a switch would change back and forth without end.
+    """
+    h, terms, end, order, expansions, status = extension().tape_step(
+        tape, t, state, tolerances, relative, trial, longest, _N_TERMS
+    )
+    if status == Statuses.SLIDING:
+        raise TimedError(SLIDING, t)
+    if status != COMPLETE:
+        h = 0.0
+    return Step(h, terms[: order + 1], end, expansions)

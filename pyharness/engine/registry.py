@@ -38,10 +38,10 @@ class Method:
     title: str
     source: str
     finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
+    solve: Integrator  # called with checked times on one side of 0, in order away from 0
     # Default tolerance, 1e-9 or the smallest that the method meets in ordinary scenes within a
     # fraction of its work limit; 1 if the method takes no tolerance.
-    default: float
-    solve: Integrator  # called with checked times on one side of 0, in order away from 0
+    default: float = _DEFAULT
     gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
     # Takes a fifth argument, whether `sol` has the steps.
     gives_steps: bool = False
@@ -91,31 +91,24 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver that imports `name` when called; with `arguments`, `name` is its factory."""
+    """Return a solver that imports `name` when called; `arguments` are its first ones."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
-        trajectory: Trajectory = (solver(*arguments) if arguments else solver)(*given)
-        return trajectory
+        found: Trajectory = solver(*arguments, *given)
+        return found
 
     return solve
 
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
-    source = f"scipy.integrate.solve_ivp; {source}"
+    # The others' interpolants are less accurate than their steps.
+    gives_steps = scipy in ("DOP853", "LSODA")
+    source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
-        scipy.lower(),
-        title,
-        source,
-        FINEST[scipy],
-        _SCIPY_DEFAULT,
-        scipy_method(scipy),
-        # The others' interpolants are less accurate than their steps.
-        gives_steps=scipy in ("DOP853", "LSODA"),
-        attitude=True,
-        state_torque=True,
-        scipy=scipy,
-    )
+        scipy.lower(), title, source, FINEST[scipy], solve, _SCIPY_DEFAULT, scipy=scipy,
+        gives_steps=gives_steps, attitude=True, state_torque=True,
+    )  # fmt: skip
 
 
 def _gauss(stages: int) -> Method:
@@ -124,18 +117,19 @@ def _gauss(stages: int) -> Method:
         f"Gauss collocation of order {2 * stages}, steps halved until two agree",
         "fortran/modern/gauss_collocation.f90; Hairer, McLachlan and Razakarivony 2008",
         _GAUSS_FINEST[stages - 1],
-        _DEFAULT if stages > 1 else _ONE_STAGE_DEFAULT,
         _from("gauss", "gauss", stages),
+        _DEFAULT if stages > 1 else _ONE_STAGE_DEFAULT,
         order=2 * stages,
     )
 
 
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
-    solve = _from("fixed_step", "fixed_step", name)
-    return Method(name, title, source, 1.0, 1.0, solve, order=order, evaluations=evaluations)
+    solve = _from("gauss", "fixed_step", name)
+    return Method(name, title, source, 1.0, solve, 1.0, order=order, evaluations=evaluations)
 
 
+_SERIES: Any = dict.fromkeys(("gives_steps", "attitude", "space_torque", "state_torque"), True)
 REGISTRY = {
     method.name: method
     for method in (
@@ -144,12 +138,8 @@ REGISTRY = {
             "closed form where there is one, else Taylor series",
             "pyharness.engine.plan",
             1e-15,
-            _DEFAULT,
             _from("solve", "by_plan"),
-            gives_steps=True,
-            attitude=True,
-            space_torque=True,
-            state_torque=True,
+            **_SERIES,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),
         _scipy("RK45", "Runge-Kutta 5(4)", "Dormand and Prince 1980"),
@@ -160,19 +150,14 @@ REGISTRY = {
             "Taylor series by recurrence, step and order adapted",
             "ours; Jorba and Zou 2005, Experimental Mathematics 14",
             1e-15,
-            _DEFAULT,
             _from("taylor", "taylor"),
-            gives_steps=True,
-            attitude=True,
-            space_torque=True,
-            state_torque=True,
+            **_SERIES,
         ),
         Method(
             "reference",
             "known solution, or Taylor series in decimal arithmetic",
             "pyharness.truth.reference",
             2.0**-52,
-            _DEFAULT,
             _reference,
             any_scale=True,
             attitude=True,
@@ -183,7 +168,6 @@ REGISTRY = {
             "known solution: sphere, or any body without torque by elliptic functions",
             "fortran/modern/torque_free.f90, sphere.f90; Jacobi 1849",
             1e-14,
-            _DEFAULT,
             _from("closed_form", "known_solution"),
             any_scale=True,
             attitude=True,
@@ -193,7 +177,6 @@ REGISTRY = {
             "two-scale averaging, for weak torques over very many revolutions",
             "ours; Calvo, Chartier, Murua and Sanz-Serna 2011, Applied Numerical Mathematics 61",
             1e-13,
-            _DEFAULT,
             _from("averaged", "averaged"),
             weak_torque=True,
         ),
@@ -207,7 +190,6 @@ REGISTRY = {
             "fortran/modern/scaled_runge_kutta.f90",
             # At smaller tolerances the rounding errors of its many steps would matter.
             1e-12,
-            _DEFAULT,
             _no_rows,
             gives_rows=False,
         ),
@@ -217,10 +199,9 @@ REGISTRY = {
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# The methods with a prepared solver for a torque that depends on the state.
+# The methods with a prepared solver for a torque that depends on the state; they alone integrate a
+# scene's own states.
 PREPARED_FOR_STATE = ("auto", "taylor")
-# The methods that integrate a scene's own states.
-WITH_STATES = ("auto", "taylor")
 # SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}
 
@@ -271,32 +252,28 @@ def check_prepared(scene: Scene, method: str) -> None:
 def check_torque(scene: Scene, method: str, attitude: bool) -> None:
     """Raise InputError if the method can't solve the scene because of its torque or inertia."""
     torque, chosen = scene.torque, REGISTRY[method]
-    if scene.states and method not in WITH_STATES:
+    if scene.states and method not in PREPARED_FOR_STATE:
         raise InputError(
             f"method {method} can't solve a scene with states of its own; "
-            f"allowed: {', '.join(WITH_STATES)}"
+            f"allowed: {', '.join(PREPARED_FOR_STATE)}"
         )
-    kind = "a torque about the axes of space"
-    able: list[str] = []
+    kind, needed = "a torque about the axes of space", ""
     if isinstance(torque, StateTorque):
         kind = "a recorded torque, which is no TorqueLaw"
         if torque.needs_attitude:
             kind = "a torque that depends on the attitude"
         if torque.tape is None and not chosen.scipy:
-            kind, able = "an opaque torque", list(SCIPY_METHODS)
+            kind, needed = "an opaque torque", "scipy"
         elif chosen.weak_torque and scene.changing is not None:
-            kind = "an inertia that changes with time"
-            able = [each.name for each in REGISTRY.values() if each.state_torque]
+            kind, needed = "an inertia that changes with time", "state_torque"
         elif not (chosen.state_torque or (chosen.weak_torque and not torque.needs_attitude)):
-            able = [each.name for each in REGISTRY.values() if each.state_torque]
+            needed = "state_torque"
     elif scene.changing is not None and not chosen.state_torque:
-        kind = "an inertia that changes with time"
-        able = [each.name for each in REGISTRY.values() if each.state_torque]
+        kind, needed = "an inertia that changes with time", "state_torque"
     elif torque.in_space and not chosen.space_torque and scene.changing is None:
-        able = [each.name for each in REGISTRY.values() if each.space_torque]
-    if able:
-        raise InputError(
-            f"method {method} can't solve a scene with {kind}; allowed: {', '.join(able)}"
-        )
+        needed = "space_torque"
+    if needed:
+        able = ", ".join(each.name for each in REGISTRY.values() if getattr(each, needed))
+        raise InputError(f"method {method} can't solve a scene with {kind}; allowed: {able}")
     if torque.needs_attitude and not attitude:
         raise InputError(f"{kind} needs the attitude; give attitude=True, or --attitude FORM")

@@ -1,11 +1,13 @@
 """The reports of the commands `run` and `plan`, and the picture of a trajectory."""
 
-from dataclasses import asdict
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pyharness.model.assumptions import assumption_records
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.listing import Listing
 from pyharness.model.report import Column, Picture, Report, Table, digits, words
 from pyharness.model.scene import Scene
@@ -54,20 +56,16 @@ def trajectory_report(
     is the arithmetic of a thesis program, None for binary64. `bound` is the error bound of the
     method `reference`.
     """
-    columns = [*_TIMES, *_OMEGA]
-    parts = [trajectory.time, trajectory.recorded_time, trajectory.omega]
-    velocity = trajectory.velocity
-    if velocity is not None:
-        columns += _VELOCITY
-        parts.append(velocity)
-    attitude = trajectory.attitude
-    if attitude is not None:
-        columns += _ATTITUDE[form]
-        parts.append(_shown(attitude, form))
-    for name, values in trajectory.states.items():
-        columns.append(Column(name, _NUMBER, name=name))
-        parts.append(values)
-    rows = np.column_stack(parts)
+    times = np.column_stack([trajectory.time, trajectory.recorded_time])
+    blocks: list[tuple[tuple[Column, ...], Array]] = [(_TIMES, times), (_OMEGA, trajectory.omega)]
+    if trajectory.velocity is not None:
+        blocks.append((_VELOCITY, trajectory.velocity))
+    if trajectory.attitude is not None:
+        blocks.append((_ATTITUDE[form], _shown(trajectory.attitude, form)))
+    states = trajectory.states
+    blocks += [((Column(name, _NUMBER, name=name),), states[name]) for name in states]
+    columns = [column for each, _ in blocks for column in each]
+    rows = np.column_stack([values for _, values in blocks])
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
     # The nine elements of a matrix fill the width of a terminal; all else but time is omitted.
@@ -77,25 +75,26 @@ def trajectory_report(
         np.column_stack([steps, rows[:, kept]]),
     )
 
+    bounds: list[str] = []
+    if bound is not None:
+        bounds.append(f"reference: error of any omega at most {bound.text()}")
+        if bound.turned is not None:
+            bounds.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
+        bounds += [f"WARNING: {bound.warning}"] if bound.warning else []
+
     def record() -> dict[str, Any]:
         from pyharness.model import records
 
+        names = ("time", "recorded_time", "omega", "velocity", "attitude")
+        arrays = {name: getattr(trajectory, name) for name in names}
         return {
             "scene": records.scene_record(scene),
             "method": method,
             "listing": None if listing is None else records.listing_record(listing),
             **({} if word is None else {"word": word}),
             "trajectory": {
-                "time": trajectory.time.tolist(),
-                "recorded_time": trajectory.recorded_time.tolist(),
-                "omega": trajectory.omega.tolist(),
-                "velocity": None if velocity is None else velocity.tolist(),
-                "attitude": None if attitude is None else attitude.tolist(),
-                **(
-                    {"states": {name: x.tolist() for name, x in trajectory.states.items()}}
-                    if trajectory.states
-                    else {}
-                ),
+                **{name: None if x is None else x.tolist() for name, x in arrays.items()},
+                **({"states": {name: x.tolist() for name, x in states.items()}} if states else {}),
                 "tolerance": trajectory.tolerance,
                 **records.estimate_record(trajectory),
             },
@@ -110,21 +109,12 @@ def trajectory_report(
         text=[
             [*heading(scene, filter(None, [listing])), title],
             [counted],
-            [ending(trajectory), *estimates(trajectory), *_bounds(bound)],
+            [ending(trajectory), *estimates(trajectory), *bounds],
         ],
         record=record,
         data=numbers,
         pictures={"omega": lambda: _picture(f"{scene.name}: {title}", trajectory, numbers)},
     )
-
-
-def _bounds(bound: "ErrorBound | None") -> list[str]:
-    if bound is None:
-        return []
-    lines = [f"reference: error of any omega at most {bound.text()}"]
-    if bound.turned is not None:
-        lines.append(f"reference: error of any attitude at most {bound.turned.text('rad')}")
-    return lines + ([f"WARNING: {bound.warning}"] if bound.warning else [])
 
 
 def _shown(attitude: Array, form: str) -> Array:
@@ -172,16 +162,39 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
     """Return the report of a plan: the method, the computed parts, and the reasons."""
     table = Table(
         words("part computed why"),
-        [[each.part, "yes" if each.kept else "no", each.why] for each in plan.decisions],
+        [[part, "yes" if kept else "no", why] for part, kept, why in plan.decisions],
     )
 
     def record() -> dict[str, Any]:
         from pyharness.model.records import scene_record
 
-        decisions = [asdict(each) for each in plan.decisions]
+        decisions = [each._asdict() for each in plan.decisions]
         found = {"method": plan.method, "closed_form": plan.closed_form, "decisions": decisions}
         supplied = assumption_records([(scene, [])])
         return {"scene": scene_record(scene), "plan": found, "assumptions": supplied}
 
     head = [*heading(scene), f"method: {plan.method}"]
     return Report("plan", text=[head, [table]], record=record, data=table)
+
+
+def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> "ErrorBound | None":
+    """Return the proved or estimated error of a trajectory by `reference`; None if not finite."""
+    from pyharness.truth.bounded import error_bound
+
+    start = None if found.attitude is None else scene.attitude or IDENTITY
+    scene = replace(scene, attitude=start)
+    largest = max(*map(abs, scene.omega), float(np.abs(found.omega).max(initial=0.0)))
+    claimed = math.inf if found.error is None else found.error
+    bound = error_bound(
+        scene,
+        found.time,
+        found.omega,
+        claimed * (largest or 1.0),
+        found.attitude,
+        claimed,
+        any_torque=True,
+        effort=effort,
+    )
+    if bound.angle is not None and not math.isfinite(bound.angle):
+        bound = bound._replace(angle=None, angle_basis=None)
+    return bound if math.isfinite(bound.value) else None

@@ -9,18 +9,25 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyharness.engine.scaled_tape import MULTIPLE, scaled_tape
 from pyharness.engine.steps import transformed_steps
-from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
+from pyharness.model.errors import TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import Tape
+from pyharness.model.tape import N_INPUTS, OMEGA, TIME, Linear, Operation, Table, Tape
 from pyharness.model.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from pyharness.engine.registry import Method
+
+# The exponents of rescaled time are multiples of this number, so that those of nested square roots
+# are whole numbers.
+_MULTIPLE = 16
 _SAMPLES = 9  # times at which a torque of the state is evaluated
 # From the inverse of this omega to this omega (rad/s), products of components of different size
 # keep their digits.
@@ -33,14 +40,6 @@ def scaled(scene: Scene, factor: float) -> Scene:
     Raise InputError if the torque depends on the state and can't be rescaled, or if the inertia
     changes with time.
     """
-    is_constant = scene.changing is None
-    tape = _tape(scene.torque, factor) if isinstance(scene.torque, StateTorque) else None
-    if is_constant and tape is not None:
-        first, second, third = (factor * each for each in scene.omega)
-        torque = StateTorque(tape, None, scene.torque.needs_attitude)
-        step = scene.step_size / factor
-        return replace(scene, omega=(first, second, third), torque=torque, step_size=step)
-    law = scene.law
 
     def times(values: Triple, power: int) -> Triple:
         # The square of the factor may overflow.
@@ -49,18 +48,21 @@ def scaled(scene: Scene, factor: float) -> Scene:
             values = first * factor, second * factor, third * factor
         return values
 
-    return replace(
-        scene,
-        omega=times(scene.omega, 1),
-        torque=replace(
+    torque = scene.torque
+    tape = _tape(torque, factor) if isinstance(torque, StateTorque) else None
+    if tape is not None and scene.changing is None:
+        torque = StateTorque(tape, None, torque.needs_attitude)
+    else:
+        law = scene.law
+        torque = replace(
             law,
             constant=times(law.constant, 2),
             rate=times(law.rate, 3),
             sines=tuple((times(a, 2), f * factor) for a, f in law.sines),
             cosines=tuple((times(a, 2), f * factor) for a, f in law.cosines),
-        ),
-        step_size=scene.step_size / factor,
-    )
+        )
+    step_size = scene.step_size / factor
+    return replace(scene, omega=times(scene.omega, 1), torque=torque, step_size=step_size)
 
 
 def is_ordinary(omega: Triple) -> bool:
@@ -68,9 +70,26 @@ def is_ordinary(omega: Triple) -> bool:
     return 1.0 / _LARGE <= max(map(abs, omega)) <= _LARGE
 
 
-def has_ordinary_rows(found: Trajectory) -> bool:
-    """Return whether a trajectory has all rows, and no omega above 2**300 rad/s."""
-    return found.has_all_rows and float(np.abs(found.omega).max(initial=0.0)) <= _LARGE
+def integrate(
+    method: "Method", scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
+) -> Trajectory:
+    """Return the trajectory on one side of 0, computed in a suitable unit of time."""
+    if not method.is_fixed_step and not is_ordinary(scene.omega):
+        # The method does not use the step size, but in the new unit it might not be finite.
+        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
+    factor = 1.0 if method.any_scale or scene.states else rescaling_factor(scene, times[-1])
+    if factor == 1.0:
+        return method.solve(scene, times, tolerance, effort, *more)
+    faster = [t / factor for t in times]
+    try:
+        found = method.solve(scaled(scene, factor), faster, tolerance, effort, *more)
+    except TimedError as refusal:
+        raise refusal.slower(factor) from refusal.__cause__
+    largest = float(np.abs(found.omega).max(initial=0.0))
+    if isinstance(scene.torque, StateTorque) and not (found.has_all_rows and largest <= _LARGE):
+        # The torque causes a larger omega than estimated.
+        return method.solve(scene, times, tolerance, effort, *more)
+    return unscaled(found, times, factor)
 
 
 def rescaling_factor(scene: Scene, time: float) -> float:
@@ -81,21 +100,28 @@ def rescaling_factor(scene: Scene, time: float) -> float:
     """
     if is_ordinary(scene.omega):
         return 1.0
-    state_torque = scene.torque if isinstance(scene.torque, StateTorque) else None
-    by_torque = omega_by_torque if state_torque is None else _omega_by_state_torque
+    torque = scene.torque if isinstance(scene.torque, StateTorque) else None
+    by_torque = omega_by_torque if torque is None else _omega_by_state_torque
     largest = max(max(map(abs, scene.omega)), by_torque(scene, time))
     if not (0.0 < largest < math.inf) or 1.0 / _LARGE <= largest <= _LARGE:
         return 1.0
     # With a larger exponent the factor would overflow or underflow.
     exponent = max(-1000, min(1000, math.frexp(largest)[1]))
-    if state_torque is not None:
-        exponent -= exponent % MULTIPLE
+    if torque is not None:
+        exponent -= exponent % _MULTIPLE
     factor = math.ldexp(1.0, -exponent)
-    if state_torque is not None:
-        is_short = 0.0 < abs(time) / factor < sys.float_info.min
-        fits = math.isfinite(abs(time) / factor) and not is_short
-        return factor if fits and _tape(state_torque, factor) is not None else 1.0
-    return factor if _fits(scene, time, factor) else 1.0
+    # Times and torques must be finite, and times not subnormal.
+    sizes, shortest = [abs(time) / factor], math.inf
+    if torque is None:
+        law, shortest = scene.law, scene.step_size / factor * scene.steps
+        waves = law.sines + law.cosines
+        vectors = law.constant, *(a for a, _ in waves)
+        sizes += [abs(x) * factor * factor for vector in vectors for x in vector]
+        sizes += [abs(x) * factor * factor * factor for x in law.rate]
+        sizes += [*(abs(f) * factor for _, f in waves), shortest]
+    is_short = shortest < sys.float_info.min or 0.0 < sizes[0] < sys.float_info.min
+    fits = all(map(math.isfinite, sizes)) and not is_short
+    return factor if fits and (torque is None or _tape(torque, factor) is not None) else 1.0
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
@@ -125,15 +151,11 @@ def _omega_by_state_torque(scene: Scene, time: float) -> float:
     assert isinstance(torque, StateTorque)
     if torque.tape is None:
         return 0.0
-    rates = [
-        abs(each / moment)
-        for n in range(_SAMPLES)
-        for each, moment in zip(
-            torque.at(time * n / (_SAMPLES - 1), scene.omega, scene.attitude or IDENTITY),
-            moments,
-            strict=True,
-        )
-    ]
+    rates = []
+    for n in range(_SAMPLES):
+        state = scene.omega, scene.attitude or IDENTITY
+        torques = torque.at(time * n / (_SAMPLES - 1), *state)
+        rates += [abs(each / moment) for each, moment in zip(torques, moments, strict=True)]
     omega = max(filter(math.isfinite, rates), default=0.0) * abs(time)
     return omega if math.isfinite(omega) else 0.0
 
@@ -142,17 +164,81 @@ def _tape(torque: StateTorque, factor: float) -> Tape | None:
     return torque.tape and scaled_tape(torque.tape, math.frexp(factor)[1] - 1)
 
 
-def _fits(scene: Scene, time: float, factor: float) -> bool:
-    """Return whether rescaled times and torques are finite, and times not subnormal."""
-    law = scene.law
-    waves = law.sines + law.cosines
-    sizes = [abs(x) * factor * factor for a in (law.constant, *(a for a, _ in waves)) for x in a]
-    sizes += [abs(x) * factor * factor * factor for x in law.rate]
-    sizes += [abs(f) * factor for _, f in waves]
-    sizes += [scene.step_size / factor * scene.steps]
-    faster = abs(time) / factor
-    short = sizes[-1] < sys.float_info.min or 0.0 < faster < sys.float_info.min
-    return all(map(math.isfinite, (*sizes, faster))) and not short
+@lru_cache(maxsize=64)
+def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
+    """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
+
+    Each slot (input or result) has its own power of two as factor, so that none overflows or
+    underflows. The outputs are multiplied by 2**(2 * exponent). The result is None if a number
+    would be rounded.
+    """
+    # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
+    operations: list[Operation] = []
+    places = list(range(N_INPUTS))
+    exponents = [exponent if slot in OMEGA else 0 for slot in places]
+    exponents[TIME] = -exponent
+    # Slots that are linear combinations.
+    combinations: dict[int, Linear] = {TIME: Linear(0.0, ((TIME, 1.0),))}
+
+    def combine(linear: Linear, power: int) -> Linear:
+        """Return a combination of the new slots, times 2**power."""
+        terms = tuple(
+            (places[slot], float(_scaled(np.float64(factor), power - exponents[slot])))
+            for slot, factor in linear.terms
+        )
+        return Linear(float(_scaled(np.float64(linear.constant), power)), terms)
+
+    def append(operation: Operation) -> int:
+        operations.append(operation)
+        return N_INPUTS + len(operations) - 1
+
+    def copy_slot(slot: int, power: int) -> int:
+        """Return a new slot that has the original value of `slot`, times 2**power."""
+        if exponents[slot] == power:
+            return places[slot]
+        # The kernel recognises an angle proportional to time by its linear combination.
+        linear = combinations.get(slot, Linear(0.0, ((slot, 1.0),)))
+        return append(Operation("linear", (), combine(linear, power)))
+
+    try:
+        for kind, operands, linear, table in tape.operations:
+            powers, power = [exponents[slot] for slot in operands], 0
+            if linear is not None:
+                combinations[len(places)] = linear
+                own = {exponents[slot] for slot, _ in linear.terms}
+                power = 0 if linear.constant or not own else min(own, key=abs)
+                found = Operation(kind, (), combine(linear, power))
+            elif table is not None:
+                pieces = _scaled(table.pieces, exponent * np.arange(4))
+                found = Operation(kind, (), None, Table(_scaled(table.breaks, -exponent), pieces))
+            elif kind in ("product", "quotient", "sqrt", "switch"):
+                found = Operation(kind, tuple(places[slot] for slot in operands))
+                if kind == "sqrt":
+                    power, odd = divmod(powers[0], 2)
+                    if odd:
+                        return None  # the exponent of the root is not a whole number
+                elif kind != "switch":
+                    power = powers[0] + (powers[1] if kind == "product" else -powers[1])
+            elif kind == "select":
+                power = powers[1]
+                other = copy_slot(operands[2], power)
+                found = Operation(kind, (places[operands[0]], places[operands[1]], other))
+            else:
+                found = Operation(kind, tuple(copy_slot(slot, 0) for slot in operands))
+            places.append(append(found))
+            exponents.append(power)
+        return Tape(tuple(operations), tuple(combine(each, 2 * exponent) for each in tape.outputs))
+    except ArithmeticError:
+        return None
+
+
+def _scaled(values: Any, exponents: Any) -> Any:
+    """Return values * 2**exponents, or raise ArithmeticError if one would be rounded."""
+    with np.errstate(all="ignore"):
+        found = np.ldexp(values, exponents)
+        if not np.array_equal(np.ldexp(found, -exponents), values):
+            raise ArithmeticError("the product underflows or overflows")
+    return found
 
 
 def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> Trajectory:
@@ -165,12 +251,10 @@ def unscaled(trajectory: Trajectory, times: Sequence[float], factor: float) -> T
     attitude = trajectory.attitude if trajectory.attitude is None else trajectory.attitude[:count]
     found = replace(
         trajectory, time=time, recorded_time=time, omega=omega[:count], attitude=attitude,
-        sol=transformed_steps(trajectory.sol, lambda states: _slower(states, factor), factor),
+        sol=transformed_steps(
+            trajectory.sol, lambda x: np.column_stack([x[:, :3] / factor, x[:, 3:]]), factor
+        ),
     )  # fmt: skip
     if count == len(trajectory.omega):
         return found
     return replace(found, ended="overflow", error=None, growth=None, sol=None)
-
-
-def _slower(states: Array, factor: float) -> Array:
-    return np.column_stack([states[:, :3] / factor, states[:, 3:]])

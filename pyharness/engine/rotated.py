@@ -79,41 +79,29 @@ def restarted_at(
     InputError if the torque is opaque, or needs an attitude and `attitude` is None.
     """
     first, second, third = (float(w) for w in omega)
-    if isinstance(scene.torque, StateTorque):
-        if scene.torque.needs_attitude and attitude is None:
-            raise InputError(
-                "a scene with a torque that depends on the attitude can't be restarted without the "
-                "attitude at that time"
-            )
-        return replace(
-            scene,
-            omega=(first, second, third),
-            torque=later(scene.torque, by),
-            attitude=scene.attitude if attitude is None else attitude,
-        )
-    law = scene.law
-    if law.in_space and attitude is None:
+    torque = scene.torque
+    if torque.needs_attitude and attitude is None:
+        kind = "about the axes of space" if torque.in_space else "that depends on the attitude"
         raise InputError(
-            "a scene with a torque about the axes of space can't be restarted without the "
-            "attitude at that time"
+            f"a scene with a torque {kind} can't be restarted without the attitude at that time"
         )
-    sines: list[Wave] = []
-    cosines: list[Wave] = []
+    if isinstance(torque, StateTorque):
+        torque = later(torque, by)
+    else:
+        sines: list[Wave] = []
+        cosines: list[Wave] = []
 
-    def times(values: Triple, factor: float) -> Triple:
-        return values[0] * factor, values[1] * factor, values[2] * factor
+        def times(values: Triple, factor: float) -> Triple:
+            return values[0] * factor, values[1] * factor, values[2] * factor
 
-    for amplitude, frequency in law.sines:
-        sines.append((times(amplitude, math.cos(frequency * by)), frequency))
-        cosines.append((times(amplitude, math.sin(frequency * by)), frequency))
-    for amplitude, frequency in law.cosines:
-        cosines.append((times(amplitude, math.cos(frequency * by)), frequency))
-        sines.append((times(amplitude, -math.sin(frequency * by)), frequency))
-    c, r = law.constant, law.rate
-    constant = (c[0] + r[0] * by, c[1] + r[1] * by, c[2] + r[2] * by)
-    return replace(
-        scene,
-        omega=(first, second, third),
-        torque=TorqueLaw(constant, r, tuple(sines), tuple(cosines), law.frame),
-        attitude=scene.attitude if attitude is None else attitude,
-    )
+        for amplitude, f in torque.sines:
+            sines.append((times(amplitude, math.cos(f * by)), f))
+            cosines.append((times(amplitude, math.sin(f * by)), f))
+        for amplitude, f in torque.cosines:
+            cosines.append((times(amplitude, math.cos(f * by)), f))
+            sines.append((times(amplitude, -math.sin(f * by)), f))
+        c, r = torque.constant, torque.rate
+        constant = (c[0] + r[0] * by, c[1] + r[1] * by, c[2] + r[2] * by)
+        torque = TorqueLaw(constant, r, tuple(sines), tuple(cosines), torque.frame)
+    attitude = scene.attitude if attitude is None else attitude
+    return replace(scene, omega=(first, second, third), torque=torque, attitude=attitude)

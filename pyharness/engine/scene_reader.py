@@ -160,10 +160,22 @@ def _torque(
 ) -> TorqueLaw | StateTorque:
     check_keys(table, SCENE_TABLES["torque"], "[torque]")
     given = {key: value for key, value in table.items() if key != "terms"}
-    if rates or any(key in given for key in _TEXTS):
-        first = _expressions(given, rates)
-    else:
+    first: TorqueLaw | StateTorque
+    if not (rates or any(key in given for key in _TEXTS)):
         first = law_of_table(given)
+    elif "expression" not in given:
+        what = "states" if rates else "constants"
+        raise InputError(
+            f"[torque]: {what} without expression; give an expression, a list of three texts, or "
+            "constant, three numbers"
+        )
+    elif others := [key for key in given if key not in _TEXTS]:
+        raise InputError(
+            f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
+            "constant, rate, sines, cosines and frame"
+        )
+    else:
+        first = parsed(given["expression"], given.get("constants", {}), rates)
     if "terms" not in table:
         return first
     # Imported late, because few scenes have ready terms.
@@ -171,18 +183,3 @@ def _torque(
 
     terms = read_terms(table["terms"], body)
     return sum(terms[1:], terms[0]) + first if terms else first
-
-
-def _expressions(table: dict[str, Any], rates: dict[str, Any]) -> StateTorque | TorqueLaw:
-    if "expression" not in table:
-        what = "states" if rates else "constants"
-        raise InputError(
-            f"[torque]: {what} without expression; give an expression, a list of three texts, or "
-            "constant, three numbers"
-        )
-    if others := [key for key in table if key not in _TEXTS]:
-        raise InputError(
-            f"[torque]: expression and {others[0]}; allowed: expression with constants, or "
-            "constant, rate, sines, cosines and frame"
-        )
-    return parsed(table["expression"], table.get("constants", {}), rates)

@@ -18,6 +18,7 @@ from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, Run, rows_of
 from pyharness.engine.scipy_run import RightHandSide as RightHandSide
 from pyharness.engine.scipy_state import finest_of_state, solve_state
 from pyharness.engine.sensitivity import is_sensitive, torque_noise
+from pyharness.model.attitude import quaternion_rates
 from pyharness.model.effort import Integrator, waves
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
@@ -61,7 +62,7 @@ _RADAU_SHARE = 2
 class _Ahead(NamedTuple):
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
     # Integral over time of the largest coefficient times |omega|, plus the limited phases of the
-    # torque waves of `_sum_phases` (rad).
+    # torque waves (rad).
     radians: float
     growth: float  # error amplification until the end, at least 1
     turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
@@ -103,7 +104,8 @@ def scipy_method(name: str) -> Integrator:
                 # The body is at rest, and no torque acts.
                 rest = np.tile(state_of(scene), (len(times), 1))
                 return rows_of(times, rest, run.evaluations, len(times), "complete")
-            run.add_attitude()
+            if scene.attitude is not None:
+                run.start, run.slopes = state_of(scene), with_attitude(run.slopes)
             total = steps_sum(name, *ahead[1:])
             finest = FINEST_STEP * total
             if tolerance < finest * (1.0 - 1e-9):
@@ -155,17 +157,11 @@ def state_of(scene: Scene) -> tuple[float, ...]:
 
 
 def with_attitude(slopes: RightHandSide) -> RightHandSide:
-    """Return the right-hand side of omega with the attitude added, q' = q (0, omega)/2."""
+    """Return the right-hand side of omega with the attitude added."""
 
     def both(time: float, state: Sequence[float]) -> list[float]:
-        x, y, z, a, b, c, d = state
-        return [
-            *slopes(time, (x, y, z)),
-            -0.5 * (b * x + c * y + d * z),
-            0.5 * (a * x + c * z - d * y),
-            0.5 * (a * y + d * x - b * z),
-            0.5 * (a * z + b * y - c * x),
-        ]
+        x, y, z, *q = state
+        return [*slopes(time, (x, y, z)), *quaternion_rates((x, y, z), q)]
 
     return both
 
@@ -181,11 +177,6 @@ class _Run(Run):
         rate = max(map(abs, scene.euler_coefficients))
         most = int(_most(name, effort) * 8 / (8 + waves(scene)))
         super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
-
-    def add_attitude(self) -> None:
-        if self.scene.attitude is not None:
-            self.start = state_of(self.scene)
-            self.slopes = with_attitude(self.slopes)
 
     def _scale_by_torque(self) -> float:
         """Return a bound of |omega| (rad/s) by the torque alone; 1 if not finite."""
@@ -217,15 +208,16 @@ class _Run(Run):
         omega = np.nan_to_num(coarse.sol(times).T)
         sizes = np.abs(omega).max(axis=1)
         largest = max(largest, float(sizes.max()))
-        radians = self.rate * length * float(np.mean(sizes)) + _sum_phases(
-            self.scene, length, largest
-        )
+        radians, phases = self.rate * length * float(np.mean(sizes)), 0.0
+        for push, frequency in _pushes(self.scene):
+            # A phase counts at most as the omega that the wave can add, relative to `largest`.
+            phases += min(frequency * length, push * length / largest if largest > 0.0 else 0.0)
         turned = 0.0
         if self.scene.attitude is not None:
             turned = length * float(np.linalg.norm(omega, axis=1).mean())
         with np.errstate(all="ignore"):
             flow = propagators(self.scene, times * self.unit, omega)
-        return _Ahead(largest, radians, growth(np.nan_to_num(flow)), turned)
+        return _Ahead(largest, radians + phases, growth(np.nan_to_num(flow)), turned)
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
@@ -235,12 +227,3 @@ def _pushes(scene: Scene) -> list[tuple[float, float]]:
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))
         for amplitude, frequency in scene.law.sines + scene.law.cosines
     ]
-
-
-def _sum_phases(scene: Scene, span: float, largest: float) -> float:
-    """Return the sum of the phases (rad) of all torque waves over the time `span` (s)."""
-    # A phase counts at most as the omega that the wave can add, relative to `largest`.
-    found = 0.0
-    for push, frequency in _pushes(scene):
-        found += min(frequency * span, push * span / largest if largest > 0.0 else 0.0)
-    return found

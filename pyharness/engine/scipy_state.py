@@ -13,8 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyharness.engine.scipy_run import FINEST_STEP, NoNumberError, RightHandSide, Run, rows_of
-from pyharness.engine.scipy_spans import Span, bounds_of, series_beside
+from pyharness.engine.scipy_run import (
+    FINEST_STEP,
+    NoNumberError,
+    RightHandSide,
+    Run,
+    Span,
+    bounds_of,
+    rows_of,
+    series_beside,
+)
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.system import slopes_of
 from pyharness.model.dense_output import DenseOutput, Pieces
@@ -94,36 +102,24 @@ def solve_state(
         return rows_of([], nothing, 1, len(times), "overflow")
     if times[-1] == 0.0:
         return rows_of(times, np.array([run.start]), 1, 0, "complete")
-    found = _solved(run, times, tolerance)
+    found = _refined(run, times, tolerance)
     is_checked = True
     if run.is_smooth:
         beside = series_beside(scene, times, tolerance)
         is_checked = beside is not None
-        if beside and not _agrees(found, beside.rows, tolerance):
+        if beside is not None:
+            largest = max(found.largest, _largest_of(beside.rows))
+            first, second = found._replace(largest=largest), _Rows(beside.rows, True, largest)
+            agrees = _difference(first, second) <= _AGREEMENT * tolerance
+        if beside is not None and not (agrees and len(found.state) >= len(beside.rows)):
             run.spans = beside.spans
-            found = _solved(run, times, tolerance)
+            found = _refined(run, times, tolerance)
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)
     ended = "overflow" if not found.is_complete else "complete" if is_checked else "unchecked"
     result = rows_of(times[:count], found.state, run.evaluations, len(times), ended)
     return replace(result, sol=run.steps(scene)) if ended == "complete" else result
-
-
-def _solved(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
-    scale = run.expected_omega()
-    if scale == 0.0:
-        # The body is at rest, and no torque acts.
-        return _Rows(np.tile(run.start, (len(times), 1)), True, 0.0)
-    return _refined(run, times, tolerance, scale)
-
-
-def _agrees(found: _Rows, rows: Array, tolerance: float) -> bool:
-    if len(found.state) < len(rows):
-        return False
-    largest = max(found.largest, float(np.abs(rows[:, :3]).max()))
-    first, second = found._replace(largest=largest), _Rows(rows, True, largest)
-    return _difference(first, second) <= _AGREEMENT * tolerance
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
@@ -138,8 +134,12 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
     return 1.5 * _SAFETY * FINEST_STEP * _difference(first, second) / _TRIAL[0]
 
 
-def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: float) -> _Rows:
+def _refined(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
     """Return rows whose estimated error is at most `tolerance`, or raise InputError."""
+    scale = run.expected_omega()
+    if scale == 0.0:
+        # The body is at rest, and no torque acts.
+        return _Rows(np.tile(run.start, (len(times), 1)), True, 0.0)
     local = max(tolerance / _FIRST[run.name], _RATIO * FINEST_STEP)
     before, ratio = run.rows(times, local, scale), _RATIO
     while True:
@@ -155,20 +155,20 @@ def _refined(run: "_StateRun", times: Sequence[float], tolerance: float, scale: 
         if finer == FINEST_STEP:
             if not (before.is_complete or after.is_complete):
                 # No row meets the tolerance near the time at which omega becomes infinite.
-                return _agreeing(before, after, tolerance)
+                n = min(len(before.state), len(after.state))
+                while n and _differences(before, after, n).max() > tolerance:
+                    n -= 1
+                return after._replace(state=after.state[:n])
+            allowed = f"{2.0 * error:.2g} to 1" if 0.0 < error < 0.5 else "a larger tolerance"
             raise InputError(
                 f"tolerance is {tolerance:g}; {run.label} can't meet it here, because two "
                 "integrations with the smallest local tolerances "
                 + (f"differ by {difference:.2g}; " if same_end else "end at different times; ")
-                + f"allowed for this motion: {_allowed(error)}, or a shorter time"
+                + f"allowed for this motion: {allowed}, or a shorter time"
             )
         # Aim at a quarter of the allowed error.
         ratio = min(_LARGEST_RATIO, max(_RATIO, 4.0 * difference / (ratio * tolerance)))
         before, local = after, finer
-
-
-def _allowed(error: float) -> str:
-    return f"{2.0 * error:.2g} to 1" if 0.0 < error < 0.5 else "a larger tolerance"
 
 
 def _difference(before: _Rows, after: _Rows) -> float:
@@ -200,7 +200,7 @@ def _differences(before: _Rows, after: _Rows, n: int) -> Array:
         largest = min(before.largest, after.largest)
     else:
         # The largest omega until the end does not exist.
-        largest = float(np.abs(second[:, :3]).max(initial=0.0))
+        largest = _largest_of(second)
     apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
     found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)
     if first.shape[1] > 3:
@@ -208,13 +208,6 @@ def _differences(before: _Rows, after: _Rows, n: int) -> Array:
         turned = 2.0 * np.linalg.norm(first[:, 3:] - second[:, 3:], axis=1)
         found = np.maximum(found, turned)
     return found
-
-
-def _agreeing(before: _Rows, after: _Rows, tolerance: float) -> _Rows:
-    n = min(len(before.state), len(after.state))
-    while n and _differences(before, after, n).max() > tolerance:
-        n -= 1
-    return after._replace(state=after.state[:n])
 
 
 class _StateRun(Run):
@@ -235,14 +228,11 @@ class _StateRun(Run):
         rate = max(map(abs, scene.euler_coefficients))
         limit = int(most * _WORK / (_WORK + work))
         start = (*scene.omega, *(scene.attitude or ()))
-        own = self._between_breaks(slopes)
-        if torque.tape is None:
-            own = self._guarded(slopes)
-        super().__init__(start, own, rate, end, name, effort, limit)
-        if torque.tape is None:
+        self.is_smooth = torque.tape is not None
+        super().__init__(start, self._guarded(slopes), rate, end, name, effort, limit)
+        if not self.is_smooth:
             self._check_memory()
         self.name = name
-        self.is_smooth = torque.tape is not None
         self._between = -math.inf, math.inf
         self._undefined: float | None = None
         self._integrations = 0
@@ -252,19 +242,17 @@ class _StateRun(Run):
         self._solutions: list[Any] = []  # SciPy's dense outputs of the last integration
         self.spans = [Span(time, math.inf) for time in bounds_of(scene, end)]
 
-    def _between_breaks(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side that evaluates tables only inside the current span."""
+    def _guarded(self, slopes: RightHandSide) -> RightHandSide:
+        """Return a right-hand side that evaluates tables only inside the current span.
+
+        It raises InputError if an opaque function fails.
+        """
 
         def between(time: float, state: Sequence[float]) -> list[float]:
             low, high = self._between
             return slopes(min(max(time, low), high), state)
 
-        return between
-
-    def _guarded(self, slopes: RightHandSide) -> RightHandSide:
-        """Return a right-hand side that raises InputError if an opaque function fails."""
         # A NaN is a failure only if SciPy does not avoid it by shorter steps.
-
         def guarded(time: float, state: Sequence[float]) -> list[float]:
             try:
                 found = slopes(time, state)
@@ -282,16 +270,20 @@ class _StateRun(Run):
                 self._undefined = float(time)
             return found
 
-        return guarded
+        return between if self.is_smooth else guarded
+
+    def _rates(self, time: float, state: Sequence[float]) -> Array:
+        """Return the right-hand side without warnings."""
+        self.evaluations += 1
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            return np.array(self.slopes(time, state))
 
     def _check_memory(self) -> None:
         """Raise InputError if an opaque function does not return the same for the same state."""
         self._undefined = None
-        self.evaluations += 3
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            first = self.slopes(0.0, self.start)
-            self.slopes(0.5 * self.end, [1.5 * each for each in self.start])
-            again = self.slopes(0.0, self.start)
+        first = self._rates(0.0, self.start)
+        self._rates(0.5 * self.end, [1.5 * each for each in self.start])
+        again = self._rates(0.0, self.start)
         if not np.array_equal(first, again, equal_nan=True):
             raise InputError(f"[torque]: {HAS_MEMORY}")
 
@@ -305,26 +297,22 @@ class _StateRun(Run):
             )
         return super().work_error(time)
 
+    @np.errstate(all="ignore")
     def _jumps(self) -> bool:
         """Return whether the rates jump near the last state."""
-        time, state = self._last
-
-        def rates(at: Array) -> Array:
-            return np.array(self.slopes(self.unit * time, at.tolist()))
-
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            low, first = state, rates(state)
-            high = state + _AHEAD * abs(self.end) * first
-            second = rates(high)
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                found = rates(middle)
-                if np.abs(found - first).max() > np.abs(second - found).max():
-                    high, second = middle, found
-                else:
-                    low, first = middle, found
-            jump = float(np.abs(second - first).max())
-            return jump > 0.1 * float(np.abs([first, second]).max())
+        time, low = self._last[0] * self.unit, self._last[1]
+        first = self._rates(time, low.tolist())
+        high = low + _AHEAD * abs(self.end) * first
+        second = self._rates(time, high.tolist())
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            found = self._rates(time, middle.tolist())
+            if np.abs(found - first).max() > np.abs(second - found).max():
+                high, second = middle, found
+            else:
+                low, first = middle, found
+        jump = float(np.abs(second - first).max())
+        return jump > 0.1 * float(np.abs([first, second]).max())
 
     def check_undefined(self) -> None:
         """Raise InputError if an opaque function returned NaN since the last step."""
@@ -350,9 +338,7 @@ class _StateRun(Run):
 
     def is_singular(self) -> bool:
         """Return whether a rate at time 0 is not finite; SciPy's first step would then not end."""
-        self.evaluations += 1
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            return not all(map(math.isfinite, self.slopes(0.0, self.start)))
+        return not np.isfinite(self._rates(0.0, self.start)).all()
 
     def expected_omega(self) -> float:
         """Return the largest |omega| (rad/s) to few digits, or a guess if rows are missing."""
@@ -369,9 +355,7 @@ class _StateRun(Run):
     def _pushed(self) -> float:
         """Return the |omega| (rad/s) that the largest torque would cause from rest; 1 if none."""
         times = np.linspace(0.0, self.end, _FEWEST_STEPS + 1).tolist()
-        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
-            rates = [abs(rate) for time in times for rate in self.slopes(time, self.start)[:3]]
-        self.evaluations += len(times)
+        rates = [abs(x) for time in times for x in self._rates(time, self.start)[:3].tolist()]
         omega = max(filter(math.isfinite, rates), default=0.0) * abs(self.end)
         return omega if 0.0 < omega < math.inf else 1.0
 
@@ -387,13 +371,16 @@ class _StateRun(Run):
         for end, most in self.spans:
             own = [time for time in times[len(rows) :] if abs(time) <= abs(end)]
             wanted = own if own and own[-1] == end else [*own, end]
-            self._between = _interior(begin, end)
+            low, high = sorted((math.nextafter(begin, end), math.nextafter(end, begin)))
+            self._between = low, high
             found = self._from(begin, state, wanted, local, sizes, min(longest, most), scale)
             rows = np.concatenate([rows, found[: len(own)]])
             if len(found) < len(wanted):
                 break
             state, begin = found[-1].tolist(), end
-        return self._collect_rows(rows, len(times))
+        finite = np.isfinite(rows).all(axis=1)
+        rows = _with_unit_attitude(rows if finite.all() else rows[: int(np.argmin(finite))])
+        return _Rows(rows, len(rows) == len(times), self._largest, tuple(self._solutions))
 
     def _from(
         self, begin: float, state: Sequence[float], wanted: list[float], local: float,
@@ -431,13 +418,6 @@ class _StateRun(Run):
         nodes = np.array(values)[::order, ::order]
         return steps_output(scene, Pieces(np.array(edges)[::order], nodes))
 
-    def _collect_rows(self, rows: Array, wanted: int) -> _Rows:
-        rows = np.reshape(rows, (-1, len(self.start)))
-        finite = np.isfinite(rows).all(axis=1)
-        rows = rows if finite.all() else rows[: int(np.argmin(finite))]
-        rows = _with_unit_attitude(rows)
-        return _Rows(rows, len(rows) == wanted, self._largest, tuple(self._solutions))
-
 
 def _with_unit_attitude(rows: Array) -> Array:
     if rows.shape[1] == 3:
@@ -446,6 +426,5 @@ def _with_unit_attitude(rows: Array) -> Array:
     return np.hstack([rows[:, :3], unit])
 
 
-def _interior(first: float, second: float) -> tuple[float, float]:
-    inner = math.nextafter(first, second), math.nextafter(second, first)
-    return min(inner), max(inner)
+def _largest_of(rows: Array) -> float:
+    return float(np.abs(rows[:, :3]).max(initial=0.0))

@@ -1,7 +1,9 @@
 """Sensitivity of a motion to rounding errors."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -9,11 +11,11 @@ from pyharness.engine.problem import closed_form, estimate_or_none, normalized
 from pyharness.engine.rescaled import rescaling_factor, scaled
 from pyharness.engine.taylor import taylor
 from pyharness.model.errors import InputError
-from pyharness.model.extension import extension
+from pyharness.model.extension import ENDS, extension
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.trajectory import ROUNDING
+from pyharness.model.trajectory import ROUNDING, WITH_ALL_ROWS
 
 # A result is sensitive if the unit roundoff times the error amplification exceeds this fraction of
 # the tolerance. The computed amplification may be too small by a factor of three, because of the
@@ -88,7 +90,9 @@ def closed_form_estimate(
 def motion_growth(scene: Scene, t_end: float) -> float | None:
     """Return the error amplification of a motion until `t_end` (s), or None if unknown."""
     if isinstance(scene.torque, StateTorque):
-        return _recorded_growth(scene, t_end)
+        with suppress(InputError):
+            return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
+        return None
     if closed_form(scene):
         _, growth = closed_form_estimate(scene, scene.omega, t_end)
         if growth is not None:
@@ -102,8 +106,25 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
     return estimate_or_none(work[3]) if n_rows else None
 
 
-def _recorded_growth(scene: Scene, t_end: float) -> float | None:
-    try:
-        return taylor(scene, [t_end], _COARSE, _LITTLE_WORK).growth
-    except InputError:
-        return None
+def judge_ending(
+    scene: Scene, kind: str, tolerance: float, ending: Any
+) -> tuple[str, float | None, float | None]:
+    """Return status, error and error amplification of a prepared solver's call.
+
+    `kind` is ``closed`` for a closed form, which takes no steps, and ``gauss`` for collocation.
+    """
+    number, steps, of_kernel, grown, omega0, t_end = ending
+    status = ENDS[number]
+    if status not in WITH_ALL_ROWS:
+        return status, None, None
+    error, growth = estimate_or_none(of_kernel), estimate_or_none(grown)
+    if kind == "closed" and not steps:
+        noise = torque_noise(scene, omega0, t_end)
+        error, growth = closed_form_estimate(scene, omega0, t_end, noise)
+        amplified = growth_of_rounding(scene, growth)
+    elif kind == "gauss":
+        growth = amplified = motion_growth(replace(scene, omega=omega0), t_end)
+        noise = torque_noise(scene, omega0, t_end, abs(t_end) / scene.step_size)
+    else:
+        return status, error, growth
+    return "sensitive" if is_sensitive(amplified, tolerance, noise) else status, error, growth

@@ -19,18 +19,11 @@ from pyharness.engine.plan import plan
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
-    Method,
     check_torque,
     computes_attitude,
     requested_tolerance,
 )
-from pyharness.engine.rescaled import (
-    has_ordinary_rows,
-    is_ordinary,
-    rescaling_factor,
-    scaled,
-    unscaled,
-)
+from pyharness.engine.rescaled import integrate, is_ordinary, rescaling_factor, scaled
 from pyharness.engine.scipy_ivp import finest_tolerance
 from pyharness.engine.sides import in_reverse, joined
 from pyharness.engine.stepper import with_reason
@@ -41,11 +34,11 @@ from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.effort import checked_effort
-from pyharness.model.errors import InputError, TimedError, known
+from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
 from pyharness.model.scene import Scene, checked_scene, most_steps
-from pyharness.model.state_torque import StateTorque, is_opaque
+from pyharness.model.state_torque import is_opaque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, Numbers, boolean, number, number_list, unit_of
@@ -175,7 +168,7 @@ def solve(
     sides = (below[::-1], values[len(below) :])
     more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
     parts = [
-        with_reason(scene, _integrate(chosen, scene, each, tolerance, effort, *more), each[-1])
+        with_reason(scene, integrate(chosen, scene, each, tolerance, effort, *more), each[-1])
         for each in sides
         if each
     ]
@@ -265,39 +258,20 @@ def by_plan(
             raise refusal from None
 
 
-def _integrate(
-    chosen: Method, scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
-) -> Trajectory:
-    """Return the trajectory on one side of 0, computed in a suitable unit of time."""
-    if not chosen.is_fixed_step and not is_ordinary(scene.omega):
-        # The method does not use the step size, but in the new unit it might not be finite.
-        scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
-    factor = 1.0 if chosen.any_scale or scene.states else rescaling_factor(scene, times[-1])
-    if factor == 1.0:
-        return chosen.solve(scene, times, tolerance, effort, *more)
-    faster = [t / factor for t in times]
-    try:
-        found = chosen.solve(scaled(scene, factor), faster, tolerance, effort, *more)
-    except TimedError as refusal:
-        raise refusal.slower(factor) from refusal.__cause__
-    if isinstance(scene.torque, StateTorque) and not has_ordinary_rows(found):
-        # The torque causes a larger omega than estimated.
-        return chosen.solve(scene, times, tolerance, effort, *more)
-    return unscaled(found, times, factor)
-
-
 def ascending_times(times: object) -> tuple[list[float], bool]:
     """Return ascending times (s), and whether they were descending; or raise InputError."""
     if unit_of(times):
         number("times", times)
-    if _are_ascending_floats(times):
-        return times.tolist(), False  # type: ignore[attr-defined]
+    most = most_steps()
+    if isinstance(times, np.ndarray) and (times.dtype, times.ndim) == (np.float64, 1):
+        is_finite = 0 < len(times) <= most and np.isfinite(times).all()
+        if is_finite and (np.diff(times) > 0.0).all():
+            return times.tolist(), False
     if not isinstance(times, Iterable) or getattr(times, "shape", None) == ():
         times = (times,)
     if isinstance(times, np.ndarray) and times.dtype.kind in "iuf":
         times = times.tolist()
     entries = number_list("times", times, "allowed: a number, or numbers in order")
-    most = most_steps()
     values = [number("times", each) for each in itertools.islice(entries, most + 1)]
     if not values:
         raise InputError("times: none is given; give at least one time")
@@ -313,12 +287,3 @@ def ascending_times(times: object) -> tuple[list[float], bool]:
     if not all(t1 < t2 for t1, t2 in itertools.pairwise(values)):
         raise InputError("times: not strictly monotonic; give increasing or decreasing times")
     return values, turned
-
-
-def _are_ascending_floats(times: object) -> bool:
-    return (
-        isinstance(times, np.ndarray)
-        and (times.dtype, times.ndim) == (np.float64, 1)
-        and 0 < len(times) <= most_steps()
-        and bool(np.isfinite(times).all() and (np.diff(times) > 0.0).all())
-    )

@@ -1,36 +1,36 @@
-"""The class `Solver`: a scene prepared for one method, for many fast calls through C."""
+"""Scenes prepared for one method, for many fast calls through C."""
 
 import math
-import reprlib
 from dataclasses import replace
 from functools import cached_property, partial
 from types import GenericAlias
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
-import numpy as np
-
-from pyharness.engine.compiled_call import CompiledCall, compiled_call
+from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_call
 from pyharness.engine.many_prepared import many_starts, many_states
-from pyharness.engine.packed import packed_scene
-from pyharness.engine.plan import RK4_OR_TAYLOR, Plan
-from pyharness.engine.problem import estimate_or_none
-from pyharness.engine.registry import FIXED_STEP, GAUSS
-from pyharness.engine.sensitivity import (
-    closed_form_estimate,
-    growth_of_rounding,
-    is_sensitive,
-    motion_growth,
-    torque_noise,
+from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
+from pyharness.engine.recorded import packed_scene
+from pyharness.engine.registry import (
+    FIXED_STEP,
+    GAUSS,
+    check_attitude,
+    check_prepared,
+    check_torque,
+    requested_tolerance,
 )
+from pyharness.engine.sensitivity import judge_ending
 from pyharness.engine.system import is_recorded
-from pyharness.model.attitude import IDENTITY, unit_quaternion
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
-from pyharness.model.errors import InputError
-from pyharness.model.extension import ENDS, extension
-from pyharness.model.principal import axes_and_turn
-from pyharness.model.scene import Scene
-from pyharness.model.trajectory import WITH_ALL_ROWS, Array, Trajectory, digits_left
-from pyharness.model.values import Number, Numbers, number, three, three_floats
+from pyharness.model.effort import checked_effort
+from pyharness.model.errors import known
+from pyharness.model.extension import extension
+from pyharness.model.keywords import with_hints
+from pyharness.model.principal import axes_and_turn, principal
+from pyharness.model.scene import Scene, checked_scene
+from pyharness.model.trajectory import Array, Trajectory, digits_left
+from pyharness.model.values import Number, Numbers, boolean, three
+from pyharness.model.waves import with_merged_waves
 
 if TYPE_CHECKING:
     from pyharness._solver import BoundKernel, Result
@@ -128,7 +128,7 @@ class Solver(BoundKernel[Result]):
             columns, turn = axes_and_turn(scene)
             axes = tuple(columns), turn
         solver = super().__new__(
-            cls, kernel, packed, partial(_check, scene, with_attitude), packed_with_gil,
+            cls, kernel, packed, partial(check_call, scene, with_attitude), packed_with_gil,
             (scene.attitude or IDENTITY) if with_attitude else None,
             scene.changing.span if scene.changing else (-math.inf, math.inf), axes,
         )  # fmt: skip
@@ -191,7 +191,7 @@ class Solver(BoundKernel[Result]):
 
         It is `plan.method`, unless the kernel chose `quick` or `taylor`, or used `plan.fallback`.
         """
-        steps = self._counted()
+        steps = 0 if self._ending is None else self._ending[1]  # negative if it chose `quick`
         if not steps:
             return self.plan.method
         if self.plan.method == RK4_OR_TAYLOR:
@@ -227,65 +227,13 @@ class Solver(BoundKernel[Result]):
     @property
     def steps(self) -> int:
         """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
-        return abs(self._counted())
-
-    def _counted(self) -> int:
-        """Return the steps of the last call, negative if the kernel chose `quick`."""
-        ending = self._ending
-        return 0 if ending is None else ending[1]
+        return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
-        ending = self._ending
-        if ending is None:
+        if self._ending is None:
             return "complete", None, None
-        number, steps, of_kernel, grown, omega0, t_end = ending
-        status = ENDS[number]
-        if status not in WITH_ALL_ROWS:
-            return status, None, None
-        error, growth = estimate_or_none(of_kernel), estimate_or_none(grown)
-        scene = self.plan.scene
-        if self.plan.closed_form and not steps:
-            noise = torque_noise(scene, omega0, t_end)
-            error, growth = closed_form_estimate(scene, omega0, t_end, noise)
-            amplified = growth_of_rounding(scene, growth)
-        elif self.plan.method in GAUSS:
-            growth = motion_growth(replace(scene, omega=omega0), t_end)
-            amplified = growth
-            noise = torque_noise(scene, omega0, t_end, abs(t_end) / scene.step_size)
-        else:
-            return status, error, growth
-        is_blurred = is_sensitive(amplified, self.settings[0], noise)
-        return "sensitive" if is_blurred else status, error, growth
-
-
-def _check(
-    scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
-) -> tuple[tuple[float, ...], float]:
-    """Return a start and `t_end` (s) from arguments that C does not accept."""
-    start, time = three_floats("omega", omega0), number("t_end", t_end)
-    if scene.changing is not None and math.isfinite(time):
-        scene.changing.check([time])
-    if with_attitude:
-        usual = scene.attitude or IDENTITY
-        return (*start, *(usual if third is None else unit_quaternion("attitude", third)[0])), time
-    if third is not None and (found := no_buffer(third)):
-        raise InputError(f"out: {found}; allowed: a writable array of three float64 side by side")
-    return start, time
-
-
-def no_buffer(out: object) -> str:
-    """Return a description of `out` if three floats can't be written into it, else ""."""
-    if not isinstance(out, np.ndarray):
-        try:
-            return reprlib.repr(out)
-        except ValueError:  # Python refuses to print an integer of too many digits
-            return "a number of too many digits to be shown"
-    flags = out.flags
-    if out.dtype.char != "d" or not out.dtype.isnative or out.shape != (3,):
-        return f"{out.dtype} of shape {out.shape}"
-    if not flags.writeable:
-        return "an array that is read-only"
-    return "" if flags.c_contiguous and flags.aligned else f"an array with strides {out.strides}"
+        kind = "closed" if self.plan.closed_form else "gauss" * (self.plan.method in GAUSS)
+        return judge_ending(self.plan.scene, kind, self.settings[0], self._ending)
 
 
 def _code(chosen: Plan, with_attitude: bool) -> int:
@@ -298,3 +246,91 @@ def _code(chosen: Plan, with_attitude: bool) -> int:
         # Taylor series, unless the closed form was requested.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
     return CODES[chosen.method]
+
+
+@overload
+def prepare(
+    scene: Scene,
+    method: str = ...,
+    tolerance: Number | None = ...,
+    *,
+    effort: float = ...,
+    attitude: Literal[False] = ...,
+) -> Solver[Array]: ...
+@overload
+def prepare(
+    scene: Scene,
+    method: str = ...,
+    tolerance: Number | None = ...,
+    *,
+    effort: float = ...,
+    attitude: Literal[True],
+) -> Solver[tuple[Array, Array]]: ...
+@with_hints
+def prepare(
+    scene: Scene,
+    method: str = "auto",
+    tolerance: Number | None = None,
+    *,
+    effort: float = 1.0,
+    attitude: bool = False,
+) -> Solver[Any]:
+    """Prepare a solver for many calls with the same scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    method : str
+        A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
+    tolerance : float
+        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
+        end, by default as in `solve`. It does not affect the error of fixed steps and Gauss
+        collocation. If the motion amplifies perturbations by a factor K, no method has a relative
+        error below some 1e-15 K.
+    effort : float
+        Factor on the work limit of a call (some ten seconds); beyond it the status is `gave up`.
+    attitude : bool
+        Whether calls return the attitude too, as in `solve`.
+
+    Returns
+    -------
+    Solver
+        A callable. ``solver(omega, t_end)`` returns omega (rad/s), shape (3,), at `t_end` (s).
+        With `attitude` it also returns a quaternion from body to space, scalar first, shape (4,).
+        Under a torque that depends on the state, an initial omega above 2**300 or below 2**-300
+        rad/s is `refused`; `solve` accepts it.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
+        attitude, and `attitude` is false; or if the tolerance or effort is out of range. A call
+        raises InputError if a changing moment reaches 0 before `t_end`.
+    NotBuiltError
+        If the extension is not built.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pyharness import case_scene, prepare
+    >>> solver = prepare(case_scene(2), tolerance=1e-12)
+    >>> np.round(solver(np.array([0.0, 1.0, 10.0]), 1.0), 6) + 0.0
+    array([-0.958924,  0.283662, 10.      ])
+    """
+    checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
+    attitude = boolean("attitude", attitude)
+    method = known("method", method, PREPARED)
+    tolerance = requested_tolerance(method, tolerance)
+    effort = checked_effort(effort)
+    check_prepared(scene, method)
+    check_torque(scene, method, attitude)
+    # An attitude that was not requested is not computed, unless the torque needs it.
+    own = scene.attitude or IDENTITY if attitude else None
+    about_principal, _ = principal(replace(scene, attitude=own))
+    if attitude:
+        check_attitude(method)
+    else:
+        about_principal = replace(about_principal, attitude=None)
+    chosen = plan(with_merged_waves(about_principal), method, tolerance, rows=attitude)
+    return Solver(scene, chosen, tolerance, method, effort, attitude)

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.engine.recorded import kernel_tape
+from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.engine.singular import SingularError, undefined_operation
 from pyharness.engine.system import is_recorded
-from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import with_constant_body
@@ -106,7 +105,7 @@ class Stepper:
         if not _FINEST <= self._tolerance <= 1.0:
             raise InputError(f"tolerance is {self._tolerance:g}; allowed: {_FINEST:g} to 1")
         self._n = 7 if attitude else 3
-        self._change(scene)
+        self.scene = scene
         own = [each.start for each in scene.states]
         self._own_sizes = np.array([each.scale for each in scene.states])
         self._state = np.array([0.0] * self._n + own + [0.0] * 3)
@@ -135,21 +134,39 @@ class Stepper:
 
     @scene.setter
     def scene(self, scene: Scene) -> None:
-        self._change(scene)
+        checked_scene(scene, *[True] * 5)
+        torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
+        if torque.tape is None:
+            raise InputError(
+                "an opaque torque can't be computed step by step; allowed: a torque that can be "
+                "recorded, or held_torque"
+            )
+        if torque.needs_attitude and self._n == 3:
+            raise InputError("the torque depends on the attitude; give attitude=True")
+        names = [each.name for each in scene.states]
+        if hasattr(self, "_scene") and names != list(self.states):
+            raise InputError(
+                f"the scene has the states {names}; allowed: those of the first scene, "
+                f"{list(self.states)}"
+            )
+        self._tape = _equations(scene, torque.tape, self._n == 7)
+        self._packed = kernel_tape(self._tape)
+        self._breaks = self._tape.breaks
+        self._scene = scene
 
     @property
     def omega(self) -> Array:
         """The angular velocity (rad/s), shape (3,)."""
-        return _fixed(self._state[:3])
+        return _copy_fixed(self._state[:3])
 
     @omega.setter
     def omega(self, values: Sequence[float] | Array) -> None:
-        self._set(slice(0, 3), _three("omega", values))
+        self._set(slice(0, 3), _check_three("omega", values))
 
     @property
     def attitude(self) -> Array | None:
         """The quaternion from body to space, scalar first, shape (4,), or None."""
-        return _fixed(self._state[3:7]) if self._n == 7 else None
+        return _copy_fixed(self._state[3:7]) if self._n == 7 else None
 
     @attitude.setter
     def attitude(self, values: Sequence[float] | Array) -> None:
@@ -175,11 +192,11 @@ class Stepper:
     @property
     def held_torque(self) -> Array:
         """The torque that is added to the scene's (N m, or 1/s2; body axes), shape (3,)."""
-        return _fixed(self._state[-3:])
+        return _copy_fixed(self._state[-3:])
 
     @held_torque.setter
     def held_torque(self, values: Sequence[float] | Array) -> None:
-        self._set(slice(-3, None), _three("held_torque", values))
+        self._set(slice(-3, None), _check_three("held_torque", values))
 
     def step(self, longest: float = math.inf) -> float:
         """Take one step, as long as the tolerance allows, and return the new time (s).
@@ -196,9 +213,12 @@ class Stepper:
                 f"longest is {longest:g} s; allowed: a positive or negative number, larger than "
                 f"{least:g} at this time"
             )
-        stop = self._next_break(longest > 0.0)
-        if stop is not None and abs(stop - self._time) < abs(longest):
-            end, longest = stop, stop - self._time
+        forward = longest > 0.0
+        place = (bisect_right if forward else bisect_left)(self._breaks, self._time) - (not forward)
+        if 0 <= place < len(self._breaks):
+            stop = self._breaks[place]
+            if abs(stop - self._time) < abs(longest):
+                end, longest = stop, stop - self._time
         taken = self._take_step(longest)
         self._begin, self._last = self._time, taken
         is_cut = self._time + taken.h == self._time + longest
@@ -212,8 +232,16 @@ class Stepper:
         return self._time
 
     def _take_step(self, longest: float) -> Step:
-        scale = self._scale()
-        sizes = self._sizes_of_states(min(abs(longest), self._trial, 1.0 / scale))
+        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
+        # For a body at rest, a guess of the omega that it reaches.
+        scale = self._largest or math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
+        # The sizes to which errors of own states are relative; guesses from 0 on.
+        own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
+        self._own_sizes = sizes = own_sizes
+        if not own_sizes.all():
+            rates = np.abs(self._rates()[self._n : -3])
+            guess = rates * min(abs(longest), self._trial, 1.0 / scale)
+            sizes = np.where(own_sizes > 0.0, own_sizes, np.where(rates > 0.0, guess, math.inf))
         while True:
             tolerances = np.full(len(self._state), math.inf)
             tolerances[:3] = self._tolerance * scale
@@ -224,8 +252,10 @@ class Stepper:
                 self._packed, self._time, self._state, tolerances, self._tolerance, trial, longest
             )
             if taken.h == 0.0:
-                raise self._singular()
-            # For a body at rest, the scale was a guess of the omega that it reaches.
+                before = [self._begin, *self._last.terms[0].tolist()]
+                here = [self._time, *self._state.tolist()]
+                what = undefined_operation(self._tape, self._origin, before, here)
+                raise SingularError(what, self._time)
             reached = float(np.abs(taken.state[:3]).max())
             own = np.abs(taken.state[self._n : -3])
             is_far = (self._own_sizes == 0.0) & (own > 0.0) & (own < 0.5 * sizes)
@@ -234,15 +264,6 @@ class Stepper:
             if self._largest == 0.0 and reached > 0.0:
                 scale = min(scale, reached)
             sizes, self._trial = np.where(is_far, own, sizes), abs(taken.h)
-
-    def _sizes_of_states(self, span: float) -> Array:
-        """Return the sizes to which errors of own states are relative; guesses from 0 on."""
-        self._own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
-        if self._own_sizes.all():
-            return self._own_sizes
-        rates = np.abs(self._rates()[self._n : -3])
-        guess = np.where(rates > 0.0, rates * span, math.inf)
-        return np.where(self._own_sizes > 0.0, self._own_sizes, guess)
 
     def _rates(self) -> Array:
         try:
@@ -279,54 +300,11 @@ class Stepper:
         state[3 : self._n] = _normalised(state[3 : self._n])
         return state
 
-    def _change(self, scene: Scene) -> None:
-        checked_scene(
-            scene, any_axes=True, any_torque=True, any_state=True, changing=True, states=True
-        )
-        torque = scene.torque if isinstance(scene.torque, StateTorque) else of_law(scene.torque)
-        if torque.tape is None:
-            raise InputError(
-                "an opaque torque can't be computed step by step; allowed: a torque that can be "
-                "recorded, or held_torque"
-            )
-        if torque.needs_attitude and self._n == 3:
-            raise InputError("the torque depends on the attitude; give attitude=True")
-        names = [each.name for each in scene.states]
-        if hasattr(self, "_scene") and names != list(self.states):
-            raise InputError(
-                f"the scene has the states {names}; allowed: those of the first scene, "
-                f"{list(self.states)}"
-            )
-        self._tape = _equations(scene, torque.tape, self._n == 7)
-        self._packed = kernel_tape(self._tape)
-        self._breaks = self._tape.breaks
-        self._scene = scene
-
-    def _singular(self) -> SingularError:
-        before = [self._begin, *self._last.terms[0].tolist()]
-        end = [self._time, *self._state.tolist()]
-        what = undefined_operation(self._tape, self._origin, before, end)
-        return SingularError(what, self._time)
-
     def _set(self, place: slice, values: Sequence[float]) -> None:
         self._state = self._state.copy()
         self._state[place] = values
         if self._steps == 0:
             self._last = Step(0.0, self._state[None], self._state, 0)
-
-    def _scale(self) -> float:
-        self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
-        if self._largest > 0.0:
-            return self._largest
-        # A guess of the omega that a body at rest reaches.
-        return math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
-
-    def _next_break(self, forward: bool) -> float | None:
-        if forward:
-            place = bisect_right(self._breaks, self._time)
-            return self._breaks[place] if place < len(self._breaks) else None
-        place = bisect_left(self._breaks, self._time)
-        return self._breaks[place - 1] if place else None
 
 
 def steps_to(
@@ -397,11 +375,11 @@ def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
     return recorder.tape([*rates, *found[3:], 0.0, 0.0, 0.0])
 
 
-def _three(name: str, values: object) -> tuple[float, ...]:
+def _check_three(name: str, values: object) -> tuple[float, ...]:
     return tuple(finite(name, each) for each in three_floats(name, values))
 
 
-def _fixed(values: Array) -> Array:
+def _copy_fixed(values: Array) -> Array:
     """Return a read-only copy, because changes of a copy would not change the motion."""
     found = values.copy()
     found.setflags(write=False)

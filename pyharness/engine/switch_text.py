@@ -5,7 +5,7 @@ import re
 from pyharness.model.errors import SLIDING, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import SWITCHES, Linear, Tape
+from pyharness.model.tape import SWITCHES, Tape
 
 _INPUTS = ("t", "w1", "w2", "w3", "q0", "q1", "q2", "q3")
 _FUNCTIONS = {"sine": "sin", "cosine": "cos"}
@@ -37,15 +37,11 @@ def with_text(reason: str | None, scene: Scene) -> str | None:
     bare = reason[: found.start()].rstrip()
     if not isinstance(torque, StateTorque) or torque.tape is None:
         return bare
-    numbers = [
-        slot
-        for slot, each in enumerate(torque.tape.operations, torque.tape.n_inputs)
-        if each.kind in SWITCHES
-    ]
+    switches = [each for each in torque.tape.operations if each.kind in SWITCHES]
     number = int(found[1])
-    if number > len(numbers):
+    if number > len(switches):
         return bare
-    operation = torque.tape.operations[numbers[number - 1] - torque.tape.n_inputs]
+    operation = switches[number - 1]
     names = (*_INPUTS, *(each.name for each in scene.states))
     text = _text(torque.tape, operation.operands[0], names)
     what = "floor of" if operation.kind == "floor" else "sign of"
@@ -58,7 +54,17 @@ def _text(tape: Tape, slot: int, names: tuple[str, ...]) -> str | None:
         return names[slot]
     kind, operands, linear, _ = tape.operations[slot - tape.n_inputs]
     if linear is not None:
-        return _sum(tape, linear, names)
+        found = ""
+        for each, factor in linear.terms:
+            part = _text(tape, each, names)
+            if part is None:
+                return None
+            sign = (" - " if found else "-") if factor < 0.0 else (" + " if found else "")
+            size = "" if abs(factor) == 1.0 else f"{abs(factor):.6g}*"
+            found += f"{sign}{size}{_bracketed(part) if size else part}"
+        if linear.constant:
+            found += f" {'-' if linear.constant < 0.0 else '+'} {abs(linear.constant):.6g}"
+        return found if len(found) <= _LONGEST else None
     if kind == "table":
         return "a table of t"
     parts = [_text(tape, each, names) for each in operands]
@@ -76,17 +82,3 @@ def _text(tape: Tape, slot: int, names: tuple[str, ...]) -> str | None:
 
 def _bracketed(text: str) -> str:
     return text if _SIMPLE.fullmatch(text) else f"({text})"
-
-
-def _sum(tape: Tape, linear: Linear, names: tuple[str, ...]) -> str | None:
-    found = ""
-    for slot, factor in linear.terms:
-        part = _text(tape, slot, names)
-        if part is None:
-            return None
-        sign = (" - " if found else "-") if factor < 0.0 else (" + " if found else "")
-        size = "" if abs(factor) == 1.0 else f"{abs(factor):.6g}*"
-        found += f"{sign}{size}{_bracketed(part) if size else part}"
-    if linear.constant:
-        found += f" {'-' if linear.constant < 0.0 else '+'} {abs(linear.constant):.6g}"
-    return found if len(found) <= _LONGEST else None

@@ -4,7 +4,7 @@ A Taylor series begins a step where a table changes, and is as accurate as for a
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from typing import Any
 
@@ -19,6 +19,7 @@ from pyharness.model.tape import Table
 from pyharness.model.tape_arrays import value_of_table, without_equal_constants
 from pyharness.model.values import Numbers, Triple, converted, finite, number_list, three
 
+_INTERPOLATIONS = ("held", "linear", "cubic")
 _MOST_TIMES, _MOST_PULSES = 1_000_000, 10_000
 _LARGEST_TIME = 1e300
 # Pulses touch if at most this many spacings of floats are between the end of one and the start of
@@ -66,14 +67,17 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     >>> steps.at(2.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     (2.0, 0.0, 0.0)
     """
-    if not isinstance(interpolation, str) or interpolation not in _PIECES:
-        raise unknown("interpolation", interpolation, _PIECES, "[torque] table")
+    if not isinstance(interpolation, str) or interpolation not in _INTERPOLATIONS:
+        raise unknown("interpolation", interpolation, _INTERPOLATIONS, "[torque] table")
     found = _ascending("[torque] table times", times)
-    rows = _rows(_as_array(values), len(found))
-    make = _PIECES[interpolation]
-    torque = _torque([make(found, axis, "[torque] table") for axis in rows.T])
+    n = len(found)
+    rows: Any = _as_array(values)
+    is_array = type(rows) is np.ndarray and rows.dtype == float and rows.shape == (n, 3)
+    if not (is_array and np.isfinite(rows).all()):
+        rows = np.array(_rows("[torque] table values", rows, n, "allowed: a list of rows"))
+    tables = [_piecewise(found, axis, interpolation, "[torque] table") for axis in rows.T]
     return ready_term(
-        "table", torque, times=found, values=rows.tolist(), interpolation=interpolation
+        "table", _torque(tables), times=found, values=rows.tolist(), interpolation=interpolation
     )
 
 
@@ -125,8 +129,8 @@ def inertia_table(
             f"or ({n}, 3, 3), matrices, because there are {n} times"
         )
     place = "moments" if rows.ndim == 2 else "inertia"
-    make = _PIECES[interpolation]
-    columns = [make(found, axis, "[body] table") for axis in rows.reshape(n, -1).T]
+    axes = rows.reshape(n, -1).T
+    columns = [_piecewise(found, axis, interpolation, "[body] table") for axis in axes]
     written = tuple({"times": found.tolist(), "values": rows.tolist()}.items())
     return inertia_of_tables(place, columns, (*written, ("interpolation", interpolation)))
 
@@ -143,16 +147,12 @@ def _as_array(values: Any) -> Any:
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 
-def _rows(values: Any, count: int) -> Array:
-    """Return a user's rows of three numbers, shape (count, 3), or raise InputError."""
-    where = "[torque] table values"
-    is_array = type(values) is np.ndarray and values.dtype == float
-    if is_array and values.shape == (count, 3) and np.isfinite(values).all():
-        return np.asarray(values)
-    given = list(islice(number_list(where, values, "allowed: a list of rows"), count + 1))
+def _rows(where: str, values: Any, count: int, allowed: str) -> list[Triple]:
+    """Return a user's rows of three numbers, or raise InputError for another count."""
+    given = list(islice(number_list(where, values, allowed), count + 1))
     if len(given) != count:
         raise _other_number(where, "rows", len(given), count)
-    return np.array([three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)])
+    return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
 
 
 def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbers]) -> StateTorque:
@@ -209,7 +209,13 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
                 f"{where}: the pulse that begins at {begin:g} s ends at {begin + length:g} s in "
                 f"binary64; allowed: a later end, up to {_LARGEST_TIME:g} s"
             )
-    torques = _torques_of_pulses(torque, len(begins))
+    where = "[torque] pulses torque"
+    wanted = "allowed: three numbers, or three numbers for each pulse"
+    given = list(islice(number_list(where, torque, wanted), max(len(begins), 3) + 1))
+    if any(isinstance(converted(each), float) for each in given):
+        torques = [three(where, given)] * len(begins)
+    else:
+        torques = _rows(where, given, len(begins), wanted)
     ordered = sorted(zip(begins, lengths, torques, strict=True))
     ends = [begin + length for begin, length, _ in ordered]
     for n, (after, _, _) in enumerate(ordered[1:]):
@@ -236,27 +242,16 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
         x, y, z = each
         times += [begun, ends[n]]
         values += [(factor * x, factor * y, factor * z), (0.0, 0.0, 0.0)]
-    held = [_held(np.array(times), axis, "[torque] pulses") for axis in np.array(values).T]
-    found = _torque(held)
+    axes = np.array(values).T
+    held = [_piecewise(np.array(times), axis, "held", "[torque] pulses") for axis in axes]
     different = any(each != torques[0] for each in torques)
     return ready_term(
         "pulses",
-        found,
+        _torque(held),
         starts=begins,
         durations=lengths,
         torque=torques if different else torques[0],
     )
-
-
-def _torques_of_pulses(torque: object, count: int) -> list[Triple]:
-    where = "[torque] pulses torque"
-    allowed = "allowed: three numbers, or three numbers for each pulse"
-    given = list(islice(number_list(where, torque, allowed), max(count, 3) + 1))
-    if any(isinstance(converted(each), float) for each in given):
-        return [three(where, given)] * count
-    if len(given) != count:
-        raise _other_number(where, "rows", len(given), count)
-    return [three(f"{where}, row {n}", row) for n, row in enumerate(given, 1)]
 
 
 def _times(where: str, values: Any, fewest: int, most: int) -> Array:
@@ -287,49 +282,33 @@ def _before(first: float, second: float) -> float:
     return min(2.0 * first - second, math.nextafter(first, -math.inf))
 
 
-def _held(times: Array, values: Array, where: str) -> Table:
-    pieces = np.zeros((len(values), 4))
-    pieces[:, 0] = values
-    return Table(times, pieces)
-
-
-def _linear(times: Array, values: Array, where: str) -> Table:
-    pieces = np.zeros((len(values) - 1, 4))
-    pieces[:, 0] = values[:-1]
+def _piecewise(times: Array, values: Array, interpolation: str, where: str) -> Table:
+    """Return the table of a function with these values, constant before and after."""
+    is_held = interpolation == "held"
+    pieces = np.zeros((len(values) - (not is_held), 4))
+    pieces[:, 0] = values[: len(pieces)]
+    if is_held:
+        return Table(times, pieces)
     with np.errstate(all="ignore"):
-        pieces[:, 1] = np.diff(values) / np.diff(times)
-    return _between(times, values, pieces, where)
+        if interpolation == "linear":
+            pieces[:, 1] = np.diff(values) / np.diff(times)
+        else:
+            # Imported late, because few scenes have a spline.
+            from scipy.interpolate import CubicSpline
 
-
-def _cubic(times: Array, values: Array, where: str) -> Table:
-    # Imported late, because few scenes have a spline.
-    from scipy.interpolate import CubicSpline
-
-    with np.errstate(all="ignore"):
-        try:
-            pieces = CubicSpline(times, values).c[::-1].T
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError):
-            pieces = np.full((len(times) - 1, 4), np.nan)
-    return _between(times, values, pieces, where)
-
-
-def _between(times: Array, values: Array, pieces: Array, where: str) -> Table:
-    """Return the table with `pieces`, and constants before and after them."""
+            try:
+                pieces = CubicSpline(times, values).c[::-1].T
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+                pieces[:] = np.nan
     if not np.isfinite(pieces).all():
         raise InputError(
             f"{where}: a slope or a coefficient overflows; allowed: smaller values, or times with "
             "a larger distance"
         )
     first = _before(float(times[0]), float(times[1]))
-    ends = _held(times[[0, -1]], values[[0, -1]], where).pieces
+    ends = np.zeros((2, 4))
+    ends[:, 0] = values[[0, -1]]
     return Table([first, *times.tolist()], np.concatenate((ends[:1], pieces, ends[1:])))
-
-
-_PIECES: dict[str, Callable[[Array, Array, str], Table]] = {
-    "held": _held,
-    "linear": _linear,
-    "cubic": _cubic,
-}
 
 
 def _torque(axes: Sequence[Table]) -> Function:

@@ -20,8 +20,6 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array, Trajectory
 
-_NO_STATES = np.zeros((1, 1))
-
 
 def taylor(
     scene: Scene,
@@ -48,15 +46,11 @@ def taylor(
     at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
     room: dict[str, Any] = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
     room |= {"at_nodes": at_nodes, "n_nodes": NODES}
-    own = _NO_STATES
     if kernel == "tape_rows":
         work = np.append(work, 0.0)
-    if n_own:
-        own = np.zeros((n_own + 1, len(times) + 1), order="F")
+        own = np.zeros((n_own + 1, (len(times) if n_own else 0) + 1), order="F")
         own[:n_own, 0] = [each.start for each in scene.states]
         room |= {"own": own, "own_sizes": [*(each.scale for each in scene.states), 0.0]}
-    elif kernel == "tape_rows":
-        room |= {"own": own, "own_sizes": own[0]}
     rows, n_rows, status, steps, kept = getattr(extension(), kernel)(
         *given, scene.omega, times, tolerance,
         n_attitudes=n_attitudes, attitudes=joint, effort=work, **room,

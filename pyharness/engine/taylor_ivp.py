@@ -13,8 +13,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from scipy.integrate import DenseOutput, OdeSolver
 
-from pyharness.engine.recorded import kernel_tape
-from pyharness.engine.taylor_step import LONGEST_TRIAL, Step, taylor_step
+from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
 from pyharness.model.errors import InputError
 from pyharness.model.numpy_calls import called_once, symbol_array
 from pyharness.model.symbols import Recorder, recorded_twice

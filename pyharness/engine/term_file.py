@@ -58,7 +58,15 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
     check_keys(table, ("kind", *parameters), f"{where}, {kind}")
     given = {key: value for key, value in table.items() if key != "kind"}
     if kind == "gravity_gradient" and "inertia" not in given:
-        given["inertia"] = _inertia(body, where)
+        keys = [key for key in ("moments", "inertia") if key in body]
+        if not keys:
+            raise InputError(
+                f"{where}, gravity_gradient: inertia is missing, and [body] has no moments and no "
+                "inertia; give inertia, kg m2"
+            )
+        given["inertia"] = body[keys[0]]
+        if not isinstance(given["inertia"], Changing):
+            inertia_of(f"[body] {keys[0]}", given["inertia"])
     for name, parameter in parameters.items():
         if name not in given and parameter.default is Parameter.empty:
             raise InputError(f"{where}, {kind}: {name} is missing; keys: {', '.join(parameters)}")
@@ -72,18 +80,6 @@ def _term(table: object, where: str, body: dict[str, Any]) -> StateTorque:
         return KINDS[kind](**arguments)
     except InputError as error:
         raise _placed(error, where) from None
-
-
-def _inertia(body: dict[str, Any], where: str) -> Any:
-    for key in ("moments", "inertia"):
-        if key in body:
-            if not isinstance(body[key], Changing):
-                inertia_of(f"[body] {key}", body[key])
-            return body[key]
-    raise InputError(
-        f"{where}, gravity_gradient: inertia is missing, and [body] has no moments and no inertia; "
-        "give inertia, kg m2"
-    )
 
 
 def _argument(where: str, value: object, key: str, frame: str | None) -> object:
@@ -100,13 +96,10 @@ def _argument(where: str, value: object, key: str, frame: str | None) -> object:
             raise _placed(error, where) from None
     if not isinstance(value, list):
         raise InputError(
-            f"{where} is {kind_of(value)}; allowed: three numbers, or a table with {_one_of(_LAW)}"
+            f"{where} is {kind_of(value)}; allowed: three numbers, or a table with constant, rate, "
+            "sines or cosines"
         )
     return value
-
-
-def _one_of(names: tuple[str, ...]) -> str:
-    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _placed(error: InputError, where: str) -> InputError:

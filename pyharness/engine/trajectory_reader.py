@@ -80,61 +80,55 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 
 
 def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> Trajectory:
-    rows: dict[str, Any] = {}
+    rows: dict[str, Any] = {name: arrays.get(name) for name in ROWS}
     count = len(arrays["time"])
     for name, (kind, shape) in ROWS.items():
-        value = arrays.get(name)
-        if value is not None and (value.dtype != kind or value.shape != (count, *shape)):
-            raise ValueError("rows of another type or shape")
-        rows[name] = value
+        if rows[name] is not None:
+            _check_array(rows[name], kind, count, *shape)
     if rows["recorded_time"] is None:
         rows["recorded_time"] = rows["time"]
-    axes = arrays.get(AXES)
-    if rows["omega"] is None or (axes is not None and (axes.dtype, axes.shape) != ("f8", (3, 3))):
-        raise ValueError("no omega, or axes of another type or shape")
-    if header["ended"] not in ENDINGS:
-        raise ValueError("an unknown ending")
-    scene = None
+    axes, own, scene = arrays.get(AXES), arrays.get(OWN), None
+    if axes is not None:
+        _check_array(axes, "f8", 3, 3)
+    _require(rows["omega"] is not None and header["ended"] in ENDINGS)
     if header["scene"] is not None:
         scene = _scene(text_of(arrays, "scene"), header["scene"], where)
-    own = arrays.get(OWN)
     n_own = 0 if own is None else own.shape[1]
-    if own is not None and (own.dtype, own.shape) != ("f8", (count, n_own)):
-        raise ValueError("own states of another type or shape")
-    if scene is not None and n_own != len(scene.states):
-        raise ValueError("another number of own states")
-    width = (3 if rows["attitude"] is None else 7) + n_own
-    t_events, y_events = _events(arrays, rows["time"], width)
+    if own is not None:
+        _check_array(own, "f8", count, n_own)
+    _require(scene is None or n_own == len(scene.states))
+    n = 3 if rows["attitude"] is None else 7
+    t_events, y_events = _events(arrays, rows["time"], n + n_own)
+    sensitivities = None
+    names: Any = header.get(SENSITIVITIES)
+    if names is not None or SENSITIVITIES in arrays:
+        array, counts = arrays[SENSITIVITIES], [_count(each) for _, each in names]
+        _check_array(array, "f8", count, n, sum(counts))
+        _require(all(type(name) is str for name, _ in names))
+        parts = np.split(array, np.cumsum(counts)[:-1], axis=2) if counts else []
+        sensitivities = dict(zip((name for name, _ in names), parts, strict=True))
+    stop = None
+    if header["stop"] is not None:
+        stop = Stop(**header["stop"])
+        _require(stop.variable in STOP_VARIABLES and type(stop.quotient) is float)
+        stop = replace(stop, step=_count(stop.step))
+    rows["ended"] = header["ended"]
+    for name in ("error", "growth", "tolerance"):
+        _require(header[name] is None or type(header[name]) is float)
+        rows[name] = header[name]
     return Trajectory(
         **rows,
-        own=own,
-        axes=axes,
         steps=_count(header["steps"]),
         evaluations=_count(header["evaluations"]),
-        ended=header["ended"],
-        stop=_stop(header["stop"]),
+        own=own,
+        axes=axes,
+        stop=stop,
         moments=_moments(header["moments"]),
         scene=scene,
-        error=_estimate(header["error"]),
-        growth=_estimate(header["growth"]),
-        tolerance=_estimate(header["tolerance"]),
         t_events=t_events,
         y_events=y_events,
-        sensitivities=_sensitivities(arrays, header.get(SENSITIVITIES), rows),
+        sensitivities=sensitivities,
     )
-
-
-def _sensitivities(
-    arrays: dict[str, Any], names: Any, rows: dict[str, Any]
-) -> dict[str, Array] | None:
-    if names is None and SENSITIVITIES not in arrays:
-        return None
-    array, counts = arrays[SENSITIVITIES], [_count(count) for _, count in names]
-    shape = (len(rows["time"]), 3 if rows["attitude"] is None else 7, sum(counts))
-    if (array.dtype, array.shape) != ("f8", shape) or not all(type(x) is str for x, _ in names):
-        raise ValueError("sensitivities of another type or shape")
-    parts = np.split(array, np.cumsum(counts)[:-1], axis=2) if counts else []
-    return dict(zip((name for name, _ in names), parts, strict=True))
 
 
 def _events(
@@ -144,20 +138,18 @@ def _events(
         return None, None
     counts, times, states = (arrays[name] for name in EVENTS)
     n = len(times)
-    found = [(each.dtype, each.shape) for each in (counts, times, states)]
-    if found != [("i8", (len(counts),)), ("f8", (n,)), ("f8", (n, width))]:
-        raise ValueError("events of another type or shape")
+    _check_array(counts, "i8", len(counts))
+    _check_array(times, "f8", n)
+    _check_array(states, "f8", n, width)
     lengths = counts.tolist()
-    if len(lengths) > MOST_FUNCTIONS or min(lengths, default=0) < 0 or sum(lengths) != n:
-        raise ValueError("other numbers of events")
+    _require(len(lengths) <= MOST_FUNCTIONS and min(lengths, default=0) >= 0)
+    _require(sum(lengths) == n and np.isfinite(times).all())
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    if not np.isfinite(times).all():
-        raise ValueError("times of events that are not finite")
     # The motion begins at time 0, and a terminal event may be before the first row.
     away = rows[-1] - rows[0] if len(rows) > 1 else rows.sum() or times.sum()
-    if any((np.diff(math.copysign(1.0, away) * times[part]) < 0.0).any() for part in parts):
-        raise ValueError("times of events that are not in order")
+    for part in parts:
+        _require((np.diff(math.copysign(1.0, away) * times[part]) >= 0.0).all())
     return [times[part] for part in parts], [states[part] for part in parts]
 
 
@@ -189,22 +181,16 @@ def _moments(record: Any) -> Any:
     return None if record is None else three_floats("moments", record)
 
 
-def _stop(record: Any) -> Stop | None:
-    if record is None:
-        return None
-    stop = Stop(**record)
-    if stop.variable not in STOP_VARIABLES or type(stop.quotient) is not float:
-        raise ValueError("an unknown variable")
-    return replace(stop, step=_count(stop.step))
-
-
 def _count(value: Any) -> int:
-    if type(value) is not int or value < 0:
-        raise ValueError("no count")
-    return value
+    _require(type(value) is int and value >= 0)
+    return int(value)
 
 
-def _estimate(value: Any) -> float | None:
-    if value is not None and type(value) is not float:
-        raise ValueError("no number")
-    return value
+def _check_array(array: Any, kind: str, *shape: int) -> None:
+    _require((array.dtype, array.shape) == (kind, shape))
+
+
+def _require(holds: object) -> None:
+    """Raise an error, for which `load` has a message, unless a condition holds."""
+    if not holds:
+        raise ValueError("a damaged value")

@@ -16,8 +16,8 @@ import scipy.integrate  # noqa: F401  (an interrupt within its import may be los
 
 from pyharness import torques
 from pyharness.engine.many import solve_many
-from pyharness.engine.prepared import prepare
 from pyharness.engine.solve import solve
+from pyharness.engine.solver import prepare
 from pyharness.model import extension as room
 from pyharness.model.extension import extension
 from pyharness.model.listing import PROGRAMS, Listing
@@ -140,9 +140,7 @@ def keyboard() -> Iterator[_Keyboard]:
 def test_kernel_ends_at_once(
     name: str, keyboard: _Keyboard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rooms = [
-        f"engine.{each}" for each in ("taylor", "fixed_step", "closed_form", "gauss", "many_scenes")
-    ]
+    rooms = [f"engine.{each}" for each in ("taylor", "closed_form", "gauss", "many_scenes")]
     for each in (*rooms, "thesis.compiled", "thesis.many", "model.extension"):
         monkeypatch.setattr(f"pyharness.{each}.extension", keyboard.door)
     if name in DOORLESS:

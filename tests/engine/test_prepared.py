@@ -22,13 +22,13 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-import pyharness.engine.prepared as preparing
 import pyharness.engine.solve as solving
 import pyharness.engine.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
 from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
 from pyharness.cli.main import main
+from pyharness.engine.compiled_call import check_call
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
 from pyharness.engine.problem import closed_form
 from pyharness.engine.solver import Solver
@@ -158,7 +158,7 @@ def test_call_leaks_no_reference() -> None:
         return tracemalloc.get_traced_memory()[0]
 
     left_behind()
-    watched = solver, start, out, solver_module._check, solver.plan, Solver
+    watched = solver, start, out, check_call, solver.plan, Solver
     counts = [sys.getrefcount(each) for each in watched]
     tracemalloc.start()
     left = [left_behind() for _ in range(4)]
@@ -340,7 +340,7 @@ def test_everyone_does_what_the_plan_says(case: int) -> None:
     def other(scene: Scene, method: str = "auto", *rest: Any, **named: Any) -> Plan:
         return plan(scene, "taylor" if method == "auto" else method, *rest, **named)
 
-    with patch.object(solving, "plan", other), patch.object(preparing, "plan", other):
+    with patch.object(solving, "plan", other), patch.object(solver_module, "plan", other):
         found, solver = solve(scene, [1.0], tolerance=1e-6), prepare(scene, tolerance=1e-6)
     solver(_omega(scene), 1.0)
     assert found.steps == solve(scene, [1.0], "taylor", 1e-6).steps > 0
@@ -400,7 +400,7 @@ def test_wave_without_effect_is_not_packed(solver: Solver) -> None:
 
 
 def test_examples_in_the_docstrings_run() -> None:
-    for each in (preparing, solving):
+    for each in (solver_module, solving):
         result = doctest.testmod(each)
         assert (result.attempted >= 2, result.failed) == (True, 0)
 

@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import Scene, opaque, solve
 from pyharness.engine.registry import SCIPY_METHODS
-from pyharness.engine.scipy_spans import series_beside
+from pyharness.engine.scipy_run import series_beside
 from pyharness.model.state_torque import StateTorque
 
 SPHERE = Scene("", (0.0, 0.0, 1.0), moments=(2.0, 2.0, 3.0))

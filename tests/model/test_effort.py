@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from pyharness.cli.main import main
-from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import FIXED_STEP
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import PREPARED
+from pyharness.engine.solver import PREPARED, prepare
 from pyharness.model.effort import suggested
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.listing import Listing

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import FIXED_STEP, METHODS
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import Solver
+from pyharness.engine.solver import Solver, prepare
 from pyharness.model.errors import InputError
 from pyharness.model.extension import COMPLETE, STOPPED, extension
 from pyharness.model.listing import Listing

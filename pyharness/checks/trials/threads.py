@@ -17,10 +17,9 @@ from pyharness.checks.check import BITS, Check, may_hold
 from pyharness.checks.compare.candidates import method_candidate, program_candidate
 from pyharness.checks.stress import LISTINGS, Trial, named
 from pyharness.checks.tolerances import finest
-from pyharness.engine.prepared import prepare
 from pyharness.engine.registry import METHODS
 from pyharness.engine.solve import solve
-from pyharness.engine.solver import PREPARED, Solver
+from pyharness.engine.solver import PREPARED, Solver, prepare
 from pyharness.engine.terms import damping
 from pyharness.model.errors import InputError
 from pyharness.model.extension import extension

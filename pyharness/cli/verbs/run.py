@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         name, title, trajectory = _method(options, scene)
         if name == "reference":
-            from pyharness.engine.reference_bound import trajectory_bound
+            from pyharness.engine.report import trajectory_bound
 
             bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 

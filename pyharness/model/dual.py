@@ -82,8 +82,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
         for slot, symbol in enumerate(recorder.inputs())
     ]
     found = [dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
-    values, slopes = [each.value for each in found], [each.slopes for each in found]
-    return recorder.tape([*values, *(slope for row in slopes for slope in row)])
+    return recorder.tape([*(x.value for x in found), *(slope for x in found for slope in x.slopes)])
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
@@ -92,8 +91,8 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     The parameters are the last inputs of `tape`; the result has these `values` in their place.
     """
     count = len(values)
-    instead = "fewer parameters"
-    recorder = Recorder(_FEWER * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
+    most, n_inputs = _FEWER * MOST_OPERATIONS, tape.n_inputs - count
+    recorder = Recorder(most, n_inputs, "sensitivities", "fewer parameters")
     inputs = [Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
     inputs += [
         Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)

@@ -322,8 +322,9 @@ _CHOICES: dict[str, Callable[..., Any]] = {
     "max": _extreme(_largest), "min": _extreme(_smallest), "amax": _extreme(_largest),
     "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
     "hypot": _by_element(lambda x, y: (x * x + y * y) ** 0.5, 2),
-    "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1), "logical_and": _by_element(lambda x, y: x & y, 2),
-    "logical_or": _by_element(lambda x, y: x | y, 2), "logical_not": _by_element(negated, 1),
+    "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
+    "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
+    "logical_not": _by_element(negated, 1),
 }  # fmt: skip
 _OF_NUMPY = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}

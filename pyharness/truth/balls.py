@@ -5,7 +5,7 @@ that contains the exact result for all numbers in its operands.
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -33,38 +33,34 @@ def balls(row: Sequence[Any]) -> Balls:
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
-def _sqrt(x: Any) -> Any:
-    if isinstance(x, Dual):
-        root = _sqrt(x.value)
-        return x.chained(root, 1 / (2 * root))
-    # Where a complex ball meets the branch cut, the result is not finite.
-    return x.sqrt(analytic=True) if isinstance(x, acb) else x.sqrt()
+def _with_slope(of_ball: Callable[[Any], Any], slope: Callable[[Any, Any], Any]) -> Any:
+    """Return a function, also of dual numbers; `slope` is of the argument and the value."""
+
+    def called(x: Any) -> Any:
+        if not isinstance(x, Dual):
+            return of_ball(x)
+        value = called(x.value)
+        return x.chained(value, slope(x.value, value))
+
+    return called
 
 
-def _exp(x: Any) -> Any:
-    if isinstance(x, Dual):
-        value = _exp(x.value)
-        return x.chained(value, value)
-    return x.exp()
+# Where a complex ball meets the branch cut of a root or logarithm, the result is not finite.
+_sqrt = _with_slope(
+    lambda x: x.sqrt(analytic=True) if isinstance(x, acb) else x.sqrt(),
+    lambda _, root: 1 / (2 * root),
+)
+_log = _with_slope(
+    lambda x: x.log(analytic=True) if isinstance(x, acb) else x.log(), lambda x, _: 1 / x
+)
+_exp = _with_slope(lambda x: x.exp(), lambda _, value: value)
+_sine: Any = _with_slope(lambda x: x.sin(), lambda x, _: _cosine(x))
+_cosine: Any = _with_slope(lambda x: x.cos(), lambda x, _: -1.0 * _sine(x))
 
 
 def _tanh(x: Any) -> Any:
     # python-flint has no hyperbolic tangent of power series.
     return 1 - 2 / (_exp(2 * x) + 1)
-
-
-def _sine(x: Any) -> Any:
-    return x.chained(_sine(x.value), _cosine(x.value)) if isinstance(x, Dual) else x.sin()
-
-
-def _cosine(x: Any) -> Any:
-    return x.chained(_cosine(x.value), -1.0 * _sine(x.value)) if isinstance(x, Dual) else x.cos()
-
-
-def _log(x: Any) -> Any:
-    if isinstance(x, Dual):
-        return x.chained(_log(x.value), 1 / x.value)
-    return x.log(analytic=True) if isinstance(x, acb) else x.log()
 
 
 def _refuse(*_: Any) -> Any:

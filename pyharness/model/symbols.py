@@ -135,7 +135,7 @@ class Recorder:
 
 
 def _of_symbols(
-    operator: Callable[["Symbol", "Symbol"], "Symbol"],
+    operator: Callable[["Symbol", "Symbol"], Any],
 ) -> Callable[["Symbol", Any], "Symbol"]:
     """Return an operator of a symbol and any real number; NotImplemented for no number."""
 
@@ -255,10 +255,7 @@ class Symbol:
         """Return the symbol itself."""
         return self
 
-    @_of_symbols
-    def __sub__(self, other: "Symbol") -> "Symbol":
-        """Return the difference from any real number."""
-        return self + -other
+    __sub__ = _of_symbols(lambda x, y: x + -y)
 
     def __rsub__(self, value: Any) -> "Symbol":
         """Return a real number minus the symbol."""
@@ -298,10 +295,7 @@ class Symbol:
             a, b, factor, divisor = self._own_slot(), other._own_slot(), 1.0, 1.0
         return self.recorder.result("quotient", (a, b), factor=factor / divisor)
 
-    @_of_symbols
-    def __rtruediv__(self, other: "Symbol") -> "Symbol":
-        """Record and return a number divided by the symbol."""
-        return other / self
+    __rtruediv__ = _of_symbols(lambda x, y: y / x)
 
     def __pow__(self, power: Any) -> "Symbol":
         """Record and return a power; that of a negative number is defined for integers alone."""
@@ -399,25 +393,10 @@ class Symbol:
             )
         return self.recorder.result("table", (), None, table)
 
-    @_of_symbols
-    def __gt__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is larger."""
-        return (self - other).switch()
-
-    @_of_symbols
-    def __lt__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is smaller."""
-        return (other - self).switch()
-
-    @_of_symbols
-    def __ge__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is not smaller."""
-        return negated((other - self).switch())
-
-    @_of_symbols
-    def __le__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is not larger."""
-        return negated((self - other).switch())
+    __gt__ = _of_symbols(lambda x, y: (x - y).switch())
+    __lt__ = _of_symbols(lambda x, y: (y - x).switch())
+    __ge__ = _of_symbols(lambda x, y: negated((y - x).switch()))
+    __le__ = _of_symbols(lambda x, y: negated((x - y).switch()))
 
     def __eq__(self, other: object) -> Any:
         """Refuse the comparison, which is true at isolated times at most."""
@@ -447,20 +426,13 @@ class Symbol:
 
     __int__ = __index__ = __complex__ = __round__ = __float__
 
-    @_of_symbols
-    def __floordiv__(self, other: "Symbol") -> "Symbol":
-        """Record and return the quotient, rounded down."""
-        return (self / other).floor()
+    __floordiv__ = _of_symbols(lambda x, y: (x / y).floor())
+    __mod__ = _of_symbols(lambda x, y: x - y * (x / y).floor())
 
     def __rfloordiv__(self, value: Any) -> "Symbol":
         """Record and return a number divided by this symbol, rounded down."""
         quotient: Symbol = value / self
         return quotient.floor()
-
-    @_of_symbols
-    def __mod__(self, other: "Symbol") -> "Symbol":
-        """Record and return the remainder, which has the sign of the divisor."""
-        return self - other * (self / other).floor()
 
     def __rmod__(self, value: Any) -> "Symbol":
         """Record and return the remainder of a number."""

@@ -96,7 +96,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     elif not law.in_space:
         # Large components may cancel in the torque about an axis of small moment. It is therefore
         # rounded only after the transformation.
-        law = exact_law(law).rotate(frame.into).rounded()
+        law = exact_law(law, frame.into)
     given = _fields(scene) | {"inertia": None, "torque": law, "attitude": attitude}
     given |= {"omega": _rotate(frame, scene.omega), "moments": frame.moments}
     return PrincipalScene(**given, moments_low=frame.moments_low), frame.axes.copy()

@@ -232,8 +232,7 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     array = np.asarray(x, dtype=object)
     if ord not in (None, 2) or (ord == 2 and array.ndim > 1 and axis is None):
         raise _symbol_in(array).recorder.refusal(f"the norm of order {ord}", "the Euclidean norm")
-    total = np.sum(array * array, axis=axis, keepdims=keepdims)
-    return total**0.5
+    return np.sum(array * array, axis=axis, keepdims=keepdims) ** 0.5
 
 
 def _solve(matrix: Any, right: Any) -> Any:

@@ -161,18 +161,6 @@ def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
     return StateTorque(tape, None, tape.needs_attitude, own=own)
 
 
-def _tape_of(function: Function, names: Sequence[str]) -> Tape:
-    """Return a function as a tape; the keyword arguments `names` become further inputs."""
-    recorder = Recorder(n_inputs=N_INPUTS + len(names))
-    # A number of factors is no parameter.
-    recorder.has_powers = not names
-
-    def named(time: Symbol, omega: Any, attitude: Any, *values: Symbol) -> Any:
-        return function(time, omega, attitude, **dict(zip(names, values, strict=True)))
-
-    return _recorded_with(recorder, named)
-
-
 def _recorded_with(recorder: Recorder, function: Function) -> Tape:
     time, *state = recorder.inputs()
     omega, attitude = map(symbol_array, (state[:3], state[3:7]))
@@ -399,22 +387,28 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
         if isinstance(value := converted(each.default), float) and math.isfinite(value)
     }
 
-    def is_recordable(names: Sequence[str]) -> bool:
+    def recorded_with(names: Sequence[str]) -> Tape | None:
+        """Return the tape with these keywords as inputs, or None if it can't be recorded."""
+        recorder = Recorder(n_inputs=N_INPUTS + len(names))
+        # A number of factors is no parameter.
+        recorder.has_powers = not names
+
+        def named(time: Symbol, omega: Any, attitude: Any, *inputs: Symbol) -> Any:
+            return called(time, omega, attitude, **dict(zip(names, inputs, strict=True)))
+
         try:
-            _tape_of(called, names)
+            return _recorded_with(recorder, named)
         except InputError:
-            return False
-        return True
+            return None
 
     if not values:
         return torque
     names = list(values)
-    if not is_recordable(names):
-        names = [name for name in names if is_recordable([name])]
-    if not is_recordable(names):
-        return torque
+    if recorded_with(names) is None:
+        names = [name for name in names if recorded_with([name]) is not None]
+    varied = recorded_with(names)
     parameters = tuple((name, values[name]) for name in names)
-    return replace(torque, parameters=parameters, varied=_tape_of(called, names))
+    return torque if varied is None else replace(torque, parameters=parameters, varied=varied)
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":

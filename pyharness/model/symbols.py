@@ -517,14 +517,6 @@ def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Re
     return first
 
 
-def _switched(x: Any) -> Any:
-    return x.switch() if isinstance(x, Symbol) else step(x)
-
-
-def _floor(x: Any) -> Any:
-    return x.floor() if isinstance(x, Symbol) else whole(x)
-
-
 def _selected(condition: Any, x: Any, y: Any) -> Any:
     known = isinstance(condition, Condition) or not isinstance(condition, Symbol)
     return select(condition if known else _condition(condition), x, y)
@@ -532,7 +524,8 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 SYMBOLS: Functions[Any] = Functions(
     float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
-    np.log, np.arctan, np.arcsin, _switched, _floor, _selected,
+    np.log, np.arctan, np.arcsin, lambda x: x.switch() if isinstance(x, Symbol) else step(x),
+    lambda x: x.floor() if isinstance(x, Symbol) else whole(x), _selected,
 )  # fmt: skip
 
 

@@ -8,10 +8,11 @@ and WRITE do not count.
 import operator
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.listing import Listing
+from pyharness.thesis.cards import statements_of
 from pyharness.thesis.decks import deck_text
 from pyharness.thesis.linear_solver import leqt1f
 
@@ -110,7 +111,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
     The scene is the case on the published cards. `times` has the weight of each operation, such as
     its unit time on a machine.
     """
-    statements = list(_statements(deck_text(listing)))
+    statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])
     assert label is not None
@@ -134,21 +135,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
     return _Number(counter, value.value) if isinstance(value, _Number) else value
 
 
-def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Return the label and the text, without blanks, of every statement of a deck."""
-    found: list[list[str]] = []
-    for line in text.splitlines():
-        label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())
-        if line.startswith("C"):
-            continue
-        if goes_on != " ":
-            found[-1][1] += rest
-        else:
-            found.append([label, rest])
-    return ((label, rest) for label, rest in found)
-
-
-def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Counter) -> None:
+def _run(statements: list[list[str]], names: dict[str, Any], counter: _Counter) -> None:
     position = 0
     while position < len(statements):
         _, text = statements[position]
@@ -164,7 +151,7 @@ def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Cou
                 _evaluated(side, names)
         elif match := _IF.match(text):
             if names[match[1]] == int(match[2]):
-                _run([("", match[3])], names, counter)
+                _run([["", match[3]]], names, counter)
         elif _CALL.match(text):
             _solve(names)
         elif not _NOTHING.match(text):

@@ -5,13 +5,13 @@ that contains the exact result for all numbers in its operands.
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
 from flint import acb, arb, fmpq
 
-from pyharness.model.dual import Dual
+from pyharness.model.dual import of_duals
 from pyharness.model.errors import InputError
 from pyharness.model.tape import Functions, Table
 from pyharness.truth.enclosed import Balls
@@ -33,29 +33,17 @@ def balls(row: Sequence[Any]) -> Balls:
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
-def _with_slope(of_ball: Callable[[Any], Any], slope: Callable[[Any, Any], Any]) -> Any:
-    """Return a function, also of dual numbers; `slope` is of the argument and the value."""
-
-    def called(x: Any) -> Any:
-        if not isinstance(x, Dual):
-            return of_ball(x)
-        value = called(x.value)
-        return x.chained(value, slope(x.value, value))
-
-    return called
-
-
 # Where a complex ball meets the branch cut of a root or logarithm, the result is not finite.
-_sqrt = _with_slope(
+_sqrt = of_duals(
     lambda x: x.sqrt(analytic=True) if isinstance(x, acb) else x.sqrt(),
     lambda _, root: 1 / (2 * root),
 )
-_log = _with_slope(
+_log = of_duals(
     lambda x: x.log(analytic=True) if isinstance(x, acb) else x.log(), lambda x, _: 1 / x
 )
-_exp = _with_slope(lambda x: x.exp(), lambda _, value: value)
-_sine: Any = _with_slope(lambda x: x.sin(), lambda x, _: _cosine(x))
-_cosine: Any = _with_slope(lambda x: x.cos(), lambda x, _: -1.0 * _sine(x))
+_exp = of_duals(lambda x: x.exp(), lambda _, value: value)
+_sine: Any = of_duals(lambda x: x.sin(), lambda x, _: _cosine(x))
+_cosine: Any = of_duals(lambda x: x.cos(), lambda x, _: -1.0 * _sine(x))
 
 
 def _tanh(x: Any) -> Any:

@@ -15,6 +15,7 @@ import numpy as np
 
 from pyharness.model.errors import InputError, printable
 from pyharness.model.tape import (
+    FLOATS,
     N_INPUTS,
     TIME,
     Functions,
@@ -22,12 +23,7 @@ from pyharness.model.tape import (
     Operation,
     Table,
     Tape,
-    arcsine,
-    exponential,
-    logarithm,
     slots_of,
-    step,
-    whole,
 )
 from pyharness.model.values import converted
 
@@ -153,15 +149,13 @@ def _is_moderate(factor: float) -> bool:
 
 
 def _function(
-    kind: str,
-    of_float: Callable[[float], float],
-    derivative: "Callable[[Symbol], Symbol] | None" = None,
+    kind: str, derivative: "Callable[[Symbol], Symbol] | None" = None
 ) -> Callable[["Symbol"], "Symbol"]:
     """Return a function of a symbol; the kernel needs the `derivative` of some."""
 
     def called(self: "Symbol") -> "Symbol":
         if not self._terms:
-            return Symbol(self.recorder, of_float(self._constant), {})
+            return Symbol(self.recorder, getattr(FLOATS, kind)(self._constant), {})
         operands: tuple[int, ...] = (self._own_slot(),)
         if derivative is not None:
             argument = Symbol(self.recorder, 0.0, {operands[0]: 1.0})
@@ -335,15 +329,15 @@ class Symbol:
         return slot
 
     # NumPy calls the methods with these names for np.sqrt(symbol) and so on.
-    exp = _function("exp", exponential)
-    sin = _function("sine", math.sin)
-    cos = _function("cosine", math.cos)
-    tanh = _function("tanh", math.tanh)
-    log = _function("log", logarithm, lambda x: 1.0 / x)
-    arctan = _function("atan", math.atan, lambda x: 1.0 / (1.0 + x * x))
-    arcsin = _function("asin", arcsine, lambda x: 1.0 / (1.0 - x * x).sqrt())
-    floor = __floor__ = _function("floor", whole)
-    _root = _function("sqrt", math.sqrt)
+    exp = _function("exp")
+    sin = _function("sine")
+    cos = _function("cosine")
+    tanh = _function("tanh")
+    log = _function("log", lambda x: 1.0 / x)
+    arctan = _function("atan", lambda x: 1.0 / (1.0 + x * x))
+    arcsin = _function("asin", lambda x: 1.0 / (1.0 - x * x).sqrt())
+    floor = __floor__ = _function("floor")
+    _root = _function("sqrt")
 
     def sqrt(self) -> "Symbol":
         """Return the square root."""
@@ -524,8 +518,9 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 SYMBOLS: Functions[Any] = Functions(
     float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
-    np.log, np.arctan, np.arcsin, lambda x: x.switch() if isinstance(x, Symbol) else step(x),
-    lambda x: x.floor() if isinstance(x, Symbol) else whole(x), _selected,
+    np.log, np.arctan, np.arcsin,
+    lambda x: x.switch() if isinstance(x, Symbol) else FLOATS.switch(x),
+    lambda x: x.floor() if isinstance(x, Symbol) else FLOATS.floor(x), _selected,
 )  # fmt: skip
 
 

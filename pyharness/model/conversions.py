@@ -310,14 +310,11 @@ class Conversions:
         }
         variables: dict[str, Any] = {}
         for each in self._quantities():
-            dimensions: tuple[str, ...] = ("time",)
-            if each.name == "attitude":
-                names = list(each.columns)
+            second = "component" if each.name == "attitude" else "axis"
+            dimensions = ("time", second) if len(each.columns) > 1 else ("time",)
+            if second == "component":
                 about = {"long_name": "component of the quaternion, scalar first"}
-                coordinates["component"] = ("component", names, about)
-                dimensions += ("component",)
-            elif len(each.columns) > 1:
-                dimensions += ("axis",)
+                coordinates[second] = (second, list(each.columns), about)
             attributes = {"units": each.unit, "long_name": each.long_name}
             variables[each.name] = (dimensions, each.values.copy(), attributes)
         described = ("ended", "steps", "evaluations", "error", "growth", "tolerance")

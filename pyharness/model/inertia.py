@@ -12,14 +12,13 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError
 from pyharness.model.values import Matrix as Matrix
 from pyharness.model.values import Triple, converted, number_list, three, triple
 
 Exact = tuple[Fraction, Fraction, Fraction]
-Array = NDArray[np.float64]
 
 SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
 _KEPT = 256  # number of cached principal frames

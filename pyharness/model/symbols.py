@@ -66,7 +66,6 @@ class Recorder:
         self._has_lines = has_lines
         self.place = place
         self._most, self._n_inputs, self._instead = most, n_inputs, instead
-        self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
         self.was_converted = False  # whether a symbol was to become a float
@@ -95,13 +94,12 @@ class Recorder:
     def slot(self, operation: Operation) -> int:
         """Return the slot of `operation`, which is recorded if new."""
         if operation not in self._slots:
-            if len(self._operations) == self._most:
+            if len(self._slots) == self._most:
                 most = self._most
                 raise InputError(
                     f"{self.place}: more than {most} operations; use fewer, or {self._instead}"
                 )
-            self._slots[operation] = self._n_inputs + len(self._operations)
-            self._operations.append(operation)
+            self._slots[operation] = self._n_inputs + len(self._slots)
         return self._slots[operation]
 
     def result(self, *operation: Any, factor: float = 1.0) -> "Symbol":
@@ -111,7 +109,7 @@ class Recorder:
     def tape(self, outputs: Sequence[Any]) -> Tape:
         """Return the tape of `outputs`, without unused operations."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
-        return _without_unused(self._operations, linear, self._n_inputs)
+        return _without_unused([*self._slots], linear, self._n_inputs)
 
     def _output(self, axis: int, value: Any) -> Linear:
         if isinstance(value, np.ndarray) and value.shape == ():
@@ -250,10 +248,7 @@ class Symbol:
         return self
 
     __sub__ = _of_symbols(lambda x, y: x + -y)
-
-    def __rsub__(self, value: Any) -> "Symbol":
-        """Return a real number minus the symbol."""
-        return (-self).__add__(value)
+    __rsub__ = _of_symbols(lambda x, y: y + -x)
 
     @_of_symbols
     def __mul__(self, other: "Symbol") -> "Symbol":
@@ -421,17 +416,9 @@ class Symbol:
     __int__ = __index__ = __complex__ = __round__ = __float__
 
     __floordiv__ = _of_symbols(lambda x, y: (x / y).floor())
+    __rfloordiv__ = _of_symbols(lambda x, y: (y / x).floor())
     __mod__ = _of_symbols(lambda x, y: x - y * (x / y).floor())
-
-    def __rfloordiv__(self, value: Any) -> "Symbol":
-        """Record and return a number divided by this symbol, rounded down."""
-        quotient: Symbol = value / self
-        return quotient.floor()
-
-    def __rmod__(self, value: Any) -> "Symbol":
-        """Record and return the remainder of a number."""
-        quotient: Symbol = value / self
-        return self.__mul__(quotient.floor()).__rsub__(value)
+    __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
         """Return a composed function, and refuse others; NumPy looks them up by name."""

@@ -51,13 +51,9 @@ class _Counter:
         self.written += self.times[name]
         key = (name, *(id(x) if isinstance(x, _Number) else float(x) for x in (left, right)))
         if key not in self.known:
-            value = _OPERATIONS[name](_value(left), _value(right))
+            value = _OPERATIONS[name](float(left), float(right))
             self.known[key] = _Number(self, value)
         return self.known[key]
-
-
-def _value(x: Any) -> float:
-    return x.value if isinstance(x, _Number) else float(x)
 
 
 def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], "_Number"]:
@@ -67,37 +63,30 @@ def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], 
     return operate
 
 
-class _Number:
+class _Number(float):
     """A floating-point value, with the counter of the operations on it.
 
     A repeated operation on the same operands returns the same object.
     """
 
-    def __init__(self, counter: _Counter, value: float) -> None:
-        self.counter, self.value = counter, value
+    counter: _Counter
+
+    def __new__(cls, counter: _Counter, value: float) -> "_Number":
+        found = super().__new__(cls, value)
+        found.counter = counter
+        return found
 
     __add__, __radd__ = _operator("+"), _operator("+", reflected=True)
     __sub__, __rsub__ = _operator("-"), _operator("-", reflected=True)
     __mul__, __rmul__ = _operator("*"), _operator("*", reflected=True)
     __truediv__, __rtruediv__ = _operator("/"), _operator("/", reflected=True)
 
-    def __pow__(self, exponent: int) -> "_Number":
+    def __pow__(self, exponent: Any, modulus: None = None) -> Any:
         square = self * self
         return {2: lambda: square, 3: lambda: square * self, 4: lambda: square * square}[exponent]()
 
     def __abs__(self) -> "_Number":
-        return self if self.value >= 0.0 else _Number(self.counter, -self.value)
-
-    def __gt__(self, other: Any) -> bool:
-        return self.value > _value(other)
-
-    def __lt__(self, other: Any) -> bool:
-        return self.value < _value(other)
-
-    def __eq__(self, other: object) -> bool:
-        return self.value == _value(other)
-
-    __hash__ = None  # type: ignore[assignment]
+        return self if self >= 0.0 else _Number(self.counter, -self)
 
 
 class _Array(defaultdict[tuple[int, ...], Any]):
@@ -132,7 +121,7 @@ def _moved(value: Any, counter: _Counter) -> Any:
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)
-    return _Number(counter, value.value) if isinstance(value, _Number) else value
+    return _Number(counter, value) if isinstance(value, _Number) else value
 
 
 def _run(statements: list[list[str]], names: dict[str, Any], counter: _Counter) -> None:
@@ -163,7 +152,7 @@ def _assign(text: str, names: dict[str, Any], counter: _Counter) -> None:
     assert match is not None, text
     name, subscripts, expression = match.groups()
     value = _evaluated(expression, names)
-    if isinstance(value, float):
+    if type(value) is float:
         value = counter.constants.setdefault(value, _Number(counter, value))
     if subscripts is None:
         names[name] = value

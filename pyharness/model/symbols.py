@@ -163,7 +163,7 @@ def _function(
     return called
 
 
-# Functions that are composed of others, by NumPy's name.
+# Compositions of other functions, by NumPy's name.
 _COMPOSED: dict[str, Callable[[Any], Any]] = {
     "tan": lambda x: x.sin() / x.cos(),
     "log1p": lambda x: (1.0 + x).log(),

@@ -156,9 +156,7 @@ def rows() -> list[Row]:
     """Return the rows of the comparison, in the order of the operations in the decks."""
     found = []
     for given in facts("cards/collation")["row"]:
-        thesis = "silent"
-        if "text" in given:
-            thesis = "agrees" if given["agrees"] else "differs"
+        thesis = ("agrees" if given["agrees"] else "differs") if "text" in given else "silent"
         found.append(
             Row(
                 given["what"], given["cards"], _decks(given), thesis, given.get("text", ""),

@@ -317,9 +317,7 @@ def is_opaque(torque: object) -> bool:
 
 def has_switches(torque: object) -> bool:
     """Return whether a torque is recorded and has switches."""
-    return (
-        isinstance(torque, StateTorque) and torque.tape is not None and torque.tape.n_switches > 0
-    )
+    return isinstance(torque, StateTorque) and bool(torque.tape and torque.tape.n_switches)
 
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
@@ -441,10 +439,8 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
         )
 
     def total(time: Any, omega: Any, attitude: Any, *own: Any) -> list[Any]:
-        given = (own if each.own else () for each in torques)
-        values = [
-            torque_of(x, time, omega, attitude, *y) for x, y in zip(tapes, given, strict=True)
-        ]
+        given = ((tape, own if each.own else ()) for tape, each in zip(tapes, torques, strict=True))
+        values = [torque_of(tape, time, omega, attitude, *states) for tape, states in given]
         rates = [rate for each in values for rate in each[3:]]
         values = [each[:3] for each in values]
         values += [body_torque(law, time, attitude) for law in laws]

@@ -334,13 +334,9 @@ _OF_NUMPY = (
 _OF_MATH = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items() if hasattr(math, name)}
     | {f"a{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
-    | {
-        "atan2": _by_element(_arctan2, 2),
-        "fabs": _by_element(abs, 1),
-        "hypot": _CHOICES["hypot"],
-        "pow": _by_element(lambda x, y: x**y, 2),
-        "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
-    }
+    | {"atan2": _CHOICES["arctan2"], "fabs": _CHOICES["fabs"], "hypot": _CHOICES["hypot"]}
+    | {"pow": _by_element(operator.pow, 2)}
+    | {"fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2)}
 )
 # The functions of scene files, of numbers and symbols.
 ELEMENTARY: dict[str, Callable[..., Any]] = {

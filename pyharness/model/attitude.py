@@ -123,13 +123,17 @@ def angles(attitude: Array, sequence: str) -> Array:
 
 def matrices(attitude: Array) -> Array:
     """Return n attitudes, (n, 4), as rotation matrices from body to space, (n, 3, 3)."""
-    w, x, y, z = attitude.T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    return np.moveaxis(np.array([*zip(*rows_to_body(attitude.T), strict=True)]), 2, 0)
+
+
+def rows_to_body(attitude: Iterable[Any]) -> tuple[tuple[Any, ...], ...]:
+    """Return the rows of the rotation matrix from space to body, for numbers, arrays or symbols."""
+    w, x, y, z = attitude
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
+        (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
+        (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
 
 
 def angle_between(attitude: Array, other: Array) -> Array:

@@ -68,7 +68,10 @@ class Changing:
 
     def at(self, time: float) -> Triple | Matrix:
         """Return the moments, or the matrix (kg m2), at `time` (s)."""
-        raise NotImplementedError
+        matrix = self.matrix(float(time))
+        if self.is_diagonal:
+            return triple(float(matrix[k][k]) for k in range(3))
+        return triple(triple(map(float, row)) for row in matrix)
 
     def momentum(
         self, times: NDArray[np.float64], omega: NDArray[np.float64]
@@ -143,6 +146,9 @@ class ChangingMoments(Changing):
 
         def __init__(self, polynomials: Iterable[Numbers]) -> None: ...
 
+        def at(self, time: float) -> Triple:
+            """Return the three moments (kg m2) at `time` (s)."""
+
     def __post_init__(self) -> None:
         """Check the polynomials, and convert coefficients to floats."""
         where = "[body] moments"
@@ -170,11 +176,6 @@ class ChangingMoments(Changing):
         """The polynomials of the inertia matrix; zero elements have empty ones."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
-
-    def at(self, time: float) -> Triple:
-        """Return the three moments (kg m2) at `time` (s)."""
-        (first, *_), (_, second, _), (*_, third) = self.matrix(float(time))
-        return first, second, third
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,9 @@ class ChangingInertia(Changing):
 
         def __init__(self, matrices: Iterable[Iterable[Numbers]]) -> None: ...
 
+        def at(self, time: float) -> Matrix:
+            """Return the inertia matrix (kg m2) at `time` (s)."""
+
     def __post_init__(self) -> None:
         """Check the matrices, and convert elements to floats."""
         # Imported only here, because the programs need no exact numbers.
@@ -234,10 +238,6 @@ class ChangingInertia(Changing):
         return [
             [tuple(matrix[i][j] for matrix in self.matrices) for j in range(3)] for i in range(3)
         ]
-
-    def at(self, time: float) -> Matrix:
-        """Return the inertia matrix (kg m2) at `time` (s)."""
-        return triple(triple(row) for row in self.matrix(float(time)))
 
 
 def _items(where: str, values: object, most: int, allowed: str) -> list[Any]:

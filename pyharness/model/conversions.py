@@ -1,6 +1,7 @@
 """Mechanical quantities of trajectories; trajectories in pandas, xarray, matplotlib and files."""
 
 import os
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from pyharness.model.dense_output import DenseOutput
     from pyharness.model.scene import Scene
-    from pyharness.model.trajectory import Trajectory
+    from pyharness.model.trajectory import Stop, Trajectory
 
 _SMOOTH = 1000  # points of a line through dense output
 # By attribute: a description, the unit, and the names of the components.
@@ -47,24 +48,37 @@ class _Quantity(NamedTuple):
     values: NDArray[Any]
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Conversions:
-    """A base class of trajectories: mechanical quantities and conversions.
+    """A base class of trajectories: fields, mechanical quantities and conversions.
 
     A changing inertia is taken at the time of the row. Where moments of inertia are needed, a body
     with coefficients raises InputError.
     """
 
     time: Array
-    omega: Array
-    attitude: Array | None
-    own: Array | None
-    moments: Triple | Changing | None
-    axes: Array | None
-    scene: "Scene | None"
     recorded_time: Array
+    omega: Array
     velocity: Array | None
-    ier: NDArray[np.int32] | None
-    sol: "DenseOutput | None"
+    steps: int
+    evaluations: int
+    ended: str = "complete"
+    stop: "Stop | None" = None
+    ier: NDArray[np.int32] | None = None
+    error: float | None = None
+    growth: float | None = None
+    reason: str | None = field(default=None, repr=False)
+    attitude: Array | None = None
+    own: Array | None = None
+    moments: Triple | Changing | None = None
+    axes: Array | None = None
+    exact: NDArray[np.object_] | None = None
+    tolerance: float | None = None
+    scene: "Scene | None" = field(default=None, repr=False)
+    sol: "DenseOutput | None" = field(default=None, repr=False)
+    t_events: list[Array] | None = field(default=None, repr=False)
+    y_events: list[Array] | None = field(default=None, repr=False)
+    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
     def rotation(self) -> "Rotation":
         """Return the attitudes as SciPy rotations, which rotate vectors from body to space.
@@ -296,14 +310,11 @@ class Conversions:
         }
         variables: dict[str, Any] = {}
         for each in self._quantities():
-            dimensions: tuple[str, ...] = ("time",)
-            if each.name == "attitude":
-                names = list(each.columns)
+            second = "component" if each.name == "attitude" else "axis"
+            dimensions = ("time", second) if len(each.columns) > 1 else ("time",)
+            if second == "component":
                 about = {"long_name": "component of the quaternion, scalar first"}
-                coordinates["component"] = ("component", names, about)
-                dimensions += ("component",)
-            elif len(each.columns) > 1:
-                dimensions += ("axis",)
+                coordinates[second] = (second, list(each.columns), about)
             attributes = {"units": each.unit, "long_name": each.long_name}
             variables[each.name] = (dimensions, each.values.copy(), attributes)
         described = ("ended", "steps", "evaluations", "error", "growth", "tolerance")

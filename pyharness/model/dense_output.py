@@ -153,8 +153,7 @@ class DenseOutput:
         InputError
             If a time is no number, or is not between `t_min` and `t_max`.
         """
-        times, shape = self._checked(t)
-        return self._shaped(self._states(times), shape)
+        return self._at(t, lambda times, states: states)
 
     def derivative(self, t: Any) -> Array:
         """Return the derivative of the state by the equations of motion.
@@ -175,11 +174,7 @@ class DenseOutput:
         InputError
             If a time is no number, or is not between `t_min` and `t_max`.
         """
-        times, shape = self._checked(t)
-        return self._shaped(self.rates(times, self._states(times)), shape)
-
-    def _states(self, times: Array) -> Array:
-        return self.normalized(self.states(times))
+        return self._at(t, self.rates)
 
     def normalized(self, states: Array) -> Array:
         """Return states, shape (..., m), whose quaternions, if any, have norm 1."""
@@ -188,7 +183,8 @@ class DenseOutput:
             states[..., 3:own] /= np.linalg.norm(states[..., 3:own], axis=-1, keepdims=True)
         return states
 
-    def _checked(self, t: Any) -> tuple[Array, tuple[int, ...]]:
+    def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:
+        """Return a function of times and states at checked times."""
         allowed = f"allowed: numbers from {self.t_min:.16g} to {self.t_max:.16g} s"
         try:
             times = np.asarray(t, dtype=np.float64)
@@ -200,8 +196,6 @@ class DenseOutput:
         outside = times[~(np.abs(times - inner) <= _ROUNDED * np.spacing(np.abs(inner)))]
         if outside.size:
             raise InputError(f"dense output: t = {outside[0]:.16g} s; {allowed}")
-        return np.atleast_1d(inner), times.shape
-
-    @staticmethod
-    def _shaped(rows: Array, shape: tuple[int, ...]) -> Array:
-        return rows.T if shape else rows[0]
+        inner = np.atleast_1d(inner)
+        rows = function(inner, self.normalized(self.states(inner)))
+        return rows.T if times.ndim else rows[0]

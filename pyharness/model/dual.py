@@ -82,8 +82,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
         for slot, symbol in enumerate(recorder.inputs())
     ]
     found = [dual(each, len(slots)) for each in evaluate(tape, inputs, _DUALS)]
-    values, slopes = [each.value for each in found], [each.slopes for each in found]
-    return recorder.tape([*values, *(slope for row in slopes for slope in row)])
+    return recorder.tape([*(x.value for x in found), *(slope for x in found for slope in x.slopes)])
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
@@ -92,8 +91,8 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     The parameters are the last inputs of `tape`; the result has these `values` in their place.
     """
     count = len(values)
-    instead = "fewer parameters"
-    recorder = Recorder(_FEWER * MOST_OPERATIONS, tape.n_inputs - count, "sensitivities", instead)
+    most, n_inputs = _FEWER * MOST_OPERATIONS, tape.n_inputs - count
+    recorder = Recorder(most, n_inputs, "sensitivities", "fewer parameters")
     inputs = [Dual(symbol, [0.0] * count) for symbol in recorder.inputs()]
     inputs += [
         Dual(value, [float(k == each) for k in range(count)]) for each, value in enumerate(values)
@@ -102,17 +101,20 @@ def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
     return recorder.tape([*(slope for x in found for slope in x.slopes), *(x.value for x in found)])
 
 
-def _of_duals(
-    function: Callable[[float], float],
-    symbolic: Callable[[Any], Any],
+def of_duals(
+    function: Callable[[Any], Any],
     slope: Callable[[Any, Any], Any],
+    symbolic: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
-    """Return a function of floats and dual numbers; `slope` is of the argument and the value."""
+    """Return a function of numbers and dual numbers; `slope` is of the argument and the value.
+
+    The function of the values of dual numbers is `symbolic`, or the same.
+    """
 
     def called(x: Any) -> Any:
         if not isinstance(x, Dual):
             return function(x)
-        value = symbolic(x.value)
+        value = (symbolic or called)(x.value)
         return x.chained(value, slope(x.value, value))
 
     return called
@@ -136,16 +138,16 @@ def _of_table(table: Table, time: Dual) -> Dual:
 
 _DUALS: Functions[Any] = Functions(
     float,
-    _of_duals(math.sqrt, np.sqrt, lambda _, root: 0.5 / root),
-    _of_duals(math.exp, np.exp, lambda _, value: value),
-    _of_duals(math.tanh, np.tanh, lambda _, value: 1.0 + -1.0 * (value * value)),
-    _of_duals(math.sin, np.sin, lambda x, _: np.cos(x)),
-    _of_duals(math.cos, np.cos, lambda x, _: -1.0 * np.sin(x)),
+    of_duals(math.sqrt, lambda _, root: 0.5 / root, np.sqrt),
+    of_duals(math.exp, lambda _, value: value, np.exp),
+    of_duals(math.tanh, lambda _, value: 1.0 + -1.0 * (value * value), np.tanh),
+    of_duals(math.sin, lambda x, _: np.cos(x), np.sin),
+    of_duals(math.cos, lambda x, _: -1.0 * np.sin(x), np.cos),
     _of_table,
-    _of_duals(math.log, np.log, lambda x, _: 1.0 / x),
-    _of_duals(math.atan, np.arctan, lambda x, _: 1.0 / (1.0 + x * x)),
-    _of_duals(math.asin, np.arcsin, lambda x, _: 1.0 / np.sqrt(1.0 + -1.0 * (x * x))),
-    _of_duals(step, SYMBOLS.switch, lambda x, _: 0.0),
-    _of_duals(whole, SYMBOLS.floor, lambda x, _: 0.0),
+    of_duals(math.log, lambda x, _: 1.0 / x, np.log),
+    of_duals(math.atan, lambda x, _: 1.0 / (1.0 + x * x), np.arctan),
+    of_duals(math.asin, lambda x, _: 1.0 / np.sqrt(1.0 + -1.0 * (x * x)), np.arcsin),
+    of_duals(step, lambda x, _: 0.0, SYMBOLS.switch),
+    of_duals(whole, lambda x, _: 0.0, SYMBOLS.floor),
     _selected,
 )

@@ -336,17 +336,16 @@ def place_for(
         raise InputError("out has the wrong type; allowed: an Ensemble, or an array of float64")
     buffer_of("out.omega", out.omega, shape, "d")
     buffer_of("out.status", out.status, (n,), "b")
-    if (out.attitude is None) == with_attitude:
-        raise InputError(
-            "out.attitude does not match attitude; allowed: an array with attitude, None without it"
-        )
-    if out.attitude is not None:
-        buffer_of("out.attitude", out.attitude, (n, 4), "d")
-    if (out.estimates is None) == with_estimates:
-        raise InputError(
-            "out.estimates does not match estimates; allowed: an array with estimates=True, None "
-            "without it"
-        )
-    if out.estimates is not None:
-        buffer_of("out.estimates", out.estimates, (n, 2), "d")
+    for name, width, is_requested, request in (
+        ("attitude", 4, with_attitude, "attitude"),
+        ("estimates", 2, with_estimates, "estimates=True"),
+    ):
+        array = getattr(out, name)
+        if (array is None) == is_requested:
+            raise InputError(
+                f"out.{name} does not match {name}; allowed: an array with {request}, None without "
+                "it"
+            )
+        if array is not None:
+            buffer_of(f"out.{name}", array, (n, width), "d")
     return out

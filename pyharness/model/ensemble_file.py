@@ -93,12 +93,11 @@ def _attributes(arrays: dict[str, Any], header: dict[str, Any]) -> dict[str, Any
             raise ValueError("sensitivities of another shape")
         given["sensitivities"] = found
     if _EVENTS[0] in arrays:
-        counts, *values = (arrays[name] for name in _EVENTS)
-        shapes = [(), (width,)]
+        counts, times, states = (arrays[name] for name in _EVENTS)
         if counts.dtype != "i8" or counts.ndim != 2 or counts.shape[1] != rows[0]:
             raise ValueError("other numbers of events")
-        for name, array, shape in zip(_EVENTS[1:], values, shapes, strict=True):
-            given[name] = _divided(array, counts, shape)
+        given["t_events"] = _divided(times, counts, ())
+        given["y_events"] = _divided(states, counts, (width,))
     return given
 
 
@@ -108,11 +107,6 @@ def _divided(array: Array, counts: Any, shape: tuple[int, ...]) -> list[list[Arr
     if array.dtype != "f8" or array.shape != (ends[-1], *shape) or counts.min(initial=0) < -1:
         raise ValueError("events of another type or shape")
     parts = [array[first:last] for first, last in pairwise(ends)]
-    rows = iter(zip(counts.ravel().tolist(), parts, strict=True))
-    return [
-        [
-            None if count < 0 else part
-            for count, part in (next(rows) for _ in range(counts.shape[1]))
-        ]
-        for _ in range(counts.shape[0])
-    ]
+    found = [None if n < 0 else part for n, part in zip(counts.flat, parts, strict=True)]
+    functions, bodies = counts.shape
+    return [found[k * bodies : (k + 1) * bodies] for k in range(functions)]

@@ -10,7 +10,7 @@ import operator
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from functools import reduce
+from functools import partial, reduce
 from keyword import iskeyword
 from types import MappingProxyType
 from typing import Any
@@ -146,16 +146,21 @@ def _checked_text(text: object, place: str) -> str:
 
 
 def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
-    """Return the value of an expression, a symbol or a float."""
     found: dict[ast.AST, Any] = {}
     # A loop, unlike recursion, is not limited by the stack; a node follows its parent in the list.
-    for node in reversed(_nodes(text, place)):
+    for node, operands, function in reversed(_operations(text, names, place)):
         try:
-            value = _value(node, found, names, place)
+            value = function(*(found[each] for each in operands))
         except OverflowError:
             raise _overflow(place) from None
         except ZeroDivisionError:
             raise InputError(f"{place}: division by the constant 0") from None
+        except InputError as error:
+            # Messages of symbols lack the expression.
+            message = str(error)
+            if message.startswith("[torque]: "):
+                raise InputError(f"{place}: {message.removeprefix('[torque]: ')}") from None
+            raise
         if isinstance(value, Symbol) and not value.linear().terms:
             value = value.linear().constant
         if isinstance(value, float) and not math.isfinite(value):
@@ -183,41 +188,51 @@ def _tree(text: str, place: str) -> ast.expr:
         ) from None
 
 
-def _nodes(text: str, place: str) -> list[ast.expr]:
-    """Return the nodes, each after its parent; raise InputError for one not allowed."""
-    nodes, waiting = [], [(_tree(text, place), 1)]
+def _operations(
+    text: str, names: Mapping[str, Any], place: str
+) -> list[tuple[ast.expr, Sequence[ast.expr], Callable[..., Any]]]:
+    """Return each node with its operands and a function of their values; check all nodes."""
+    found, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()
         if depth > _DEEPEST:
             raise _too_deep(place)
-        nodes.append(node)
-        waiting += [(each, depth + 1) for each in _operands(node, text, place)]
-    return nodes
+        operands, function = _operation(node, text, names, place)
+        found.append((node, operands, function))
+        waiting += [(each, depth + 1) for each in operands]
+    return found
 
 
-def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
+def _operation(
+    node: ast.expr, text: str, names: Mapping[str, Any], place: str
+) -> tuple[Sequence[ast.expr], Callable[..., Any]]:
     match node:
-        case ast.BinOp(left, op, right) if type(op) in _SUM or isinstance(op, ast.Pow):
-            return [left, right]
-        case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
-            return [operand]
+        case ast.BinOp(left, ast.Pow(), right):
+            return [left, right], partial(_power, place)
+        case ast.BinOp(left, op, right) if type(op) in _SUM:
+            return [left, right], _SUM[type(op)]
+        case ast.UnaryOp(ast.UAdd(), operand):
+            return [operand], lambda x: x
+        case ast.UnaryOp(ast.USub(), operand):
+            return [operand], operator.neg
         case ast.Compare(left, [op], [right]) if type(op) in _COMPARISONS:
-            return [left, right]
-        case ast.BoolOp(_, conditions) if all(map(_is_condition, conditions)):
-            return conditions
+            return [left, right], _COMPARISONS[type(op)]
+        case ast.BoolOp(op, conditions) if all(map(_is_condition, conditions)):
+            join = operator.and_ if isinstance(op, ast.And) else operator.or_
+            return conditions, lambda *values: reduce(join, values)
         case ast.UnaryOp(ast.Not(), condition) if _is_condition(condition):
-            return [condition]
+            return [condition], negated
         case ast.Call(ast.Name(name), arguments, keywords):
             if name not in FUNCTIONS:
                 raise unknown("function", name, FUNCTIONS, place)
             count = _COUNTS[name]
             if len(arguments) != count or keywords:
                 raise InputError(f"{place}: {name} of {len(arguments)} arguments; allowed: {count}")
-            return arguments
-        case ast.Name():
-            return []
+            return arguments, partial(_called, place, name)
+        case ast.Name(name):
+            return [], partial(_named, name, names, place)
         case ast.Constant(value) if type(value) in (int, float):
-            return []
+            return [], partial(float, value)  # type: ignore[arg-type]
     shown = _short(text[node.col_offset : node.end_col_offset])
     raise InputError(f"{place}: '{shown}' is not allowed; {_ALLOWED}")
 
@@ -225,40 +240,6 @@ def _operands(node: ast.expr, text: str, place: str) -> list[ast.expr]:
 def _is_condition(node: ast.expr) -> bool:
     is_not = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
     return isinstance(node, (ast.Compare, ast.BoolOp)) or is_not
-
-
-def _value(
-    node: ast.expr, found: Mapping[ast.AST, Any], names: Mapping[str, Any], place: str
-) -> Any:
-    """Return the value of a node; `found` has those of its operands."""
-    try:
-        match node:
-            case ast.Constant(value):
-                return float(value)  # type: ignore[arg-type]
-            case ast.Name(name):
-                return _named(name, names, place)
-            case ast.Compare(left, [op], [right]):
-                return _COMPARISONS[type(op)](found[left], found[right])
-            case ast.BoolOp(op, conditions):
-                values = [found[each] for each in conditions]
-                return reduce(operator.and_ if isinstance(op, ast.And) else operator.or_, values)
-            case ast.UnaryOp(ast.Not(), condition):
-                return negated(found[condition])
-            case ast.UnaryOp(op, operand):
-                return -found[operand] if isinstance(op, ast.USub) else found[operand]
-            case ast.BinOp(left, ast.Pow(), right):
-                return _power(found[left], found[right], place)
-            case ast.BinOp(left, op, right):
-                return _SUM[type(op)](found[left], found[right])
-            case ast.Call(ast.Name(name), arguments):
-                return _function(name, [found[each] for each in arguments], place)
-    except InputError as error:
-        # Messages of symbols lack the expression.
-        message = str(error)
-        if message.startswith("[torque]: "):
-            raise InputError(f"{place}: {message.removeprefix('[torque]: ')}") from None
-        raise
-    raise AssertionError(node)
 
 
 def _named(name: str, names: Mapping[str, Any], place: str) -> Any:
@@ -269,7 +250,7 @@ def _named(name: str, names: Mapping[str, Any], place: str) -> Any:
     raise unknown("name", name, [*names, *FUNCTIONS], place)
 
 
-def _power(base: Any, exponent: Any, place: str) -> Any:
+def _power(place: str, base: Any, exponent: Any) -> Any:
     if isinstance(base, Symbol) or isinstance(exponent, Symbol):
         return base**exponent
     try:
@@ -280,7 +261,7 @@ def _power(base: Any, exponent: Any, place: str) -> Any:
         raise InputError(f"{place}: the constant {base:g} has no real power {exponent:g}") from None
 
 
-def _function(name: str, arguments: Sequence[Any], place: str) -> Any:
+def _called(place: str, name: str, *arguments: Any) -> Any:
     if name == "where":
         return select(*arguments)
     if any(isinstance(each, Symbol) for each in arguments):

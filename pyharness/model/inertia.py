@@ -12,14 +12,13 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError
 from pyharness.model.values import Matrix as Matrix
 from pyharness.model.values import Triple, converted, number_list, three, triple
 
 Exact = tuple[Fraction, Fraction, Fraction]
-Array = NDArray[np.float64]
 
 SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
 _KEPT = 256  # number of cached principal frames
@@ -98,7 +97,7 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
         order.append(max(left, key=lambda k: abs(vectors[k][row])))
     axes = [vectors[k] for k in order]
     axes = [_reverse(axis) if axis[n] < 0 else axis for n, axis in enumerate(axes)]
-    if _determinant(axes) < 0:
+    if np.linalg.det([list(map(float, axis)) for axis in axes]) < 0.0:
         least = min(range(3), key=lambda n: abs(axes[n][n]))
         axes[least] = _reverse(axes[least])
     exact = triple(values[k] for k in order)
@@ -111,11 +110,6 @@ def principal_frame(inertia: Matrix) -> PrincipalFrame:
 
 def _reverse(axis: Exact) -> Exact:
     return triple(-x for x in axis)
-
-
-def _determinant(axes: list[Exact]) -> float:
-    (a, b, c), (d, e, f), (g, h, k) = ([float(x) for x in axis] for axis in axes)
-    return a * (e * k - f * h) - b * (d * k - f * g) + c * (d * h - e * g)
 
 
 def nearest_float(value: Fraction) -> float:

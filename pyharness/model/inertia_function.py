@@ -6,7 +6,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.changing import Changing
@@ -17,7 +16,7 @@ from pyharness.model.numpy_calls import called_once
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Table, Tape, evaluate, float_outputs, slots_of
 from pyharness.model.tape_arrays import ARRAYS, value_of_table, without_equal_constants
-from pyharness.model.values import Matrix, Triple, three, triple
+from pyharness.model.values import three
 
 COUNTS = {"moments": 3, "inertia": 9}
 _RETURNS = {"moments": "three moments", "inertia": "three rows of three numbers"}
@@ -48,18 +47,17 @@ class InertiaFunction(Changing):
     @property
     def phrase(self) -> str:
         """The function in words, for reports."""
-        if not self.written:
+        values = self.values()
+        if values is None:
             return "a recorded function of t"
-        if isinstance(self.written[0], tuple):
-            return f"a table of {len(dict(self.written)['times'])} times"
-        return ", ".join(str(each).replace("'", "") for each in self.written)
+        if isinstance(values, dict):
+            return f"a table of {len(values['times'])} times"
+        return ", ".join(str(each).replace("'", "") for each in values)
 
     def values(self) -> list[Any] | dict[str, Any] | None:
         """Return what a scene file has in its place; None for a function of Python."""
-        if not self.written:
-            return None
-        is_table = isinstance(self.written[0], tuple)
-        return dict(self.written) if is_table else list(self.written)
+        is_table = self.written and isinstance(self.written[0], tuple)
+        return dict(self.written) if is_table else list(self.written) or None
 
     @property
     def is_constant(self) -> bool:
@@ -84,13 +82,6 @@ class InertiaFunction(Changing):
         # The triangle above the diagonal; below it, the same elements may be rounded otherwise.
         return [[found[3 * min(i, j) + max(i, j)] for j in range(3)] for i in range(3)]
 
-    def at(self, time: float) -> Triple | Matrix:
-        """Return the moments, or the matrix (kg m2), at `time` (s)."""
-        matrix = self.matrix(float(time))
-        if self.is_diagonal:
-            return triple(float(matrix[k][k]) for k in range(3))
-        return triple(triple(map(float, row)) for row in matrix)
-
     @cached_property
     def span(self) -> tuple[float, float]:
         """Infinite times: a moment that reaches 0 is a singularity, which ends the integration."""
@@ -99,17 +90,15 @@ class InertiaFunction(Changing):
     def check(self, times: Iterable[float]) -> None:
         """Raise InputError if a moment is not above 0 at one of many times to those of `times`."""
         for end in times:
-            if end and np.isfinite(end):
-                self._check_between(np.linspace(0.0, end, _CHECKED + 1))
-
-    def _check_between(self, times: NDArray[np.float64]) -> None:
-        least = self._least(times)
-        wrong = np.flatnonzero(~(least > 0.0))
-        if wrong.size:
-            raise InputError(
-                f"[body] {self.place}: a principal moment is {least[wrong[0]]:g} kg m2 at t = "
-                f"{times[wrong[0]]:g} s; allowed: moments above 0 at all times of the solution"
-            )
+            if not (end and np.isfinite(end)):
+                continue
+            tried = np.linspace(0.0, end, _CHECKED + 1)
+            for time, least in zip(tried, self._least(tried), strict=True):
+                if not least > 0.0:
+                    raise InputError(
+                        f"[body] {self.place}: a principal moment is {least:g} kg m2 at t = "
+                        f"{time:g} s; allowed: moments above 0 at all times of the solution"
+                    )
 
     def _least(self, times: Array) -> Array:
         elements = [np.broadcast_to(each, len(times)) for row in self.matrix(times) for each in row]
@@ -192,15 +181,13 @@ def checked_function(found: InertiaFunction) -> InertiaFunction:
             raise InputError(f"{where} at time 0: {min(moments):g}; allowed: numbers above 0")
     else:
         checked_inertia(f"{where} at time 0", start)
-        _check_symmetric(found.tape, where)
+        for time in _TRIED:
+            matrix = np.array(_outputs(found.tape, time)).reshape(3, 3)
+            if (np.abs(matrix - matrix.T) > _CONTINUOUS * np.abs(matrix).max()).any():
+                raise InputError(
+                    f"{where} at t = {time:g} s: not symmetric; allowed: a symmetric one"
+                )
     return found
-
-
-def _check_symmetric(tape: Tape, where: str) -> None:
-    for time in _TRIED:
-        matrix = np.array(_outputs(tape, time)).reshape(3, 3)
-        if (np.abs(matrix - matrix.T) > _CONTINUOUS * np.abs(matrix).max()).any():
-            raise InputError(f"{where} at t = {time:g} s: not symmetric; allowed: a symmetric one")
 
 
 def _check_continuous(tape: Tape, where: str) -> None:

@@ -11,7 +11,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import update_wrapper
+from functools import partial, update_wrapper
 from typing import Any
 
 import numpy as np
@@ -44,31 +44,16 @@ def replaced_functions(with_targets: bool) -> Iterator[None]:
         _here.targets = before
         with _lock:
             _installed -= 1
-            if _installed == 0:
-                _restore()
+            while _originals and not _installed:
+                setattr(*_originals.pop())
 
 
 def _install() -> None:
-    original: Callable[..., Any]
     for module, functions in _REPLACEMENTS:
-        for name, function in functions.items():
+        for name, replaced in functions.items():
             original = getattr(module, name)
             _originals.append((module, name, original))
-            setattr(module, name, _Replaced(original, function))
-    for name in _WRAPPED:
-        original = getattr(np, name)
-        _originals.append((np, name, original))
-        setattr(np, name, _Wrapped(original))
-    for name, value in (("zeros", 0.0), ("empty", 0.0), ("ones", 1.0)):
-        original = getattr(np, name)
-        _originals.append((np, name, original))
-        setattr(np, name, _Target(original, value))
-
-
-def _restore() -> None:
-    while _originals:
-        module, name, original = _originals.pop()
-        setattr(module, name, original)
+            setattr(module, name, replaced(original))
 
 
 class _Replaced:
@@ -122,34 +107,20 @@ def _has_symbol(value: Any) -> bool:
     return isinstance(value, Symbol)
 
 
+def _comparison(compare: Callable[[Any, Any], Any]) -> Any:
+    def compared(x: Any, y: Any) -> Any:
+        found = compare(x, y)
+        # The negative of a bool of Python is a number.
+        return np.bool_(found) if isinstance(found, bool) else found
+
+    return lambda array, other: np.frompyfunc(compared, 2, 1)(array, other)
+
+
 class SymbolArray(np.ndarray[Any, Any]):
     """An array of symbols, whose comparisons are arrays of conditions instead of truth values."""
 
-    def _compared(self, name: str, other: Any) -> Any:
-        compare = getattr(operator, name)
-
-        def compared(x: Any, y: Any) -> Any:
-            found = compare(x, y)
-            # The negative of a bool of Python is a number.
-            return np.bool_(found) if isinstance(found, bool) else found
-
-        return np.frompyfunc(compared, 2, 1)(self, other)
-
-    def __lt__(self, other: Any) -> Any:
-        """Return where each element is smaller."""
-        return self._compared("lt", other)
-
-    def __le__(self, other: Any) -> Any:
-        """Return where each element is not larger."""
-        return self._compared("le", other)
-
-    def __gt__(self, other: Any) -> Any:
-        """Return where each element is larger."""
-        return self._compared("gt", other)
-
-    def __ge__(self, other: Any) -> Any:
-        """Return where each element is not smaller."""
-        return self._compared("ge", other)
+    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
+    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def clip(self, *given: Any, **named: Any) -> Any:
         """Return the elements, limited to an interval."""
@@ -162,11 +133,9 @@ def symbol_array(values: Any) -> Any:
     return np.array(values, dtype=object).view(SymbolArray)
 
 
-class _Wrapped(_Replaced):
-    """A function whose result, an array of symbols, compares as `SymbolArray`."""
-
-    def __init__(self, original: Callable[..., Any]) -> None:
-        super().__init__(original, lambda *given, **named: _viewed(original(*given, **named)))
+def _wrapped(original: Callable[..., Any]) -> _Replaced:
+    """Return a function whose result, an array of symbols, compares as `SymbolArray`."""
+    return _Replaced(original, lambda *given, **named: _viewed(original(*given, **named)))
 
 
 def _viewed(found: Any) -> Any:
@@ -212,22 +181,10 @@ def _clip(x: Any, a_min: Any = None, a_max: Any = None, **named: Any) -> Any:
     return _by_element(_limited, 3)(x, low, high)
 
 
-def _where(condition: Any, *values: Any) -> Any:
-    return _by_element(select, 3)(condition, *values)
-
-
-def _heaviside(x: Any, at_zero: Any) -> Any:
-    return select(x > 0.0, 1.0, 0.0)
-
-
 def _arctan2(y: Any, x: Any) -> Any:
     if not isinstance(y, Symbol) and not isinstance(x, Symbol):
         return math.atan2(y, x)
     return (y if isinstance(y, Symbol) else 0.0 * x + y).arctan2(x)
-
-
-def _hypot(x: Any, y: Any) -> Any:
-    return (x * x + y * y) ** 0.5
 
 
 def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
@@ -275,8 +232,7 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     array = np.asarray(x, dtype=object)
     if ord not in (None, 2) or (ord == 2 and array.ndim > 1 and axis is None):
         raise _symbol_in(array).recorder.refusal(f"the norm of order {ord}", "the Euclidean norm")
-    total = np.sum(array * array, axis=axis, keepdims=keepdims)
-    return total**0.5
+    return np.sum(array * array, axis=axis, keepdims=keepdims) ** 0.5
 
 
 def _solve(matrix: Any, right: Any) -> Any:
@@ -292,13 +248,10 @@ def _inverse(matrix: Any) -> Any:
         raise _symbol_in(array).recorder.refusal(
             f"the inverse of a matrix of shape {array.shape}", "matrices of at most three rows"
         )
-    n = len(array)
-    cofactors = np.empty((n, n), dtype=object)
-    for i in range(n):
-        for j in range(n):
-            cofactors[i, j] = (-1.0) ** (i + j) * _determinant(
-                np.delete(np.delete(array, i, 0), j, 1)
-            )
+    cofactors = np.empty(array.shape, dtype=object)
+    for i, j in np.ndindex(array.shape):
+        minor = np.delete(np.delete(array, i, 0), j, 1)
+        cofactors[i, j] = (-1.0) ** (i + j) * _determinant(minor)
     return cofactors.T / (array[0] @ cofactors[0])
 
 
@@ -361,14 +314,16 @@ _ELEMENTARY = {
 }  # fmt: skip
 _ARCS = {"sin": math.asin, "cos": math.acos, "tan": math.atan, "sinh": math.asinh}
 _CHOICES: dict[str, Callable[..., Any]] = {
-    "where": _where, "clip": _clip, "heaviside": _by_element(_heaviside, 2),
+    "where": _by_element(select, 3), "clip": _clip,
+    "heaviside": _by_element(lambda x, at_zero: select(x > 0.0, 1.0, 0.0), 2),
     "maximum": _by_element(_largest, 2), "minimum": _by_element(_smallest, 2),
     "fmax": _by_element(_largest, 2), "fmin": _by_element(_smallest, 2),
     "max": _extreme(_largest), "min": _extreme(_smallest), "amax": _extreme(_largest),
     "amin": _extreme(_smallest), "interp": _interp, "arctan2": _by_element(_arctan2, 2),
-    "hypot": _by_element(_hypot, 2), "sign": _of_symbol("sign", np.sign),
-    "fabs": _by_element(abs, 1), "logical_and": _by_element(lambda x, y: x & y, 2),
-    "logical_or": _by_element(lambda x, y: x | y, 2), "logical_not": _by_element(negated, 1),
+    "hypot": _by_element(lambda x, y: (x * x + y * y) ** 0.5, 2),
+    "sign": _of_symbol("sign", np.sign), "fabs": _by_element(abs, 1),
+    "logical_and": _by_element(operator.and_, 2), "logical_or": _by_element(operator.or_, 2),
+    "logical_not": _by_element(negated, 1),
 }  # fmt: skip
 _OF_NUMPY = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items()}
@@ -379,13 +334,9 @@ _OF_NUMPY = (
 _OF_MATH = (
     {name: _of_symbol(name, each) for name, each in _ELEMENTARY.items() if hasattr(math, name)}
     | {f"a{name}": _of_symbol(f"arc{name}", each) for name, each in _ARCS.items()}
-    | {
-        "atan2": _by_element(_arctan2, 2),
-        "fabs": _by_element(abs, 1),
-        "hypot": _by_element(_hypot, 2),
-        "pow": _by_element(lambda x, y: x**y, 2),
-        "fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2),
-    }
+    | {"atan2": _CHOICES["arctan2"], "fabs": _CHOICES["fabs"], "hypot": _CHOICES["hypot"]}
+    | {"pow": _by_element(operator.pow, 2)}
+    | {"fmod": _by_element(lambda x, y: x - y * (x / y).trunc(), 2)}
 )
 # The functions of scene files, of numbers and symbols.
 ELEMENTARY: dict[str, Callable[..., Any]] = {
@@ -399,8 +350,14 @@ ELEMENTARY: dict[str, Callable[..., Any]] = {
     "heaviside": lambda x: select(x > 0.0, 1.0, 0.0), "min": _smallest, "max": _largest,
     "clip": _limited, "where": select,
 }  # fmt: skip
-_REPLACEMENTS: tuple[tuple[Any, dict[str, Callable[..., Any]]], ...] = (
-    (np, _OF_NUMPY),
-    (np.linalg, {"norm": _norm, "solve": _solve, "inv": _inverse}),
-    (math, _OF_MATH),
-)
+_OF_LINALG: dict[str, Callable[..., Any]] = {"norm": _norm, "solve": _solve, "inv": _inverse}
+_TARGETS = {"zeros": 0.0, "empty": 0.0, "ones": 1.0}
+# By module and name: a function of the original that returns the replacement.
+_REPLACEMENTS: list[tuple[Any, dict[str, Callable[..., Any]]]] = [
+    (module, {name: partial(_Replaced, function=each) for name, each in functions.items()})
+    for module, functions in ((np, _OF_NUMPY), (np.linalg, _OF_LINALG), (math, _OF_MATH))
+]
+_REPLACEMENTS += [
+    (np, dict.fromkeys(_WRAPPED, _wrapped)),
+    (np, {name: partial(_Target, value=each) for name, each in _TARGETS.items()}),
+]

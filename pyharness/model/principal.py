@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def in_double(scene: Scene) -> Scene:
     """Return a scene whose moments are in double precision."""
     if not isinstance(scene, PrincipalScene):
         return scene
-    return Scene(**{each.name: getattr(scene, each.name) for each in fields(Scene) if each.init})
+    return Scene(**_fields(scene))
 
 
 def principal(scene: Scene) -> tuple[Scene, Array]:
@@ -95,22 +96,14 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     elif not law.in_space:
         # Large components may cancel in the torque about an axis of small moment. It is therefore
         # rounded only after the transformation.
-        law = exact_law(law).rotate(frame.into).rounded()
-    bare = PrincipalScene(
-        scene.name,
-        _rotate(frame, scene.omega),
-        moments=frame.moments,
-        torque=law,
-        step_size=scene.step_size,
-        steps=scene.steps,
-        masses=scene.masses,
-        forces=scene.forces,
-        case=scene.case,
-        attitude=attitude,
-        states=scene.states,
-        moments_low=frame.moments_low,
-    )
-    return bare, frame.axes.copy()
+        law = exact_law(law, frame.into)
+    given = _fields(scene) | {"inertia": None, "torque": law, "attitude": attitude}
+    given |= {"omega": _rotate(frame, scene.omega), "moments": frame.moments}
+    return PrincipalScene(**given, moments_low=frame.moments_low), frame.axes.copy()
+
+
+def _fields(scene: Scene) -> dict[str, Any]:
+    return {each.name: getattr(scene, each.name) for each in fields(Scene) if each.init}
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:

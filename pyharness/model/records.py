@@ -6,7 +6,7 @@ from typing import Any
 from pyharness.model.build import build
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.model.scene_file import body_of
+from pyharness.model.scene_file import as_lists, body_of, law_table
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
@@ -44,7 +44,7 @@ def _states(scene: Scene) -> dict[str, Any]:
 def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
     if isinstance(torque, TorqueLaw):
         frame = {} if torque.frame == "body" else {"frame": torque.frame}
-        return {**_law(torque), **frame}
+        return {**law_table(torque), **frame}
     if torque.tape is None:
         return {"opaque": True}
     if not (torque.expression or torque.terms):
@@ -56,26 +56,9 @@ def _torque(torque: TorqueLaw | StateTorque) -> dict[str, Any]:
         if isinstance(part, TorqueLaw):
             record |= _torque(part)
         else:
-            term = {key: _value(value) for key, value in part}
+            term = {key: as_lists(value) for key, value in part}
             record["terms"] = [*record.get("terms", []), term]
     return record
-
-
-def _value(value: Any) -> Any:
-    if isinstance(value, TorqueLaw):
-        return _law(value)
-    return list(map(_value, value)) if isinstance(value, tuple) else value
-
-
-def _law(law: TorqueLaw) -> dict[str, Any]:
-    return {
-        "constant": list(law.constant),
-        "rate": list(law.rate),
-        **{
-            name: [{"amplitude": list(amplitude), "frequency": f} for amplitude, f in waves]
-            for name, waves in (("sines", law.sines), ("cosines", law.cosines))
-        },
-    }
 
 
 def listing_record(listing: Listing) -> dict[str, Any]:

@@ -176,23 +176,26 @@ def _has_form(torque: TorqueLaw | StateTorque) -> bool:
     return isinstance(torque, TorqueLaw) or bool(torque.expression or torque.terms)
 
 
+def law_table(law: TorqueLaw) -> dict[str, Any]:
+    """Return the table [torque] of a torque law without its frame."""
+    waves = {
+        key: [{"amplitude": list(amplitude), "frequency": f} for amplitude, f in getattr(law, key)]
+        for key in _WAVES
+    }
+    return {"constant": list(law.constant), "rate": list(law.rate), **waves}
+
+
 def _law_lines(law: TorqueLaw) -> list[str]:
-    lines = [f"constant = {list(law.constant)}", f"rate = {list(law.rate)}"]
-    if law.frame != "body":
-        lines.append(f'frame = "{law.frame}"')
-    for key, waves in (("sines", law.sines), ("cosines", law.cosines)):
-        each = [f"{{ amplitude = {list(a)}, frequency = {f!r} }}" for a, f in waves]
-        lines.append(f"{key} = [{', '.join(each)}]")
-    return lines
+    lines = [f"{key} = {_toml(value)}" for key, value in law_table(law).items()]
+    return lines if law.frame == "body" else [*lines[:2], f'frame = "{law.frame}"', *lines[2:]]
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, TorqueLaw):
-        lines = _law_lines(value)
-        return f"{{ {', '.join(line for line in lines if not line.startswith('frame'))} }}"
+        value = law_table(value)
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{key} = {_toml(each)}' for key, each in value.items())} }}"
-    if isinstance(value, tuple):
+    if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, str):
         return f'"{value}"'
@@ -201,17 +204,21 @@ def _toml(value: Any) -> str:
 
 def body_of(scene: Scene) -> tuple[str, Any]:
     """Return key ("moments", "coefficients" or "inertia") and value of a scene file's body."""
-    if scene.inertia is not None:
-        return "inertia", [list(row) for row in scene.inertia]
     if isinstance(scene.changing, InertiaFunction):
         return scene.changing.place, scene.changing.values()
     if isinstance(scene.changing, ChangingMoments):
-        return "moments", [list(each) for each in scene.changing.polynomials]
+        return "moments", as_lists(scene.changing.polynomials)
     if isinstance(scene.changing, ChangingInertia):
-        return "inertia", [[list(row) for row in each] for each in scene.changing.matrices]
-    if scene.moments is not None:
-        return "moments", list(scene.moments)
-    return "coefficients", list(scene.coefficients or ())
+        return "inertia", as_lists(scene.changing.matrices)
+    bodies = {key: getattr(scene, key) for key in ("inertia", "moments", "coefficients")}
+    return next((key, as_lists(each)) for key, each in bodies.items() if each is not None)
+
+
+def as_lists(value: Any) -> Any:
+    """Return the value with lists for tuples and tables for torque laws, as JSON has them."""
+    if isinstance(value, TorqueLaw):
+        return law_table(value)
+    return list(map(as_lists, value)) if isinstance(value, tuple) else value
 
 
 def law_of_table(table: dict[str, Any]) -> TorqueLaw:

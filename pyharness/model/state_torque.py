@@ -158,26 +158,14 @@ def torque_of(tape: Tape, time: Any, omega: Any, attitude: Any, *own: Any) -> Ar
 
 def replayed(function: Function, own: tuple[str, ...] = ()) -> StateTorque:
     """Return a torque recorded from a function of this project, without checks."""
-    recorder = Recorder(_MOST_REPLAYED, N_INPUTS + len(own))
-    time, *state = recorder.inputs()
-    omega, attitude = map(symbol_array, (state[:3], state[3:7]))
-    tape = recorder.tape(list(function(time, omega, attitude, *state[7:])))
+    tape = _recorded_with(Recorder(_MOST_REPLAYED, N_INPUTS + len(own)), function)
     return StateTorque(tape, None, tape.needs_attitude, own=own)
 
 
-def _tape_of(function: Function, names: Sequence[str] = ()) -> Tape:
-    """Return a function as a tape; the keyword arguments `names` become further inputs."""
-    recorder = Recorder(n_inputs=N_INPUTS + len(names))
-    # A number of factors is no parameter.
-    recorder.has_powers = not names
-    return _recorded_with(recorder, function, names)
-
-
-def _recorded_with(recorder: Recorder, function: Function, names: Sequence[str] = ()) -> Tape:
+def _recorded_with(recorder: Recorder, function: Function) -> Tape:
     time, *state = recorder.inputs()
     omega, attitude = map(symbol_array, (state[:3], state[3:7]))
-    values = dict(zip(names, state[7:], strict=True))
-    return recorder.tape(list(function(time, omega, attitude, **values)))
+    return recorder.tape(list(function(time, omega, attitude, *state[7:])))
 
 
 @lru_cache(maxsize=64)
@@ -230,10 +218,7 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
         given = (time, omega, attitude) if takes_attitude else (time, omega)
         allowed = "a function that returns three components in N m"
         with_values = partial(function, **values) if values else function
-        components = called_once(with_values, given, time.recorder, allowed)
-        if len(components) != 3:
-            raise InputError(f"[torque]: {len(components)} components; allowed: three")
-        return components
+        return _checked_components(called_once(with_values, given, time.recorder, allowed))
 
     tape = recorded_twice(lambda recorder: _recorded_with(recorder, called), Recorder)
     torque = StateTorque(tape, None, tape.needs_attitude)
@@ -244,23 +229,25 @@ def _with_states(function: Function, names: tuple[str, ...]) -> StateTorque:
     """Return a torque recorded from a function that also returns the rates of own states."""
     takes_attitude = count_arguments(function, "[torque]", _WITH_STATES) == 4
 
-    def record(recorder: Recorder) -> Tape:
-        time, *state = recorder.inputs()
-        omega, attitude = map(symbol_array, (state[:3], state[3:7]))
-        own = dict(zip(names, state[7:], strict=True))
+    def called(time: Symbol, omega: Any, attitude: Any, *states: Symbol) -> list[Any]:
+        own = dict(zip(names, states, strict=True))
         given = (time, omega, attitude, own) if takes_attitude else (time, omega, own)
-        parts = called_once(function, given, recorder, _WITH_STATES)
+        parts = called_once(function, given, time.recorder, _WITH_STATES)
         if len(parts) != 2:
             raise InputError(
                 f"[torque]: the function returned {len(parts)} values; it must be {_WITH_STATES}"
             )
-        components = list(parts[0])
-        if len(components) != 3:
-            raise InputError(f"[torque]: {len(components)} components; allowed: three")
-        return recorder.tape([*components, *_ordered_rates(parts[1], names)])
+        return [*_checked_components(list(parts[0])), *_ordered_rates(parts[1], names)]
 
-    tape = recorded_twice(record, partial(Recorder, n_inputs=N_INPUTS + len(names)))
+    new = partial(Recorder, n_inputs=N_INPUTS + len(names))
+    tape = recorded_twice(lambda recorder: _recorded_with(recorder, called), new)
     return StateTorque(tape, None, tape.needs_attitude, own=names)
+
+
+def _checked_components(components: list[Any]) -> list[Any]:
+    if len(components) != 3:
+        raise InputError(f"[torque]: {len(components)} components; allowed: three")
+    return components
 
 
 def _ordered_rates(rates: Any, names: tuple[str, ...]) -> list[Any]:
@@ -285,12 +272,7 @@ def _listed(names: Iterable[str]) -> str:
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
     """Return the number of arguments of a function that reads states, 3 or 4."""
-    try:
-        parameters = signature(function).parameters.values()
-    except (TypeError, ValueError):
-        raise InputError(
-            f"{where}: the function's arguments are unknown; allowed: {allowed}"
-        ) from None
+    parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
         raise InputError(f"{where}: the function has {count} arguments; allowed: {allowed}")
@@ -337,9 +319,7 @@ def is_opaque(torque: object) -> bool:
 
 def has_switches(torque: object) -> bool:
     """Return whether a torque is recorded and has switches."""
-    return (
-        isinstance(torque, StateTorque) and torque.tape is not None and torque.tape.n_switches > 0
-    )
+    return isinstance(torque, StateTorque) and bool(torque.tape and torque.tape.n_switches)
 
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
@@ -407,22 +387,28 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
         if isinstance(value := converted(each.default), float) and math.isfinite(value)
     }
 
-    def is_recordable(names: Sequence[str]) -> bool:
+    def recorded_with(names: Sequence[str]) -> Tape | None:
+        """Return the tape with these keywords as inputs, or None if it can't be recorded."""
+        recorder = Recorder(n_inputs=N_INPUTS + len(names))
+        # A number of factors is no parameter.
+        recorder.has_powers = not names
+
+        def named(time: Symbol, omega: Any, attitude: Any, *inputs: Symbol) -> Any:
+            return called(time, omega, attitude, **dict(zip(names, inputs, strict=True)))
+
         try:
-            _tape_of(called, names)
+            return _recorded_with(recorder, named)
         except InputError:
-            return False
-        return True
+            return None
 
     if not values:
         return torque
     names = list(values)
-    if not is_recordable(names):
-        names = [name for name in names if is_recordable([name])]
-    if not is_recordable(names):
-        return torque
+    if recorded_with(names) is None:
+        names = [name for name in names if recorded_with([name]) is not None]
+    varied = recorded_with(names)
     parameters = tuple((name, values[name]) for name in names)
-    return replace(torque, parameters=parameters, varied=_tape_of(called, names))
+    return torque if varied is None else replace(torque, parameters=parameters, varied=varied)
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | TorqueLaw, ...]":
@@ -455,10 +441,8 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
         )
 
     def total(time: Any, omega: Any, attitude: Any, *own: Any) -> list[Any]:
-        given = (own if each.own else () for each in torques)
-        values = [
-            torque_of(x, time, omega, attitude, *y) for x, y in zip(tapes, given, strict=True)
-        ]
+        given = ((tape, own if each.own else ()) for tape, each in zip(tapes, torques, strict=True))
+        values = [torque_of(tape, time, omega, attitude, *states) for tape, states in given]
         rates = [rate for each in values for rate in each[3:]]
         values = [each[:3] for each in values]
         values += [body_torque(law, time, attitude) for law in laws]
@@ -478,21 +462,21 @@ def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
 def _takes_attitude(function: object) -> bool:
     if not callable(function):
         raise InputError(f"[torque] is {kind_of(function)}; {_ARGUMENTS}")
-    try:
-        parameters = signature(function).parameters.values()
-    except (TypeError, ValueError):
-        raise InputError(f"[torque]: the function's arguments are unknown; {_ARGUMENTS}") from None
+    parameters = _parameters(function, "[torque]", _ARGUMENTS)
     places = [each for each in parameters if each.kind in _POSITIONAL]
-    required = [each for each in places if each.default is Parameter.empty]
-    keywords = [
-        each
-        for each in parameters
-        if each.kind is Parameter.KEYWORD_ONLY and each.default is Parameter.empty
-    ]
-    many = any(each.kind is Parameter.VAR_POSITIONAL for each in parameters)
-    if keywords or len(required) > 3 or not (many or len(places) >= 2):
+    required = [each.kind for each in parameters if each.default is Parameter.empty]
+    many = Parameter.VAR_POSITIONAL in required
+    count = sum(each in _POSITIONAL for each in required)
+    if Parameter.KEYWORD_ONLY in required or count > 3 or not (many or len(places) >= 2):
         raise InputError(f"[torque]: the function has {len(places)} arguments; {_ARGUMENTS}")
-    return len(required) == 3 or (len(required) < 2 and many)
+    return count == 3 or (count < 2 and many)
+
+
+def _parameters(function: Function, where: str, allowed: str) -> list[Parameter]:
+    try:
+        return [*signature(function).parameters.values()]
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: the function's arguments are unknown; {allowed}") from None
 
 
 _POSITIONAL = (Parameter.POSITIONAL_ONLY, Parameter.POSITIONAL_OR_KEYWORD)

@@ -7,7 +7,7 @@ change its coefficients. Any other operation has a slot for its result, only one
 import math
 import sys
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from pyharness.model.errors import InputError, printable
 from pyharness.model.tape import (
+    FLOATS,
     N_INPUTS,
     TIME,
     Functions,
@@ -22,12 +23,7 @@ from pyharness.model.tape import (
     Operation,
     Table,
     Tape,
-    arcsine,
-    exponential,
-    logarithm,
     slots_of,
-    step,
-    whole,
 )
 from pyharness.model.values import converted
 
@@ -70,7 +66,6 @@ class Recorder:
         self._has_lines = has_lines
         self.place = place
         self.most, self._n_inputs, self._instead = most, n_inputs, instead
-        self._operations: list[Operation] = []
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
         self.was_converted = False  # whether a symbol was to become a float
@@ -99,19 +94,22 @@ class Recorder:
     def slot(self, operation: Operation) -> int:
         """Return the slot of `operation`, which is recorded if new."""
         if operation not in self._slots:
-            if len(self._operations) == self.most:
+            if len(self._slots) == self.most:
                 most = self.most
                 raise InputError(
                     f"{self.place}: more than {most} operations; use fewer, or {self._instead}"
                 )
-            self._slots[operation] = self._n_inputs + len(self._operations)
-            self._operations.append(operation)
+            self._slots[operation] = self._n_inputs + len(self._slots)
         return self._slots[operation]
+
+    def result(self, *operation: Any, factor: float = 1.0) -> "Symbol":
+        """Record an operation, given by its fields; return its result times `factor`."""
+        return Symbol(self, 0.0, {self.slot(Operation(*operation)): factor})
 
     def tape(self, outputs: Sequence[Any]) -> Tape:
         """Return the tape of `outputs`, without unused operations."""
         linear = [self._output(axis, each) for axis, each in enumerate(outputs, 1)]
-        return _without_unused(self._operations, linear, self._n_inputs)
+        return _without_unused([*self._slots], linear, self._n_inputs)
 
     def _output(self, axis: int, value: Any) -> Linear:
         if isinstance(value, np.ndarray) and value.shape == ():
@@ -131,7 +129,7 @@ class Recorder:
 
 
 def _of_symbols(
-    operator: Callable[["Symbol", "Symbol"], "Symbol"],
+    operator: Callable[["Symbol", "Symbol"], Any],
 ) -> Callable[["Symbol", Any], "Symbol"]:
     """Return an operator of a symbol and any real number; NotImplemented for no number."""
 
@@ -146,6 +144,42 @@ def _of_symbols(
 def _is_moderate(factor: float) -> bool:
     """Return whether a constant factor may be taken out of products without loss."""
     return _LEAST_FACTOR <= abs(factor) <= 1.0 / _LEAST_FACTOR
+
+
+def _function(
+    kind: str, derivative: "Callable[[Symbol], Symbol] | None" = None
+) -> Callable[["Symbol"], "Symbol"]:
+    """Return a function of a symbol; the kernel needs the `derivative` of some."""
+
+    def called(self: "Symbol") -> "Symbol":
+        if not self._terms:
+            return Symbol(self.recorder, getattr(FLOATS, kind)(self._constant), {})
+        operands: tuple[int, ...] = (self._own_slot(),)
+        if derivative is not None:
+            argument = Symbol(self.recorder, 0.0, {operands[0]: 1.0})
+            operands = (*operands, derivative(argument)._own_slot())
+        return self.recorder.result(kind, operands)
+
+    return called
+
+
+# Compositions of other functions, by NumPy's name.
+_COMPOSED: dict[str, Callable[[Any], Any]] = {
+    "tan": lambda x: x.sin() / x.cos(),
+    "log1p": lambda x: (1.0 + x).log(),
+    "log2": lambda x: x.log() / math.log(2.0),
+    "log10": lambda x: x.log() / math.log(10.0),
+    "exp2": lambda x: (x * math.log(2.0)).exp(),
+    "expm1": lambda x: x.exp() - 1.0,
+    "square": lambda x: x * x,
+    "cbrt": lambda x: x.sign() * (abs(x).log() / 3.0).exp(),
+    "arccos": lambda x: 0.5 * math.pi - x.arcsin(),
+    "arcsinh": lambda x: (x + (x * x + 1.0).sqrt()).log(),
+    "rint": lambda x: (x + 0.5).floor(),
+    "sinh": lambda x: 0.5 * (x.exp() - (-x).exp()),
+    "cosh": lambda x: 0.5 * (x.exp() + (-x).exp()),
+    "conjugate": lambda x: x,
+}
 
 
 class Symbol:
@@ -213,14 +247,8 @@ class Symbol:
         """Return the symbol itself."""
         return self
 
-    @_of_symbols
-    def __sub__(self, other: "Symbol") -> "Symbol":
-        """Return the difference from any real number."""
-        return self + -other
-
-    def __rsub__(self, value: Any) -> "Symbol":
-        """Return a real number minus the symbol."""
-        return (-self).__add__(value)
+    __sub__ = _of_symbols(lambda x, y: x + -y)
+    __rsub__ = _of_symbols(lambda x, y: y + -x)
 
     @_of_symbols
     def __mul__(self, other: "Symbol") -> "Symbol":
@@ -232,8 +260,7 @@ class Symbol:
         (a, factor), (b, second) = self._slot(), other._slot()
         if not _is_moderate(factor * second):
             a, b, factor, second = self._own_slot(), other._own_slot(), 1.0, 1.0
-        product = self.recorder.slot(Operation("product", (min(a, b), max(a, b))))
-        return Symbol(self.recorder, 0.0, {product: factor * second})
+        return self.recorder.result("product", (min(a, b), max(a, b)), factor=factor * second)
 
     __rmul__ = __mul__
 
@@ -255,13 +282,9 @@ class Symbol:
             a, factor = self.recorder.slot(Operation("linear", (), one)), self._constant
         if self._terms and not _is_moderate(factor / divisor):
             a, b, factor, divisor = self._own_slot(), other._own_slot(), 1.0, 1.0
-        slot = self.recorder.slot(Operation("quotient", (a, b)))
-        return Symbol(self.recorder, 0.0, {slot: factor / divisor})
+        return self.recorder.result("quotient", (a, b), factor=factor / divisor)
 
-    @_of_symbols
-    def __rtruediv__(self, other: "Symbol") -> "Symbol":
-        """Record and return a number divided by the symbol."""
-        return other / self
+    __rtruediv__ = _of_symbols(lambda x, y: y / x)
 
     def __pow__(self, power: Any) -> "Symbol":
         """Record and return a power; that of a negative number is defined for integers alone."""
@@ -300,92 +323,23 @@ class Symbol:
             slot = self.recorder.slot(Operation("linear", (), self.linear()))
         return slot
 
-    def _apply(
-        self,
-        kind: str,
-        function: Callable[[float], float],
-        derivative: "Callable[[Symbol], Symbol] | None" = None,
-    ) -> "Symbol":
-        """Return a function of this symbol; the kernel needs the `derivative` of some."""
-        if not self._terms:
-            return Symbol(self.recorder, function(self._constant), {})
-        operands: tuple[int, ...] = (self._own_slot(),)
-        if derivative is not None:
-            argument = Symbol(self.recorder, 0.0, {operands[0]: 1.0})
-            operands = (*operands, derivative(argument)._own_slot())
-        return Symbol(self.recorder, 0.0, {self.recorder.slot(Operation(kind, operands)): 1.0})
-
     # NumPy calls the methods with these names for np.sqrt(symbol) and so on.
+    exp = _function("exp")
+    sin = _function("sine")
+    cos = _function("cosine")
+    tanh = _function("tanh")
+    log = _function("log", lambda x: 1.0 / x)
+    arctan = _function("atan", lambda x: 1.0 / (1.0 + x * x))
+    arcsin = _function("asin", lambda x: 1.0 / (1.0 - x * x).sqrt())
+    floor = __floor__ = _function("floor")
+    _root = _function("sqrt")
+
     def sqrt(self) -> "Symbol":
         """Return the square root."""
         if not self._terms and self._constant < 0.0:
             place = self.recorder.place
             raise InputError(f"{place}: square root of the constant {self._constant:g}")
-        return self._apply("sqrt", math.sqrt)
-
-    def exp(self) -> "Symbol":
-        """Return the exponential."""
-        return self._apply("exp", exponential)
-
-    def sin(self) -> "Symbol":
-        """Return the sine."""
-        return self._apply("sine", math.sin)
-
-    def cos(self) -> "Symbol":
-        """Return the cosine."""
-        return self._apply("cosine", math.cos)
-
-    def tan(self) -> "Symbol":
-        """Return the tangent."""
-        return self.sin() / self.cos()
-
-    def log(self) -> "Symbol":
-        """Return the natural logarithm."""
-        return self._apply("log", logarithm, lambda x: 1.0 / x)
-
-    def log1p(self) -> "Symbol":
-        """Return the natural logarithm of 1 + x."""
-        return (1.0 + self).log()
-
-    def log2(self) -> "Symbol":
-        """Return the logarithm to base 2."""
-        return self.log() / math.log(2.0)
-
-    def log10(self) -> "Symbol":
-        """Return the logarithm to base 10."""
-        return self.log() / math.log(10.0)
-
-    def exp2(self) -> "Symbol":
-        """Return 2**x."""
-        return (self * math.log(2.0)).exp()
-
-    def expm1(self) -> "Symbol":
-        """Return exp(x) - 1."""
-        return self.exp() - 1.0
-
-    def square(self) -> "Symbol":
-        """Return the square."""
-        return self * self
-
-    def cbrt(self) -> "Symbol":
-        """Return the real cube root."""
-        return self.sign() * (abs(self).log() / 3.0).exp()
-
-    def arctan(self) -> "Symbol":
-        """Return the angle (rad) whose tangent is this symbol."""
-        return self._apply("atan", math.atan, lambda x: 1.0 / (1.0 + x * x))
-
-    def arcsin(self) -> "Symbol":
-        """Return the angle (rad) whose sine is this symbol."""
-        return self._apply("asin", arcsine, lambda x: 1.0 / (1.0 - x * x).sqrt())
-
-    def arccos(self) -> "Symbol":
-        """Return the angle (rad) whose cosine is this symbol."""
-        return 0.5 * math.pi - self.arcsin()
-
-    def arcsinh(self) -> "Symbol":
-        """Return the number whose hyperbolic sine is this symbol."""
-        return (self + (self * self + 1.0).sqrt()).log()
+        return self._root()
 
     def arctan2(self, x: Any) -> "Symbol":
         """Return the angle (rad) of the point (x, self); not defined where x < 0 and self = 0."""
@@ -400,47 +354,21 @@ class Symbol:
         slot, factor = self._slot()
         if factor < 0.0:
             slot = self._own_slot()
-        return Condition(
-            self.recorder, 0.0, {self.recorder.slot(Operation("switch", (slot,))): 1.0}
-        )
-
-    def floor(self) -> "Symbol":
-        """Return the largest whole number up to this symbol."""
-        return self._apply("floor", whole)
-
-    __floor__ = floor
+        return _condition(self.recorder.result("switch", (slot,)))
 
     def ceil(self) -> "Symbol":
         """Return the smallest whole number from this symbol on."""
         return -((-self).floor())
 
-    __ceil__ = ceil
-
     def trunc(self) -> "Symbol":
         """Return the whole number next to this symbol on the side of 0."""
         return self.sign() * abs(self).floor()
 
-    __trunc__ = trunc
-
-    def rint(self) -> "Symbol":
-        """Return the nearest whole number."""
-        return (self + 0.5).floor()
+    __ceil__, __trunc__ = ceil, trunc
 
     def sign(self) -> "Symbol":
         """Return 1 if this symbol is positive, else -1."""
         return 2.0 * (self > 0.0) - 1.0
-
-    def sinh(self) -> "Symbol":
-        """Return the hyperbolic sine."""
-        return 0.5 * (self.exp() - (-self).exp())
-
-    def cosh(self) -> "Symbol":
-        """Return the hyperbolic cosine."""
-        return 0.5 * (self.exp() + (-self).exp())
-
-    def tanh(self) -> "Symbol":
-        """Return the hyperbolic tangent."""
-        return self._apply("tanh", math.tanh)
 
     def is_time(self) -> bool:
         """Return whether this symbol is the time."""
@@ -452,32 +380,12 @@ class Symbol:
             raise InputError(
                 f"{self.recorder.place}: a table of anything but the time can't be recorded"
             )
-        slot = self.recorder.slot(Operation("table", (), None, table))
-        return Symbol(self.recorder, 0.0, {slot: 1.0})
+        return self.recorder.result("table", (), None, table)
 
-    def conjugate(self) -> "Symbol":
-        """Return the symbol itself, because it is real."""
-        return self
-
-    @_of_symbols
-    def __gt__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is larger."""
-        return (self - other).switch()
-
-    @_of_symbols
-    def __lt__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is smaller."""
-        return (other - self).switch()
-
-    @_of_symbols
-    def __ge__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is not smaller."""
-        return negated((other - self).switch())
-
-    @_of_symbols
-    def __le__(self, other: "Symbol") -> Any:
-        """Record and return the condition that this symbol is not larger."""
-        return negated((self - other).switch())
+    __gt__ = _of_symbols(lambda x, y: (x - y).switch())
+    __lt__ = _of_symbols(lambda x, y: (y - x).switch())
+    __ge__ = _of_symbols(lambda x, y: negated((y - x).switch()))
+    __le__ = _of_symbols(lambda x, y: negated((x - y).switch()))
 
     def __eq__(self, other: object) -> Any:
         """Refuse the comparison, which is true at isolated times at most."""
@@ -507,28 +415,15 @@ class Symbol:
 
     __int__ = __index__ = __complex__ = __round__ = __float__
 
-    @_of_symbols
-    def __floordiv__(self, other: "Symbol") -> "Symbol":
-        """Record and return the quotient, rounded down."""
-        return (self / other).floor()
-
-    def __rfloordiv__(self, value: Any) -> "Symbol":
-        """Record and return a number divided by this symbol, rounded down."""
-        quotient: Symbol = value / self
-        return quotient.floor()
-
-    @_of_symbols
-    def __mod__(self, other: "Symbol") -> "Symbol":
-        """Record and return the remainder, which has the sign of the divisor."""
-        return self - other * (self / other).floor()
-
-    def __rmod__(self, value: Any) -> "Symbol":
-        """Record and return the remainder of a number."""
-        quotient: Symbol = value / self
-        return self.__mul__(quotient.floor()).__rsub__(value)
+    __floordiv__ = _of_symbols(lambda x, y: (x / y).floor())
+    __rfloordiv__ = _of_symbols(lambda x, y: (y / x).floor())
+    __mod__ = _of_symbols(lambda x, y: x - y * (x / y).floor())
+    __rmod__ = _of_symbols(lambda x, y: y - x * (y / x).floor())
 
     def __getattr__(self, name: str) -> Any:
-        """Refuse functions that can't be recorded; NumPy looks them up by name."""
+        """Return a composed function, and refuse others; NumPy looks them up by name."""
+        if name in _COMPOSED:
+            return partial(_COMPOSED[name], self)
         # NumPy's mean reads `dtype`, and works without it.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
@@ -583,8 +478,7 @@ def select(condition: Any, first: Any, second: Any) -> Any:
     if one.linear() == other.linear():
         return one
     operands = tuple(each._own_slot() for each in (condition, one, other))
-    recorder = condition.recorder
-    return Symbol(recorder, 0.0, {recorder.slot(Operation("select", operands)): 1.0})
+    return condition.recorder.result("select", operands)
 
 
 def _line() -> str:
@@ -604,14 +498,6 @@ def recorded_twice(record: Callable[[Recorder], Tape], recorder: Callable[[], Re
     return first
 
 
-def _switched(x: Any) -> Any:
-    return x.switch() if isinstance(x, Symbol) else step(x)
-
-
-def _floor(x: Any) -> Any:
-    return x.floor() if isinstance(x, Symbol) else whole(x)
-
-
 def _selected(condition: Any, x: Any, y: Any) -> Any:
     known = isinstance(condition, Condition) or not isinstance(condition, Symbol)
     return select(condition if known else _condition(condition), x, y)
@@ -619,7 +505,9 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
 
 SYMBOLS: Functions[Any] = Functions(
     float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
-    np.log, np.arctan, np.arcsin, _switched, _floor, _selected,
+    np.log, np.arctan, np.arcsin,
+    lambda x: x.switch() if isinstance(x, Symbol) else FLOATS.switch(x),
+    lambda x: x.floor() if isinstance(x, Symbol) else FLOATS.floor(x), _selected,
 )  # fmt: skip
 
 
@@ -627,19 +515,18 @@ def _without_unused(
     operations: Sequence[Operation], outputs: Sequence[Linear], n_inputs: int
 ) -> Tape:
     used = {slot for output in outputs for slot, _ in output.terms}
-    for number in range(len(operations) - 1, -1, -1):
-        if n_inputs + number in used:
-            used.update(slots_of(operations[number]))
+    for slot, operation in reversed([*enumerate(operations, n_inputs)]):
+        if slot in used:
+            used.update(slots_of(operation))
     places = {slot: slot for slot in range(n_inputs)}
     kept: list[Operation] = []
-    for number, (kind, operands, linear, table) in enumerate(operations):
-        if n_inputs + number in used:
-            places[n_inputs + number] = n_inputs + len(kept)
-            moved = None if linear is None else _moved(linear, places)
-            moved_operands = tuple(places[slot] for slot in operands)
-            kept.append(Operation(kind, moved_operands, moved, table))
-    return Tape(tuple(kept), tuple(_moved(each, places) for each in outputs), n_inputs)
 
+    def moved(linear: Linear) -> Linear:
+        return Linear(linear.constant, tuple((places[slot], x) for slot, x in linear.terms))
 
-def _moved(linear: Linear, places: dict[int, int]) -> Linear:
-    return Linear(linear.constant, tuple((places[slot], x) for slot, x in linear.terms))
+    for slot, (kind, operands, linear, table) in enumerate(operations, n_inputs):
+        if slot in used:
+            places[slot] = n_inputs + len(kept)
+            own = None if linear is None else moved(linear)
+            kept.append(Operation(kind, tuple(places[each] for each in operands), own, table))
+    return Tape(tuple(kept), tuple(map(moved, outputs)), n_inputs)

@@ -5,9 +5,10 @@ decimal numbers, Taylor series, or symbols again. A slot is the place of an inpu
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -162,15 +163,13 @@ def evaluate(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T
 
 
 def _combined(linear: Linear, values: Sequence[Any], functions: Functions[Any]) -> Any:
-    total: Any = None
-    for slot, coefficient in linear.terms:
-        term = values[slot]
-        if coefficient != 1.0:
-            term = functions.number(coefficient) * term
-        total = term if total is None else total + term
-    if total is None:
-        return functions.number(linear.constant)
-    return total + functions.number(linear.constant) if linear.constant else total
+    number = functions.number
+    terms = [
+        values[k] if factor == 1.0 else number(factor) * values[k] for k, factor in linear.terms
+    ]
+    if linear.constant or not terms:
+        terms.append(number(linear.constant))
+    return reduce(operator.add, terms)
 
 
 def slot_values(tape: Tape, inputs: Sequence[T], functions: Functions[T]) -> list[T]:

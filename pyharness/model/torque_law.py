@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pyharness.model.array_type import Array
+from pyharness.model.attitude import rows_to_body
 from pyharness.model.errors import InputError, unknown
 from pyharness.model.functions import cosine, sine
 from pyharness.model.values import Number, Numbers, Triple, finite, number_list, three
@@ -195,12 +196,7 @@ def to_body(vector: Any, attitude: Any) -> Array:
     The matrix is written out, so that terms of one torque share its products.
     """
     u, v, w = vector
-    a, x, y, z = attitude
-    rows = (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + a * z), 2.0 * (x * z - a * y)),
-        (2.0 * (x * y - a * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + a * x)),
-        (2.0 * (x * z + a * y), 2.0 * (y * z - a * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    rows = rows_to_body(attitude)
     return np.array([p * u + q * v + s * w for p, q, s in rows], dtype=object)
 
 

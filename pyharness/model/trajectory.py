@@ -2,23 +2,18 @@
 
 import math
 import textwrap
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array as Array
 from pyharness.model.attitude import turned_to_space as turned_to_space
-from pyharness.model.changing import Changing
 from pyharness.model.conversions import Conversions
 from pyharness.model.extension import ENDS
 from pyharness.model.report import counted, short
-
-if TYPE_CHECKING:
-    from pyharness.model.dense_output import DenseOutput
-    from pyharness.model.scene import Scene
 
 # Largest relative rounding error in binary64.
 ROUNDING = 2.0**-53
@@ -158,30 +153,6 @@ class Trajectory(Conversions):
     >>> found.ended, found.omega.shape
     ('complete', (2, 3))
     """
-
-    time: Array
-    recorded_time: Array
-    omega: Array
-    velocity: Array | None
-    steps: int
-    evaluations: int
-    ended: str = "complete"
-    stop: Stop | None = None
-    ier: NDArray[np.int32] | None = None
-    error: float | None = None
-    growth: float | None = None
-    reason: str | None = field(default=None, repr=False)
-    attitude: Array | None = None
-    own: Array | None = None
-    moments: tuple[float, float, float] | Changing | None = None
-    axes: Array | None = None
-    exact: NDArray[np.object_] | None = None
-    tolerance: float | None = None
-    scene: "Scene | None" = field(default=None, repr=False)
-    sol: "DenseOutput | None" = field(default=None, repr=False)
-    t_events: list[Array] | None = field(default=None, repr=False)
-    y_events: list[Array] | None = field(default=None, repr=False)
-    sensitivities: dict[str, Array] | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

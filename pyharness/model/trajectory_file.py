@@ -86,10 +86,8 @@ def file_content(found: "Trajectory") -> bytes:
         if name != "recorded_time" or found.recorded_time is not found.time:
             value = getattr(found, name)
             arrays |= {} if value is None else {name: np.asarray(value, kind)}
-    if found.own is not None:
-        arrays[OWN] = found.own
-    if found.axes is not None:
-        arrays[AXES] = found.axes
+    others = {OWN: found.own, AXES: found.axes}
+    arrays |= {name: each for name, each in others.items() if each is not None}
     if found.t_events is not None and found.y_events is not None:
         if len(found.t_events) > MOST_FUNCTIONS:
             raise InputError(

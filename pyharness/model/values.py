@@ -91,11 +91,7 @@ def _read_text(text: str) -> str:
 
 def three(where: str, values: object) -> Triple:
     """Return three finite numbers as floats, or raise InputError."""
-    found = three_floats(where, values)
-    for each in found:
-        if not math.isfinite(each):
-            raise _not_finite(where, each)
-    return found
+    return triple(finite(where, each) for each in three_floats(where, values))
 
 
 def three_floats(where: str, values: object) -> Triple:
@@ -114,12 +110,8 @@ def finite(where: str, value: object) -> float:
     """Return a finite number as a float, or raise InputError."""
     found = number(where, value)
     if not math.isfinite(found):
-        raise _not_finite(where, found)
+        raise InputError(f"{where}: {found:g} is not finite; allowed: finite numbers")
     return found
-
-
-def _not_finite(where: str, value: float) -> InputError:
-    return InputError(f"{where}: {value:g} is not finite; allowed: finite numbers")
 
 
 def number_list(where: str, values: object, allowed: str) -> Iterable[object]:

@@ -8,9 +8,8 @@ Merged laws have at most one sine and one cosine per frequency, none of frequenc
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,36 +26,9 @@ ExactWave = tuple[Exact, float]
 _ZERO = (Fraction(0), Fraction(0), Fraction(0))
 
 
-@dataclass(frozen=True)
-class ExactLaw:
-    """A merged `TorqueLaw` in exact fractions."""
-
-    constant: Exact
-    rate: Exact
-    sines: tuple[ExactWave, ...]
-    cosines: tuple[ExactWave, ...]
-    frame: str
-
-    def rotate(self, turn: Callable[[Exact], Exact]) -> "ExactLaw":
-        """Return the law with its vectors rotated by `turn`."""
-        return ExactLaw(*self._vectors(turn), self.frame)
-
-    def rounded(self) -> TorqueLaw:
-        """Return the law in floats; raise InputError if an amplitude overflows."""
-        return TorqueLaw(*self._vectors(_rounded), self.frame)
-
-    def _vectors(self, function: Callable[[Exact], Any]) -> tuple[Any, Any, Any, Any]:
-        """Return a function of the constant and the rate, and the waves with it of amplitudes."""
-        sines, cosines = (
-            tuple((function(amplitude), frequency) for amplitude, frequency in waves)
-            for waves in (self.sines, self.cosines)
-        )
-        return function(self.constant), function(self.rate), sines, cosines
-
-
 def merged(law: TorqueLaw) -> TorqueLaw:
     """Return a merged torque law, or the argument itself if nothing changes."""
-    return exact_law(law).rounded() if is_mergeable(law) else law
+    return exact_law(law) if is_mergeable(law) else law
 
 
 def is_mergeable(law: TorqueLaw) -> bool:
@@ -69,21 +41,29 @@ def is_mergeable(law: TorqueLaw) -> bool:
     return False
 
 
-def exact_law(law: TorqueLaw) -> ExactLaw:
-    """Return a merged torque law in exact fractions."""
-    constant = triple(map(Fraction, law.constant))
-    cosines = _summed(law.cosines, even=True)
+def exact_law(law: TorqueLaw, turn: Callable[[Exact], Exact] | None = None) -> TorqueLaw:
+    """Return a merged torque law, its vectors rotated by `turn` before they are rounded.
+
+    Raise InputError if an amplitude overflows.
+    """
+    constant, rate = (triple(map(Fraction, each)) for each in (law.constant, law.rate))
+    sines, cosines = _summed(law.sines, even=False), _summed(law.cosines, even=True)
     # A cosine of frequency 0 is 1 at all times, whereas a sine is 0.
     for amplitude, frequency in cosines:
         if frequency == 0.0:
             constant = _sum(constant, amplitude)
-    return ExactLaw(
-        constant,
-        triple(map(Fraction, law.rate)),
-        tuple(wave for wave in _summed(law.sines, even=False) if wave[1] != 0.0),
-        tuple(wave for wave in cosines if wave[1] != 0.0),
-        law.frame,
-    )
+
+    def rounded(vector: Exact) -> Triple:
+        try:
+            return triple(map(float, vector if turn is None else turn(vector)))
+        except OverflowError:
+            raise InputError(
+                "[torque]: the sum of waves of one frequency overflows; allowed: "
+                f"amplitudes up to {math.ldexp(1.0, 1023):.2g} N m together"
+            ) from None
+
+    waves = [[(rounded(each), f) for each, f in found if f != 0.0] for found in (sines, cosines)]
+    return TorqueLaw(rounded(constant), rounded(rate), waves[0], waves[1], law.frame)
 
 
 def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
@@ -100,16 +80,6 @@ def _summed(waves: Iterable[Wave], even: bool) -> list[ExactWave]:
 
 def _sum(x: Exact, y: Exact) -> Exact:
     return x[0] + y[0], x[1] + y[1], x[2] + y[2]
-
-
-def _rounded(values: Exact) -> Triple:
-    try:
-        return triple(map(float, values))
-    except OverflowError:
-        raise InputError(
-            "[torque]: the sum of waves of one frequency overflows; allowed: "
-            f"amplitudes up to {math.ldexp(1.0, 1023):.2g} N m together"
-        ) from None
 
 
 def with_merged_waves(scene: Scene) -> Scene:

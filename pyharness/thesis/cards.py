@@ -203,6 +203,19 @@ def deck(program: str) -> Deck:
     return Deck(program)
 
 
+def statements_of(texts: Iterable[str]) -> list[list[str]]:
+    """Return label and text, without blanks, of each statement on cards with these `texts`."""
+    found: list[list[str]] = []
+    for text in texts:
+        if text.startswith("C"):
+            continue
+        if text[5:6].strip():
+            found[-1][1] += tight(text[6:72])
+        else:
+            found.append([text[:5].strip(), tight(text[6:72])])
+    return found
+
+
 def numbers(ranges: str) -> list[int]:
     """Return the card numbers that a text names: ``750-770, 800`` is 750, 760, 770 and 800."""
     found: list[int] = []

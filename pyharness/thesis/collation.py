@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts
 from pyharness.model.listing import PROGRAMS
-from pyharness.thesis.cards import chosen, deck, numbers, tight
+from pyharness.thesis.cards import chosen, deck, numbers, statements_of, tight
 
 HEADING = "APPENDIX AND PROGRAMS"
 _OF_THE_SCAN = ("misreading", "missing text", "normalization")
@@ -156,9 +156,7 @@ def rows() -> list[Row]:
     """Return the rows of the comparison, in the order of the operations in the decks."""
     found = []
     for given in facts("cards/collation")["row"]:
-        thesis = "silent"
-        if "text" in given:
-            thesis = "agrees" if given["agrees"] else "differs"
+        thesis = ("agrees" if given["agrees"] else "differs") if "text" in given else "silent"
         found.append(
             Row(
                 given["what"], given["cards"], _decks(given), thesis, given.get("text", ""),
@@ -201,16 +199,8 @@ def faults(found: list[Row]) -> list[str]:
 
 def statements(program: str, cards: str) -> list[str]:
     """Return the statements on some cards, without blanks, labels and comments."""
-    found: list[str] = []
-    for number in numbers(cards):
-        card = deck(program).cards[number]
-        if card.is_comment:
-            continue
-        if card.continues:
-            found[-1] += tight(card.text[6:])
-        else:
-            found.append(tight(card.text[6:]))
-    return found
+    texts = (deck(program).cards[number].text for number in numbers(cards))
+    return [text for _, text in statements_of(texts)]
 
 
 def _decks(given: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ from pyharness.model.extension import ENDS, columns, extension
 from pyharness.model.listing import PROGRAMS, Listing
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
-from pyharness.thesis.equations import initial_torque
+from pyharness.thesis.equations import initial_torque, trajectory_of
 
 
 def run(
@@ -42,12 +42,8 @@ def read_rows(
     right-hand side divided by the variable's (1/s).
     """
     n = len(rows)
-    return Trajectory(
-        time=rows[:, 0],
-        recorded_time=rows[:, 1],
-        omega=rows[:, 2:5],
-        velocity=rows[:, 5:8],
-        steps=n,
+    return trajectory_of(
+        rows,
         evaluations=evaluations,
         ended=ENDS[status],
         stop=Stop(n, STOP_VARIABLES[stop_variable - 1], stop_quotient) if stop_variable else None,

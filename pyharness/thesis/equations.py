@@ -1,8 +1,10 @@
 """Right-hand sides, and the record of a run, for all three twins."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.facts import facts
 from pyharness.model.functions import is_finite
@@ -56,6 +58,11 @@ def all_finite(values: Vector) -> bool:
     return all(map(is_finite, values))
 
 
+def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
+    """Return rows of true time and TIME (s), omega (rad/s) and velocity (m/s) as a trajectory."""
+    return Trajectory(rows[:, 0], rows[:, 1], rows[:, 2:5], rows[:, 5:], len(rows), **others)
+
+
 class Record:
     """The results of a twin's run, a row for each step."""
 
@@ -81,14 +88,9 @@ class Record:
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)
-        steps = len(self._rows)
-        return Trajectory(
-            time=rows[:, 0],
-            recorded_time=rows[:, 1],
-            omega=rows[:, 2:5],
-            velocity=rows[:, 5:8],
-            steps=steps,
-            evaluations=self._per_step * (steps + (ended == "overflow")),
+        return trajectory_of(
+            rows,
+            evaluations=self._per_step * (len(rows) + (ended == "overflow")),
             ended=ended,
             stop=stop,
             ier=np.array(self._ier, dtype=np.int32) if prints_ier else None,

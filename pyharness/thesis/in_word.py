@@ -9,7 +9,7 @@ import importlib
 import itertools
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -21,7 +21,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.extension import REFUSED, columns, extension
 from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
-from pyharness.model.torque_law import TorqueLaw, Wave
+from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.compiled import program_arguments, read_rows
 from pyharness.thesis.word import WORDS as WORDS
@@ -50,29 +50,22 @@ def scene_in(scene: Scene, word: Word) -> Scene:
     """Return a copy of a checked scene, with all numbers except counts converted to `word`."""
     law = scene.law
 
-    def those(values: Any) -> Any:
-        return None if values is None else tuple(word(each) for each in values)
+    def converted(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(converted, value))
+        return None if value is None else word(value)
 
-    def waves(values: tuple[Wave, ...]) -> Any:
-        return tuple((those(amplitude), word(frequency)) for amplitude, frequency in values)
+    def copied(frozen: Of, names: Sequence[str]) -> Of:
+        # Checks would convert the values to floats.
+        changed = copy.copy(frozen)
+        vars(changed).update({name: converted(getattr(frozen, name)) for name in names})
+        return changed
 
-    torque = _with(
-        law,
-        constant=those(law.constant),
-        rate=those(law.rate),
-        sines=waves(law.sines),
-        cosines=waves(law.cosines),
-    )
-    names = ("omega", "moments", "coefficients", "masses", "forces")
-    triples = {name: those(getattr(scene, name)) for name in names}
-    return _with(scene, torque=torque, step_size=word(scene.step_size), **triples)
-
-
-def _with(frozen: Of, **fields: Any) -> Of:
-    """Return a changed copy without checks, which would convert the values to floats."""
-    changed = copy.copy(frozen)
-    vars(changed).update(fields)
-    return changed
+    torque = copied(law, ("constant", "rate", "sines", "cosines"))
+    names = ("omega", "moments", "coefficients", "masses", "forces", "step_size")
+    found = copied(scene, names)
+    object.__setattr__(found, "torque", torque)
+    return found
 
 
 def run_compiled(

@@ -208,10 +208,8 @@ def _run(
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
-    body, omega, constant, first, step_size, lipschitz = (
-        spread(inputs[name], n)
-        for name in ("body", "omega", "torque_constant", "first", "step_size", "lipschitz")
-    )
+    rows = (spread(each, n) for each in inputs.values())
+    omega, constant, step_size, lipschitz, body, first = rows
     computes_velocity = velocity or stop_reads_velocity(listing, may_stop)
     prints_ier = listing.program != "runge-kutta"
     # The kernel needs at least one requested step.

@@ -8,10 +8,11 @@ and WRITE do not count.
 import operator
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from pyharness.model.listing import Listing
+from pyharness.thesis.cards import statements_of
 from pyharness.thesis.decks import deck_text
 from pyharness.thesis.linear_solver import leqt1f
 
@@ -50,13 +51,9 @@ class _Counter:
         self.written += self.times[name]
         key = (name, *(id(x) if isinstance(x, _Number) else float(x) for x in (left, right)))
         if key not in self.known:
-            value = _OPERATIONS[name](_value(left), _value(right))
+            value = _OPERATIONS[name](float(left), float(right))
             self.known[key] = _Number(self, value)
         return self.known[key]
-
-
-def _value(x: Any) -> float:
-    return x.value if isinstance(x, _Number) else float(x)
 
 
 def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], "_Number"]:
@@ -66,37 +63,30 @@ def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], 
     return operate
 
 
-class _Number:
+class _Number(float):
     """A floating-point value, with the counter of the operations on it.
 
     A repeated operation on the same operands returns the same object.
     """
 
-    def __init__(self, counter: _Counter, value: float) -> None:
-        self.counter, self.value = counter, value
+    counter: _Counter
+
+    def __new__(cls, counter: _Counter, value: float) -> "_Number":
+        found = super().__new__(cls, value)
+        found.counter = counter
+        return found
 
     __add__, __radd__ = _operator("+"), _operator("+", reflected=True)
     __sub__, __rsub__ = _operator("-"), _operator("-", reflected=True)
     __mul__, __rmul__ = _operator("*"), _operator("*", reflected=True)
     __truediv__, __rtruediv__ = _operator("/"), _operator("/", reflected=True)
 
-    def __pow__(self, exponent: int) -> "_Number":
+    def __pow__(self, exponent: Any, modulus: None = None) -> Any:
         square = self * self
         return {2: lambda: square, 3: lambda: square * self, 4: lambda: square * square}[exponent]()
 
     def __abs__(self) -> "_Number":
-        return self if self.value >= 0.0 else _Number(self.counter, -self.value)
-
-    def __gt__(self, other: Any) -> bool:
-        return self.value > _value(other)
-
-    def __lt__(self, other: Any) -> bool:
-        return self.value < _value(other)
-
-    def __eq__(self, other: object) -> bool:
-        return self.value == _value(other)
-
-    __hash__ = None  # type: ignore[assignment]
+        return self if self >= 0.0 else _Number(self.counter, -self)
 
 
 class _Array(defaultdict[tuple[int, ...], Any]):
@@ -110,7 +100,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
     The scene is the case on the published cards. `times` has the weight of each operation, such as
     its unit time on a machine.
     """
-    statements = list(_statements(deck_text(listing)))
+    statements = statements_of(deck_text(listing).splitlines())
     begin = next(n for n, (_, text) in enumerate(statements) if _DO.match(text))
     label = _DO.match(statements[begin][1])
     assert label is not None
@@ -131,24 +121,10 @@ def _moved(value: Any, counter: _Counter) -> Any:
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)
-    return _Number(counter, value.value) if isinstance(value, _Number) else value
+    return _Number(counter, value) if isinstance(value, _Number) else value
 
 
-def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """Return the label and the text, without blanks, of every statement of a deck."""
-    found: list[list[str]] = []
-    for line in text.splitlines():
-        label, goes_on, rest = line[:5].strip(), line[5], "".join(line[6:72].split())
-        if line.startswith("C"):
-            continue
-        if goes_on != " ":
-            found[-1][1] += rest
-        else:
-            found.append([label, rest])
-    return ((label, rest) for label, rest in found)
-
-
-def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Counter) -> None:
+def _run(statements: list[list[str]], names: dict[str, Any], counter: _Counter) -> None:
     position = 0
     while position < len(statements):
         _, text = statements[position]
@@ -164,7 +140,7 @@ def _run(statements: list[tuple[str, str]], names: dict[str, Any], counter: _Cou
                 _evaluated(side, names)
         elif match := _IF.match(text):
             if names[match[1]] == int(match[2]):
-                _run([("", match[3])], names, counter)
+                _run([["", match[3]]], names, counter)
         elif _CALL.match(text):
             _solve(names)
         elif not _NOTHING.match(text):
@@ -176,7 +152,7 @@ def _assign(text: str, names: dict[str, Any], counter: _Counter) -> None:
     assert match is not None, text
     name, subscripts, expression = match.groups()
     value = _evaluated(expression, names)
-    if isinstance(value, float):
+    if type(value) is float:
         value = counter.constants.setdefault(value, _Number(counter, value))
     if subscripts is None:
         names[name] = value

@@ -18,6 +18,7 @@ from pyharness.model.facts import facts
 from pyharness.model.functions import is_finite
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
+from pyharness.thesis.equations import card_torque
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
@@ -35,7 +36,7 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """
     formats = formats_of(program)
     assert scene.moments is not None
-    pairs = zip(scene.moments, _torque_cards(scene), strict=True)
+    pairs = zip(scene.moments, card_torque(scene) or scene.law.constant, strict=True)
     records = write(formats["header"], [value for pair in pairs for value in pair])
     records += write(formats["heads"], [])
     for index, row in enumerate(_printed_rows(trajectory, formats["rows"])):
@@ -78,13 +79,6 @@ def formats_of(program: str) -> dict[str, Any]:
     """
     programs: list[dict[str, Any]] = facts("printer")["program"]
     return next(each for each in programs if each["name"] == program)
-
-
-def _torque_cards(scene: Scene) -> tuple[float, float, float]:
-    """Return the torques (N m) on the input cards, which can't vary with time."""
-    cards = {entry["case"]: entry["torque"] for entry in facts("printer")["initial_torque"]}
-    first, second, third = cards.get(scene.case, scene.law.constant)
-    return first, second, third
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from flint import acb, arb, fmpq
 
-from pyharness.model.dual import Dual
+from pyharness.model.dual import of_duals
 from pyharness.model.errors import InputError
 from pyharness.model.tape import Functions, Table
 from pyharness.truth.enclosed import Balls
@@ -33,38 +33,22 @@ def balls(row: Sequence[Any]) -> Balls:
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 
-def _sqrt(x: Any) -> Any:
-    if isinstance(x, Dual):
-        root = _sqrt(x.value)
-        return x.chained(root, 1 / (2 * root))
-    # Where a complex ball meets the branch cut, the result is not finite.
-    return x.sqrt(analytic=True) if isinstance(x, acb) else x.sqrt()
-
-
-def _exp(x: Any) -> Any:
-    if isinstance(x, Dual):
-        value = _exp(x.value)
-        return x.chained(value, value)
-    return x.exp()
+# Where a complex ball meets the branch cut of a root or logarithm, the result is not finite.
+_sqrt = of_duals(
+    lambda x: x.sqrt(analytic=True) if isinstance(x, acb) else x.sqrt(),
+    lambda _, root: 1 / (2 * root),
+)
+_log = of_duals(
+    lambda x: x.log(analytic=True) if isinstance(x, acb) else x.log(), lambda x, _: 1 / x
+)
+_exp = of_duals(lambda x: x.exp(), lambda _, value: value)
+_sine: Any = of_duals(lambda x: x.sin(), lambda x, _: _cosine(x))
+_cosine: Any = of_duals(lambda x: x.cos(), lambda x, _: -1.0 * _sine(x))
 
 
 def _tanh(x: Any) -> Any:
     # python-flint has no hyperbolic tangent of power series.
     return 1 - 2 / (_exp(2 * x) + 1)
-
-
-def _sine(x: Any) -> Any:
-    return x.chained(_sine(x.value), _cosine(x.value)) if isinstance(x, Dual) else x.sin()
-
-
-def _cosine(x: Any) -> Any:
-    return x.chained(_cosine(x.value), -1.0 * _sine(x.value)) if isinstance(x, Dual) else x.cos()
-
-
-def _log(x: Any) -> Any:
-    if isinstance(x, Dual):
-        return x.chained(_log(x.value), 1 / x.value)
-    return x.log(analytic=True) if isinstance(x, acb) else x.log()
 
 
 def _refuse(*_: Any) -> Any:

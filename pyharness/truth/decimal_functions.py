@@ -2,10 +2,12 @@
 
 import decimal
 import math
+from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from operator import mul
+from typing import Any
 
 Row = list[Decimal]
 
@@ -94,9 +96,9 @@ def product(x: Row, reversed_y: Row) -> Decimal:
     return sum(map(mul, x, reversed_y), Decimal(0))
 
 
-def value_at(series: Row, offset: Decimal) -> Decimal:
+def value_at(series: Sequence[Any], offset: Any) -> Any:
     """Return the value of a Taylor series at `offset` from its centre."""
-    total = Decimal(0)
+    total: Any = 0
     for term in reversed(series):
         total = total * offset + term
     return total

@@ -52,11 +52,13 @@ def taylor_series(
     state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
-    if equations.least_order > order:
+    tape = equations.tape
+    if tape is not None and tape.least_order > order:
         # The caller compares integrations of different orders, which must remain different.
-        order = equations.least_order + order // 4
+        order = tape.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
-    at_end, switches = [equations], equations.switches
+    at_end = [equations]
+    switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
         # Sums of the torque that cancel may be rounded to 0, as those beside a saturated tanh are.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
@@ -84,7 +86,8 @@ def taylor_series(
         length = _step(series[:moving], tolerance, rest)
         if scene.attitude is not None:
             length = min(length, _step(series[moving:], tolerance, rest, 4))
-        length = equations.reach(length)
+        # No pulse of the expansion is skipped.
+        length = length if tape is None else tape.reach(length)
         length = length.copy_sign(times[-1])
         if switches is not None:
             try:
@@ -97,7 +100,8 @@ def taylor_series(
         if begin + length == begin and rest:
             return rows
         limit.check(step, stops, begin, length, rest)
-        end, stop = begin + length, equations.next_change(begin, forward)
+        end = begin + length
+        stop = None if tape is None else tape.next_change(begin, forward)
         # The Taylor series of a table is valid until the table changes.
         if stop is not None and abs(stop) <= abs(end):
             end, length = stop, stop - begin
@@ -114,10 +118,10 @@ def taylor_series(
         else:
             step += 1
         while len(rows) < len(times) and abs(times[len(rows)]) <= abs(end):
-            if equations.is_singular_before(times[len(rows)] - begin):
+            if tape is not None and tape.crosses_a_branch(times[len(rows)] - begin):
                 return rows
             rows.append(_evaluate(series, times[len(rows)] - begin))
-        if len(rows) == len(times) or equations.is_singular_before(length):
+        if len(rows) == len(times) or (tape is not None and tape.crosses_a_branch(length)):
             return rows
         begin = end
         if switches is not None:
@@ -285,9 +289,9 @@ class _Equations:
         results: dict[int, Decimal] | None = None,
     ) -> None:
         self._abc = coefficients
-        self._tape = self._law = None
+        self.tape = self._law = None
         if isinstance(scene.torque, StateTorque) and scene.torque.tape is not None:
-            self._tape = TapeSeries(scene.torque.tape, change, results)
+            self.tape = TapeSeries(scene.torque.tape, change, results)
         else:
             self._law = _law_of(scene)
         self._changing = scene.changing
@@ -332,34 +336,12 @@ class _Equations:
                 each.append(rate / (k + 1))
         return series
 
-    @property
-    def switches(self) -> Switches | None:
-        """The switches of the torque; None without."""
-        has_one = self._tape is not None and self._tape.has_switches
-        return Switches(self._tape) if has_one and self._tape is not None else None
-
-    @property
-    def least_order(self) -> int:
-        return 0 if self._tape is None else self._tape.least_order
-
-    def reach(self, length: Decimal) -> Decimal:
-        """Return the step (s), reduced so that no pulse of the last expansion is skipped."""
-        return length if self._tape is None else self._tape.reach(length)
-
-    def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) of a table's next change, or None; before `time` unless `forward`."""
-        return None if self._tape is None else self._tape.next_change(time, forward)
-
-    def is_singular_before(self, offset: Decimal) -> bool:
-        """Return whether the torque is singular up to `offset` (s) from the last expansion."""
-        return self._tape is not None and self._tape.crosses_a_branch(offset)
-
     def _torque_series(
         self, time: Decimal, order: int, series: list[Row], forward: bool
     ) -> Callable[[int], Row]:
         """Return a function for coefficient k of torque over moments; call it with k = 0, 1, ..."""
-        if self._tape is not None:
-            tape, moments = self._tape, self._moments
+        if self.tape is not None:
+            tape, moments = self.tape, self._moments
             tape.begin(time, series[:3], series[-4:] if self._attitude else [], forward)
             return lambda k: [x / moment for x, moment in zip(tape.next(), moments, strict=True)]
         terms = self._law_series(time, order)

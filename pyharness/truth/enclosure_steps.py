@@ -31,6 +31,7 @@ from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.balls import ball, balls, functions_at
+from pyharness.truth.decimal_functions import value_at
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, scales_of
 from pyharness.truth.integer_series import exact_body
 
@@ -284,7 +285,7 @@ class _Proof:
             except (_NoStepError, ZeroDivisionError):
                 length /= 2
                 continue
-            found = [_value(each, ball(end - self.time)) for each in terms]
+            found = [value_at(each, ball(end - self.time)) for each in terms]
             rounding = [x - x.mid() for x in found]
             self.time, self.middle = end, [x.mid() for x in found]
             self.radii = [
@@ -312,7 +313,7 @@ class _Proof:
         length, begin = abs(ball(h)), ball(self.time)
         sizes = [[abs(x) * length**k for k, x in enumerate(each)] for each in terms]
         half = [_upper(sum(each[1:], arb(0)) / 2) for each in sizes]
-        middles = [each[0] + _value([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
+        middles = [each[0] + value_at([arb(0), *each[1:]], ball(h)) / 2 for each in terms]
         residuals = self._residuals(rates, terms, h)
         tubes = [
             _upper(2 * r + self.norm([each[0] for each in terms], block) * _TUBE + _LEAST_TUBE)
@@ -345,7 +346,7 @@ class _Proof:
             series = _terms(slope, count)
             for k in range(1, len(each)):
                 series[k - 1] -= k * each[k]
-            total = _value([abs(x) for x in series], length)
+            total = value_at([abs(x) for x in series], length)
             bounds.append(_upper(total + rest))
         return [self.norm(bounds, block) for block in self.blocks]
 
@@ -361,7 +362,7 @@ class _Proof:
             around = length * circle
             inputs = []
             for each in terms:
-                radius = _upper(_value([arb(0), *(abs(x) for x in each[1:])], around))
+                radius = _upper(value_at([arb(0), *(abs(x) for x in each[1:])], around))
                 inputs.append(acb(arb(each[0], radius), arb(0, radius)))
             # A square contains the disc.
             radius = _upper(around)
@@ -387,14 +388,12 @@ class _Proof:
             else [arb(0)] * count
             for each, s in zip(found, self.scales, strict=True)
         ]
-        rows = []
-        for block in self.blocks:
-            row = []
-            for other in self.blocks:
-                part = [line[other] for line in jacobian[block]]
-                row.append(_log_norm(part) if block == other else _norm(part))
-            rows.append(row)
-        return arb_mat(rows)
+
+        def growth(block: slice, other: slice) -> Any:
+            part = [line[other] for line in jacobian[block]]
+            return _log_norm(part) if block == other else _norm(part)
+
+        return arb_mat([[growth(block, other) for other in self.blocks] for block in self.blocks])
 
 
 def _log_norm(part: list[list[Any]]) -> Any:
@@ -410,13 +409,6 @@ def _log_norm(part: list[list[Any]]) -> Any:
 
 def _norm(part: list[list[Any]]) -> Any:
     return _upper(sum((_upper(abs(x)) ** 2 for row in part for x in row), arb(0)).sqrt())
-
-
-def _value(terms: Sequence[Any], offset: Any) -> Any:
-    total = arb(0)
-    for term in reversed(terms):
-        total = total * offset + term
-    return total
 
 
 def _log2(x: Any) -> float:

@@ -133,20 +133,6 @@ def _fixed(value: Fraction) -> int:
     return (value.numerator << BITS) // value.denominator
 
 
-@dataclass(frozen=True)
-class _Wave:
-    """All torque terms of one frequency, as two unknowns: a sine and a cosine.
-
-    If the angle at the last time is below 1 rad, the unknown is the sine divided by this angle. A
-    sine of large amplitude then has all its digits.
-    """
-
-    to_sine: int  # the derivative of the unknown sine is `to_sine` times the cosine
-    to_cosine: int  # the derivative of the cosine is `to_cosine` times the unknown sine
-    on_sine: Series  # for each axis, the factor of the unknown sine in the torque over moment
-    on_cosine: Series  # for each axis, the factor of the cosine in the torque over moment
-
-
 def exact_body(scene: Scene) -> tuple[list[Fraction], list[Fraction]]:
     """Return the exact divisors of torques, and A, B, C.
 
@@ -171,6 +157,10 @@ class _Equations:
         self._products = [_fixed(x * span * unit) for x in products]
         self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]
         self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
+        # All torque terms of one frequency are two unknowns, a sine and a cosine. If the angle at
+        # the last time is below 1 rad, the unknown is the sine divided by this angle, so that a
+        # sine of large amplitude has all its digits. Of each: the factors of the cosine and of the
+        # sine in each other's derivative, and by axis those of both in the torque over moment.
         self._waves = []
         for frequency in {abs(f) for _, f in law.sines + law.cosines}:
             angle = Fraction(frequency) * span
@@ -183,7 +173,7 @@ class _Equations:
             for amplitude, f in law.cosines:
                 if abs(f) == frequency:
                     cosines = [x + Fraction(a) for x, a in zip(cosines, amplitude, strict=True)]
-            wave = _Wave(
+            wave = (
                 _fixed(Fraction(1) if slow else angle),
                 _fixed(-angle * angle if slow else -angle),
                 [_fixed(x * p * (angle if slow else 1)) for x, p in zip(sines, push, strict=True)],
@@ -211,13 +201,13 @@ class _Equations:
             for m, r in zip(self._constant, self._rate, strict=True)
         ]
         torques = [each + [0] * (_ORDER - 2) for each in torques]
-        for n, wave in enumerate(self._waves):
+        for n, (to_sine, to_cosine, on_sines, on_cosines) in enumerate(self._waves):
             sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
-            forth, back = stepped(wave.to_sine), stepped(wave.to_cosine)
+            forth, back = stepped(to_sine), stepped(to_cosine)
             for k in range(_ORDER):
                 sine.append((forth * cosine[k] >> BITS) // (k + 1))
                 cosine.append((back * sine[k] >> BITS) // (k + 1))
-            for m, on_sine, on_cosine in zip(torques, wave.on_sine, wave.on_cosine, strict=True):
+            for m, on_sine, on_cosine in zip(torques, on_sines, on_cosines, strict=True):
                 if on_sine or on_cosine:
                     s, t = stepped(on_sine), stepped(on_cosine)
                     for k in range(_ORDER):

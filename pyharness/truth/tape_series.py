@@ -8,7 +8,6 @@ from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Callable
 from decimal import Context, Decimal
-from typing import NamedTuple
 
 from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape, live_slots
 from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine_cosine, value_at
@@ -37,18 +36,9 @@ _FUNCTIONS: dict[str, Callable[[Decimal], Decimal]] = {
 }
 
 
-class _Power(NamedTuple):
-    """A product of many factors.
-
-    `factors` counts how often each slot is a factor. `scale` is the decimal logarithm of the
-    product's largest coefficient. `divisors` are slots with which its size is compared.
-    """
-
-    factors: Counter[int]
-    scale: Decimal
-    divisors: set[int]
-
-
+# A product of many factors: how often each slot is a factor, the decimal logarithm of the product's
+# largest coefficient, and slots with which its size is compared.
+_Power = tuple[Counter[int], Decimal, set[int]]
 # A linear combination of slots: the constant, and pairs of coefficient and slot.
 _Sum = tuple[Decimal, list[tuple[Decimal, int]]]
 
@@ -249,17 +239,15 @@ class TapeSeries:
 
         The mean order of a product's terms is the sum of the mean orders of its factors.
         """
-        order, size = Decimal(0), power.scale
-        for slot, count in power.factors.items():
+        (factors, size, slots), order = power, Decimal(0)
+        for slot, count in factors.items():
             terms = [abs(x) * length**k for k, x in enumerate(self._slots[slot])]
             if not (total := sum(terms)):
                 return False
             order += count * sum(k * x for k, x in enumerate(terms)) / total
             size += count * total.log10(_ROUGH)
         # A divisor that is 0 has no series.
-        divisors = [
-            abs(self._slots[slot][0]).log10(_ROUGH) for slot in power.divisors if self._slots[slot]
-        ]
+        divisors = [abs(self._slots[slot][0]).log10(_ROUGH) for slot in slots if self._slots[slot]]
         least = min([Decimal(0), *divisors]) - _INVISIBLE * Decimal("0.4343")
         return 2 * order > self._order and size > least
 
@@ -316,7 +304,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
     divisors = _divisors(tape)
     found = [each for each in factors if numbers[each] >= _MANY_FACTORS and scales.get(each)]
     powers = [
-        _Power(factors[each], Decimal(scales[each]).log10(_ROUGH), divisors.get(each, set()))
+        (factors[each], Decimal(scales[each]).log10(_ROUGH), divisors.get(each, set()))
         for each in found
     ]
     return powers, max((numbers[each] for each in found), default=0)

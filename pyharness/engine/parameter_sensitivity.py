@@ -100,16 +100,11 @@ def checked_names(
 
 
 def sensitivities_at(
-    scene: Scene,
-    found: Trajectory,
-    names: Sequence[str],
-    tolerance: float,
-    effort: float,
-    states: States,
+    scene: Scene, found: Trajectory, names: Sequence[str], effort: float, states: States
 ) -> dict[str, Array]:
     """Return the derivatives with respect to each parameter, (n, k, m) for k unknowns, m values.
 
-    `states` returns the unknowns of a changed scene at the times. `tolerance` is relative to the
+    `states` returns the unknowns of a changed scene at the times. The tolerance is relative to the
     largest derivative in a column so far. Raise InputError if the work limit is exceeded, or a
     derivative overflows.
     """
@@ -123,7 +118,7 @@ def sensitivities_at(
         }
         return {name: np.stack(each, 2) for name, each in slopes.items()}
     # Near the separatrix, a large error of omega would lead to the derivatives of another motion.
-    tolerance = max(_FINEST, tolerance / max(1.0, found.growth or 1.0))
+    tolerance = max(_FINEST, (found.tolerance or 1.0) / max(1.0, found.growth or 1.0))
     # Closed forms alone take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = 0.0

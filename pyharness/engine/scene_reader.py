@@ -88,7 +88,16 @@ def scene_of(data: dict[str, Any], default_name: str) -> Scene:
     body, initial, run = _body(tables["body"]), tables["initial"], tables["run"]
     if "omega" not in initial:
         raise InputError("[initial] omega is missing; give three numbers in rad/s")
-    states, rates = _states(tables["states"])
+    states, rates = {}, {}
+    for name, values in tables["states"].items():
+        where = f"[states.{name}]"
+        if not isinstance(values, dict):
+            raise InputError(f"{where} is {kind_of(values)}; it must be a table with start, rate")
+        check_keys(values, _STATE, where)
+        if "rate" not in values:
+            raise InputError(f"{where}: rate is missing; give an expression, as in '0.4*w3'")
+        states[name] = (values.get("start", 0.0), values.get("scale", 0.0))
+        rates[name] = values["rate"]
     return Scene(
         name=data.get("name", default_name),
         omega=initial["omega"],
@@ -119,21 +128,6 @@ def _body(table: dict[str, Any]) -> dict[str, Any]:
     if isinstance(inertia, list) and any(map(_has_lists, inertia)):
         return {**table, "inertia": ChangingInertia(inertia)}
     return table
-
-
-def _states(table: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return starts and scales, and the expressions of the rates, by name of a state."""
-    states, rates = {}, {}
-    for name, values in table.items():
-        where = f"[states.{name}]"
-        if not isinstance(values, dict):
-            raise InputError(f"{where} is {kind_of(values)}; it must be a table with start, rate")
-        check_keys(values, _STATE, where)
-        if "rate" not in values:
-            raise InputError(f"{where}: rate is missing; give an expression, as in '0.4*w3'")
-        states[name] = (values.get("start", 0.0), values.get("scale", 0.0))
-        rates[name] = values["rate"]
-    return states, rates
 
 
 def _has_texts(value: Any) -> bool:

@@ -21,7 +21,7 @@ from pyharness.model.effort import advice
 from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Tape
+from pyharness.model.tape import N_INPUTS, SWITCHES, Linear
 from pyharness.model.trajectory import Array, Trajectory
 
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
@@ -197,25 +197,21 @@ def bounds_of(scene: Scene, end: float) -> list[float]:
     assert isinstance(torque, StateTorque)
     breaks = [] if torque.tape is None else torque.tape.breaks
     if torque.tape is not None and torque.tape.n_switches:
-        breaks = breaks + _crossings(scene, torque.tape, end)
+        # The ends of the series' steps at which the result of a switch changes.
+        operations = enumerate(torque.tape.operations, N_INPUTS)
+        slots = [slot for slot, each in operations if each.kind in SWITCHES]
+        results = replace(torque.tape, outputs=tuple(Linear(0.0, ((x, 1.0),)) for x in slots))
+        ends, middles, states = [], [], []
+        attitude = scene.attitude is not None
+        for before, stepper in steps_to(scene, attitude, end, _FINEST, _MOST_STEPS):
+            ends.append(stepper.time)
+            middles.append(0.5 * before + 0.5 * stepper.time)
+            states.append(stepper.at(middles[-1]))
+        if ends:
+            found = outputs_at(results, np.array(middles), np.array(states))
+            changed = (found[1:] != found[:-1]).any(axis=1)
+            breaks = breaks + [time for time, x in zip(ends, changed.tolist(), strict=False) if x]
     return sorted({*(time for time in breaks if 0.0 < time / (end or 1.0) < 1.0), end}, key=abs)
-
-
-def _crossings(scene: Scene, tape: Tape, end: float) -> list[float]:
-    """Return the times (s) of the series' steps at which the result of a switch changes."""
-    slots = [slot for slot, each in enumerate(tape.operations, N_INPUTS) if each.kind in SWITCHES]
-    results = replace(tape, outputs=tuple(Linear(0.0, ((slot, 1.0),)) for slot in slots))
-    ends, middles, states = [], [], []
-    attitude = scene.attitude is not None
-    for before, stepper in steps_to(scene, attitude, end, _FINEST, _MOST_STEPS):
-        ends.append(stepper.time)
-        middles.append(0.5 * before + 0.5 * stepper.time)
-        states.append(stepper.at(middles[-1]))
-    if not ends:
-        return []
-    found = outputs_at(results, np.array(middles), np.array(states))
-    changed = (found[1:] != found[:-1]).any(axis=1)
-    return [time for time, each in zip(ends[:-1], changed.tolist(), strict=True) if each]
 
 
 def series_beside(scene: Scene, times: Sequence[float], tolerance: float) -> Beside | None:

@@ -110,10 +110,10 @@ def solve_state(
         if beside is not None:
             largest = max(found.largest, _largest_of(beside.rows))
             first, second = found._replace(largest=largest), _Rows(beside.rows, True, largest)
-            agrees = _difference(first, second) <= _AGREEMENT * tolerance
-        if beside is not None and not (agrees and len(found.state) >= len(beside.rows)):
-            run.spans = beside.spans
-            found = _refined(run, times, tolerance)
+            is_short = len(found.state) < len(beside.rows)
+            if is_short or not _difference(first, second) <= _AGREEMENT * tolerance:
+                run.spans = beside.spans
+                found = _refined(run, times, tolerance)
     if not found.is_complete:
         run.check_undefined()
     count = len(found.state)

@@ -203,7 +203,7 @@ def solve(
     found = in_reverse(found) if turned else found
     if names is not None:
         states = partial(_states_of_changed, found.time, effort, found.attitude is not None)
-        slopes = sensitivities_at(given, found, names, tolerance, effort, states)
+        slopes = sensitivities_at(given, found, names, effort, states)
         found = replace(found, sensitivities=slopes)
     return found
 

@@ -106,7 +106,7 @@ contains
     logical :: arrives, at_end, from_rest, is_full, has_guess
     logical :: is_rejected                    ! whether a longer step was rejected
     logical :: has_values                     ! whether terms 0 of all slots are known
-    integer :: is_short
+    logical :: is_short                       ! whether all terms of perturbations do not suffice
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
     logical :: is_guessed                     ! whether the size of an own state is
@@ -198,7 +198,7 @@ contains
       call set_lanes()
       call perturb()
       ! Perturbations may change faster than the motion, as about a steady rotation.
-      if (is_short /= 0) factor = factor*fitting_lanes()
+      if (is_short) factor = factor*fitting_lanes()
       call converge(live, s%order, max(scale, LEAST_SCALE), s%a, s%powers, factor)
       if (switches%n > 0) call resolve_switches(nearly, switches, s, factor)
       if (.not. factor > 0.0_dp) then
@@ -387,16 +387,15 @@ contains
 
     subroutine perturb()
       !! Expand the perturbations.
-      integer :: block, block_is_short, is_long
+      integer :: block, is_long
 
-      is_short = 0
       is_long = merge(1, 0, found%steps + rest/(factor*s%h) > FEW_STEPS)
       do block = 1, n_blocks
         last_terms(block) = perturb_tape(arrays_of_block(block), SIDE_BY_SIDE*(block - 1), s%h, &
-                                         s%order, factor, weights, VARIATION_TOLERANCE, &
-                                         is_long, block_is_short)
-        is_short = max(is_short, block_is_short)
+                                         s%order, factor, weights, VARIATION_TOLERANCE, is_long)
       end do
+      is_short = any(last_terms(:n_blocks) < 0)
+      last_terms(:n_blocks) = abs(last_terms(:n_blocks))
     end subroutine perturb
 
     type(tape_arrays_t) function arrays_of_block(block)

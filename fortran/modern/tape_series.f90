@@ -105,8 +105,9 @@ module tape_series
     end subroutine sum_terms
 
     integer(c_int) function perturb_tape(tape, number, h, order, factor, weights, tolerance, &
-                                         is_long, is_short) bind(c, name="perturb_tape_level")
-      !! Expand the perturbations to as many terms as they need, and return the last one's number.
+                                         is_long) bind(c, name="perturb_tape_level")
+      !! Expand the perturbations to as many terms as they need, and return the last one's number,
+      !! negative if all terms do not suffice.
       import :: c_int, dp, tape_arrays_t
       implicit none(type, external)
       type(tape_arrays_t), intent(in) :: tape
@@ -117,7 +118,6 @@ module tape_series
       real(dp), intent(in) :: weights(tape%n_unknowns) !! make the unknowns comparable
       real(dp), intent(in), value :: tolerance !! of the terms that are left out, relative
       integer(c_int), intent(in), value :: is_long !! not 0: there are many steps
-      integer(c_int), intent(out) :: is_short  !! not 0: all terms do not suffice
     end function perturb_tape
 
     subroutine slot_gradient(tape, slot, gradient) bind(c, name="slot_gradient_level")

@@ -588,11 +588,10 @@ static ALWAYS_INLINE void perturb_all(const int n, const int nodes, perturbation
 
 /* Expand eight perturbations, from number `number` on, whose values are terms 0 of the unknowns, to as
    many terms as they need for the part `factor` of the step, and return the number of the last term.
-   `is_long` says that there are many steps. `is_short` says that all terms do not suffice. `tolerance` is the largest relative size of a term
+   `is_long` says that there are many steps. The number is negative if all terms do not suffice. `tolerance` is the largest relative size of a term
    that is left out. */
 int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h, int order,
-                                  double factor, const double *weights, double tolerance,
-                                  int is_long, int *is_short)
+                                  double factor, const double *weights, double tolerance, int is_long)
 {
   matrix jacobian[NODES] __attribute__((aligned(64)));
   perturbations *const v = (perturbations *)tape->v + FIRST_UNKNOWN;
@@ -608,7 +607,7 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
   }
   const double first = largest(tape, 0, weights, units, count);
   double before = first, power = 1.0;
-  int k = 0;
+  int k = 0, is_short;
   if (is_long) set_blocks(tape, NODES, h, factor, jacobian);
   else set_blocks(tape, FEW_NODES, h, factor, jacobian);
   do {
@@ -617,10 +616,10 @@ int OF_LEVEL(perturb_tape, LEVEL)(const struct tape *tape, int number, double h,
     power *= factor;
     const double size = power * largest(tape, k, weights, units, count);
     /* Every other term may be zero. */
-    *is_short = !(size <= tolerance * first && before <= tolerance * first);
+    is_short = !(size <= tolerance * first && before <= tolerance * first);
     before = size;
-  } while (*is_short && k < order);
-  return k;
+  } while (is_short && k < order);
+  return is_short ? -k : k;
 }
 
 /* Add the terms of combination n of the series, times h, to the next terms of one derivative. */

@@ -5,15 +5,26 @@ reaches it by a kink or a jump, but not if it decays to 0.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import NODES, POINTS, TO_COEFFICIENTS, Fits, Index, Roots, joined
+from pyharness.engine.event_roots import (
+    NO_ROOTS,
+    NODES,
+    POINTS,
+    TO_COEFFICIENTS,
+    Fits,
+    Index,
+    Roots,
+    joined,
+)
 from pyharness.model.array_type import Array
+from pyharness.model.dense_output import NODES as N_STATES
+from pyharness.model.dense_output import TO_COEFFICIENTS as STATES_TO_COEFFICIENTS
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
@@ -29,6 +40,12 @@ _SHIFT = 2.0**-26  # relative difference of an argument for a numerical derivati
 ROUNDING = 2.0**-50  # relative, of the arguments of a function
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
+_SOME = slice(NODES // 6, None, NODES // 3)  # three nodes at which noise is computed
+
+
+# From the values at the nodes of the solution's polynomials to those at this module's nodes.
+_REFINED = chebyshev.chebvander(POINTS, N_STATES - 1) @ STATES_TO_COEFFICIENTS
+_REFINED[::2] = np.eye(N_STATES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +64,12 @@ class Solution:
         """Return omega, attitude and own states at n `times` (s), shape (n, m)."""
         return self.sol.normalized(self.pieces(times))
 
+    @cached_property
+    def at_nodes(self) -> tuple[Array, Array]:
+        """The times (s) of the nodes of each polynomial, and the states there."""
+        times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
+        return times, self.sol.normalized(_REFINED @ self.pieces.values)
+
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
         """Return the values of an event's function at `times` (s)."""
         states = self.states(times) if states is None else states
@@ -59,33 +82,31 @@ class Solution:
 
     def noise(self, g: EventFunction, times: Array) -> Array:
         """Return the errors of a function due to errors of time, omega, attitude and rates."""
+        return self.values_and_noise(g, times)[1]
+
+    def values_and_noise(self, g: EventFunction, times: Array) -> tuple[Array, Array, Array]:
+        """Return values, their `noise`, and the part of it that is due to rounding errors."""
         states = self.states(times)
         n, width = states.shape
-        shift = _SHIFT * np.abs(times)
-        later = np.where(times + shift > times, times + shift, times)
         # All arguments in one call: the state at a later time, the state, and with each component
-        # changed.
-        moved = np.tile(states, (width + 2, 1, 1))
-        sizes = sizes_of(self._largest_until(times), self.sol.n_own)
-        for k in range(width):
-            moved[k + 2, :, k] += _SHIFT * sizes[:, k]
-        every = np.concatenate([later, np.tile(times, width + 1)])
+        # changed; then the state with each rate changed.
+        sizes = self._sizes[self.pieces.numbers(times)]
+        moved = np.concatenate([states[None], states[None], with_changes(states, _SHIFT * sizes)])
+        every = np.tile(times, (width + 2, 1))
+        every[0] += _SHIFT * np.abs(times)
         rates = None
         if g.event.needs_rates:
-            rates = self.sol.rates(every[n:], moved[1:].reshape(-1, width))
-            rates = np.concatenate([rates[:n], rates])
-        after, value, *others = g(every, moved.reshape(-1, width), rates).reshape(-1, n)
-        found = ROUNDING * np.abs(after - value) / _SHIFT
-        for other in others:
-            found += self.state_error * np.abs(other - value) / _SHIFT
-        if rates is not None:
-            rates = rates[:n]
-            largest = np.abs(rates[:, :3]).max(axis=1)
-            for k in range(3):
-                changed = rates.copy()
-                changed[:, k] += _SHIFT * largest
-                found += ROUNDING * np.abs(g(times, states, changed) - value) / _SHIFT
-        return np.asarray(found)
+            rates = self.sol.rates(every[1:].ravel(), moved[1:].reshape(-1, width))[:, :3]
+            first = rates[:n]
+            largest = np.abs(first).max(axis=1, keepdims=True)
+            changed = with_changes(first, _SHIFT * np.broadcast_to(largest, first.shape))
+            rates = np.concatenate([first, rates, changed.reshape(-1, 3)])
+            every, moved = np.append(every, every[1:4], axis=0), np.append(moved, moved[[1] * 3], 0)
+        found = g(every.ravel(), moved.reshape(-1, width), rates).reshape(-1, n)
+        apart = np.abs(found - found[1]) / _SHIFT
+        of_states = apart[2 : width + 2].sum(axis=0)
+        others = ROUNDING * (apart[0] + apart[width + 2 :].sum(axis=0))
+        return found[1], others + self.state_error * of_states, others + ROUNDING * of_states
 
     @property
     def state_error(self) -> float:
@@ -93,27 +114,32 @@ class Solution:
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
-    def _largest(self) -> Array:
-        """The largest values of each unknown from time 0 to the end of each polynomial."""
+    def _sizes(self) -> Array:
+        """The sizes of the unknowns from time 0 to the end of each polynomial."""
         sizes = np.abs(self.pieces.values).max(axis=1)
         count = int(np.sum(self.pieces.edges[:-1] < 0.0))
         before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
-        return np.concatenate([before, np.maximum.accumulate(after)])
+        largest = np.concatenate([before, np.maximum.accumulate(after)])
+        return sizes_of(largest, self.sol.n_own)
 
-    def _largest_until(self, times: Array) -> Array:
-        piece = np.searchsorted(self.pieces.edges, times, side="right") - 1
-        return self._largest[np.clip(piece, 0, len(self._largest) - 1)]
+
+def with_changes(states: Array, changes: Array) -> Array:
+    """Return n states with each of m components changed by `changes`, (n, m): shape (m, n, m)."""
+    k = np.arange(states.shape[1])
+    found = np.tile(states, (len(k), 1, 1))
+    found[k, :, k] += changes.T
+    return found
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return converged polynomials through a function's values; elsewhere, its sign changes."""
+    """Return converged polynomials through a function's values; elsewhere, its sign changes.
+
+    Both are in ascending order of time.
+    """
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     smallest = (high - low) * 2.0**-_MOST_DIVISIONS
-    coefficients = solution.pieces.coefficients
-    basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
-    inner = solution.sol.normalized(basis @ coefficients)
-    times = nodes(low, high, POINTS)
+    times, inner = solution.at_nodes
     values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
         times.shape
     )
@@ -128,8 +154,12 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         tail = np.abs(c[:, -_TAIL:]).max(axis=1)
         is_done = tail <= _LAST * largest
         near = np.flatnonzero(~is_done)
-        is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
+        if near.size:
+            is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
+        if is_done.all():
+            done.append(fits)
+            break
         done.append(fits.only(is_done))
         is_rough = ~is_done & (
             (high - low <= np.maximum(smallest, 64.0 * np.spacing(np.abs(low) + np.abs(high))))
@@ -152,23 +182,40 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 
 
 def _all_fits(parts: list[Fits]) -> Fits:
-    return Fits(*(np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0])))
+    if len(parts) == 1:
+        return parts[0]
+    found = Fits(*map(np.concatenate, zip(*(x.columns for x in parts), strict=True)))
+    return found.only(np.argsort(found.low))
 
 
 def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
     """Return the largest noise at three nodes of each interval."""
-    if not low.size:
-        return np.zeros(0)
-    times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
+    times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel()).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
 
 
-def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials that may exceed twice their noise, with the noise stored."""
-    noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
-    fits = replace(fits, noise=noise)
-    return fits.only(fits.sizes > 2.0 * noise)
+def with_noise(
+    g: EventFunction, solution: Solution, fits: Fits, needed: Index
+) -> tuple[Fits, Roots]:
+    """Return polynomials with the noise of those that matter, and the ends that are roots.
+
+    Polynomials matter if they are `needed`, are small, or are the largest one.
+    """
+    which = np.flatnonzero(needed | _are_small(fits) | (fits.sizes == fits.sizes.max(initial=0.0)))
+    edges = solution.pieces.edges
+    ends = np.unique([edges[0], 0.0, edges[-1]])
+    inner = nodes(fits.low[which], fits.high[which], POINTS)[:, _SOME]
+    values, noise, rounding = solution.values_and_noise(g, np.append(inner, ends))
+    fits.noise[which] = noise[: inner.size].reshape(inner.shape).max(axis=1)
+    # A function that is not 0 to rounding at an end is on one side of 0 there.
+    noise = 4.0 * rounding[inner.size :]
+    is_root = np.abs(values[inner.size :]) <= noise
+    if not is_root.any():
+        return fits, NO_ROOTS
+    found = ends[is_root]
+    zeros = np.zeros(len(found))
+    return fits, Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros, zeros)
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
@@ -220,8 +267,6 @@ class ZeroIntervals:
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
         """Return which roots are in an interval, or so near that the function is 0 in between."""
-        if not self.low.size:
-            return np.zeros(len(roots.time), dtype=bool)
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
@@ -238,21 +283,25 @@ class ZeroIntervals:
         return found
 
 
-def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
-    """Return the zero intervals of a function."""
-    none = ZeroIntervals(*(np.zeros(0) for _ in range(5)))
-    if not fits.low.size:
-        return none
-    fits = fits.only(np.argsort(fits.low))
-    sizes, noise = fits.sizes, np.zeros(len(fits.low))
-    largest = [sizes.argmax()]
-    limit = _noise_of(g, solution, fits.low[largest], fits.high[largest])[0]
+def _are_small(fits: Fits, limit: float = 0.0) -> Index:
+    """Return a mask of the polynomials that may be 0, if the largest one has the noise `limit`."""
     # If no value is far above its error, all polynomials may be 0.
-    near = np.flatnonzero(sizes <= max(sizes.max() / _SUDDEN, _SUDDEN * limit))
-    noise[near] = 2.0 * _noise_of(g, solution, fits.low[near], fits.high[near])
+    return fits.sizes <= max(fits.sizes.max(initial=0.0) / _SUDDEN, _SUDDEN * limit)
+
+
+def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
+    """Return the zero intervals of a function, or None if there is none."""
+    if not fits.low.size:
+        return None
+    sizes = fits.sizes
+    near = np.flatnonzero(_are_small(fits, fits.noise[sizes.argmax()]))
+    unknown = near[fits.noise[near] == 0.0]
+    if unknown.size:
+        fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])
+    noise = 2.0 * fits.noise
     zero = near[sizes[near] <= noise[near]]
     if not zero.size:
-        return none
+        return None
     is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]
     begins = np.flatnonzero(is_begin)
     ends = np.append(begins[1:], len(zero))[: len(begins)] - 1

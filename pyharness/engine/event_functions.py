@@ -2,9 +2,10 @@
 
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,9 @@ _FUNCTIONS_ALLOWED = (
 _AGREEMENT = 1e-10
 _CHECKED = 9  # values that are compared
 
+# Attributes that change the signature of a function.
+_SIGNED = {"__wrapped__", "__signature__"}
+_MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
 # Omega, attitude and the derivative of omega, whose columns are the times.
 _Columns = tuple[Array, Array, Array | None]
@@ -71,12 +75,12 @@ class EventFunction:
             self.is_vectorized = False
             found = self._of_tape(times, states, columns)
         if found is None:
-            found = np.array([self._of_one(k, times, *columns) for k in range(len(times))])
-        wrong = np.flatnonzero(~np.isfinite(found))
-        if wrong.size:
+            found = self._of_each(range(len(times)), times, *columns)
+        if not np.isfinite(found).all():
+            wrong = np.flatnonzero(~np.isfinite(found))[0]
             raise InputError(
-                f"{self.name}: the function returned {found[wrong[0]]:g} at t = "
-                f"{times[wrong[0]]:g} s; allowed: finite numbers"
+                f"{self.name}: the function returned {found[wrong]:g} at t = "
+                f"{times[wrong]:g} s; allowed: finite numbers"
             )
         return found
 
@@ -87,7 +91,9 @@ class EventFunction:
         try:
             with np.errstate(all="ignore"):
                 found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
-            found = np.array(np.broadcast_to(np.asarray(found, dtype=np.float64), times.shape))
+            found = np.array(found, dtype=np.float64)
+            if found.shape != times.shape:
+                found = np.array(np.broadcast_to(found, times.shape))
         except Exception:  # the function may raise anything where it expects one number
             if self.is_vectorized:
                 raise
@@ -101,10 +107,11 @@ class EventFunction:
 
     def _is_confirmed(self, found: Array, times: Array, columns: _Columns) -> bool:
         """Return whether values agree with those of single calls at a few times."""
-        some = np.unique(np.linspace(0, len(times) - 1, _CHECKED).astype(int))
-        each = np.array([self._of_one(k, times, *columns) for k in some])
-        scale = _AGREEMENT * np.abs(each).max()
-        return bool(np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)))
+        some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
+        each = self._of_each(some, times, *columns)
+        apart = np.abs(found[some] - each)
+        # Equal infinite values have no difference.
+        return bool(((apart <= _AGREEMENT * np.abs(each).max()) | (found[some] == each)).all())
 
     def _of_tape(self, times: Array, states: Array, columns: _Columns) -> Array | None:
         """Return the values by a record of the function; None if it can't be recorded."""
@@ -136,21 +143,26 @@ class EventFunction:
         except InputError:
             return None
 
-    def _of_one(
-        self, k: int, times: Array, omega: Array, attitude: Array, rates: Array | None
-    ) -> float:
-        time = float(times[k])
-        rate = None if rates is None else rates[:, k].copy()
+    def _of_each(
+        self, numbers: Iterable[int], times: Array, omega: Array, attitude: Array, rates: Any
+    ) -> Array:
+        """Return the values at the times of these numbers, by single calls."""
+        found = []
         with np.errstate(all="ignore"):
-            value = self.event.function(time, omega[:, k].copy(), attitude[:, k].copy(), rate)
-        if isinstance(value, np.ndarray) and value.size == 1:
-            value = value.item()
-        found = converted(value)
-        if isinstance(found, str):
-            raise InputError(
-                f"{self.name}: the function returned {found} at t = {time:g} s; allowed: a number"
-            )
-        return found
+            for k in numbers:
+                rate = None if rates is None else rates[:, k].copy()
+                time = float(times[k])
+                value = self.event.function(time, omega[:, k].copy(), attitude[:, k].copy(), rate)
+                if isinstance(value, np.ndarray) and value.size == 1:
+                    value = value.item()
+                value = converted(value)
+                if isinstance(value, str):
+                    raise InputError(
+                        f"{self.name}: the function returned {value} at t = {time:g} s; "
+                        "allowed: a number"
+                    )
+                found.append(value)
+        return np.array(found)
 
 
 def event_functions(
@@ -215,6 +227,12 @@ def _with_own(
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
     """Return the number of arguments that a function accepts, 2 or 3, beside own states."""
+    if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
+        code = given.__code__
+        count = code.co_argcount - with_own
+        # A function without defaults and flags for others has so many arguments and no other.
+        if count in (2, 3) and not (code.co_kwonlyargcount or code.co_flags & _MORE_ARGUMENTS):
+            return count
     try:
         signature = inspect.signature(given)
     except (TypeError, ValueError):

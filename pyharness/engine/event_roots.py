@@ -7,6 +7,7 @@ is missed (Trefethen 2013, Approximation Theory and Approximation Practice, chap
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ _MOST_DIVISIONS = 50
 # A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
 # of an interval is never lost to rounding.
 _MARGIN = 1.001
+_SHORT = 1e-11  # length of the last Newton step
 # Largest error of a polynomial, relative to its largest value on the interval.
 FIT_ERROR = 4e-13
 
@@ -57,11 +59,16 @@ class Fits:
     coefficients: Array
     noise: Array
 
+    @property
+    def columns(self) -> list[Array]:
+        """The attributes in order."""
+        return [getattr(self, name) for name in self.__dataclass_fields__]
+
     def only(self, kept: Index) -> "Fits":
         """Return the polynomials that an index or a mask selects."""
-        return Fits(*(each[kept] for each in vars(self).values()))
+        return Fits(*(each[kept] for each in self.columns))
 
-    @property
+    @cached_property
     def sizes(self) -> Array:
         """The upper bounds of the magnitudes of the polynomials, shape (p,)."""
         found: Array = np.abs(self.coefficients).sum(axis=1)
@@ -91,25 +98,42 @@ class Roots:
         return Roots(*(each[kept] for each in vars(self).values()))
 
 
+NO_ROOTS = Roots(np.zeros(0), np.zeros(0, dtype=int), *(np.zeros(0) for _ in range(5)))
+
+
 def joined(parts: list[Roots]) -> Roots:
     """Return the roots of all parts in ascending order of time."""
-    columns = (np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0]))
-    found = Roots(*columns)
-    return found.only(np.argsort(found.time, kind="stable"))
+    parts = [each for each in parts if each.time.size]
+    if len(parts) < 2:
+        return parts[0] if parts else NO_ROOTS
+    columns = map(np.concatenate, zip(*(vars(each).values() for each in parts), strict=True))
+    return _sorted(Roots(*columns))
+
+
+def _sorted(roots: Roots) -> Roots:
+    return roots.only(np.argsort(roots.time, kind="stable"))
+
+
+def _basis(x: Array) -> Array:
+    """Return the Chebyshev polynomials at each x, shape (n, NODES)."""
+    return np.cos(_ORDERS * np.arccos(x)[:, None])
+
+
+def _sums(coefficients: Array, basis: Array) -> Array:
+    return np.asarray(np.einsum("nk,nk->n", coefficients, basis))
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
     """Return the value of polynomial k at x[k], for all k."""
-    angles = _ORDERS * np.arccos(x)[:, None]
-    return np.asarray(np.einsum("nk,nk->n", coefficients, np.cos(angles)))
+    return _sums(coefficients, _basis(x))
 
 
-def may_vanish(fits: Fits) -> Array:
+def may_vanish(fits: Fits) -> Index:
     """Return a mask of the polynomials that may have a root."""
     c = np.abs(fits.coefficients)
     rest = c[:, 1:].sum(axis=1)
     near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))
-    found: Array = (c[:, 0] <= rest + near) | ((fits.first < 0.0) != (fits.last < 0.0))
+    found: Index = (c[:, 0] <= rest + near) | ((fits.first < 0.0) != (fits.last < 0.0))
     return found
 
 
@@ -126,29 +150,33 @@ def isolated(fits: Fits) -> Roots:
         rest = np.abs(c[:, 1:]).sum(axis=1)
         changes = (first < 0.0) != (last < 0.0)
         kept = changes | (np.abs(c[:, 0]) <= rest + near[number])
-        number, low, high, first, last, c, rest, changes = (
-            each[kept] for each in (number, low, high, first, last, c, rest, changes)
-        )
+        if not kept.all():
+            number, low, high, first, last, c, rest, changes = (
+                each[kept] for each in (number, low, high, first, last, c, rest, changes)
+            )
         if not number.size:
             break
         sign = np.where(last < 0.0, -1, 1)
         slopes = c @ _DERIVATIVE.T
-        bends = slopes @ _DERIVATIVE.T
         is_tiny = (np.abs(c[:, 0]) + rest <= smallest[number]) | (level == _MOST_DIVISIONS)
         is_monotone = ~is_tiny & _has_no_root(slopes)
-        is_bent = ~is_tiny & ~is_monotone & _has_no_root(bends)
-        middle = 0.5 * (low + high)
-        found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        if is_tiny.any():
+            found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
         one = is_monotone & changes
-        x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
-        x = middle[one] + 0.5 * (high - low)[one] * x
-        found.append((x, sign[one], number[one]))
+        if one.any():
+            x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
+            found.append((middle[one] + half[one] * x, sign[one], number[one]))
+        split = ~(is_tiny | is_monotone)
+        if not split.any():
+            break
+        is_bent = split & _has_no_root(slopes @ _DERIVATIVE.T)
         if is_bent.any():
             for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent],
                                           slopes[is_bent], near[number[is_bent]]):  # fmt: skip
-                inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
+                inner = middle[is_bent][which] + half[is_bent][which] * x
                 found.append((inner, change, number[is_bent][which]))
-        split = ~(is_tiny | is_monotone | is_bent)
+        split &= ~is_bent
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
         ends = np.column_stack([low[split], middle[split], middle[split], high[split]])
@@ -157,9 +185,9 @@ def isolated(fits: Fits) -> Roots:
         first, last = values.reshape(-1, 2).T
         c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
     if not found:
-        found = [(np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int))]
+        return NO_ROOTS
     x, change, which = map(np.concatenate, zip(*found, strict=True))
-    return joined([_describe_roots(fits, x, change, which, near)])
+    return _sorted(_describe_roots(fits, x, change, which, near))
 
 
 def _has_no_root(coefficients: Array) -> Array:
@@ -174,8 +202,9 @@ def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Ar
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
     slopes = fits.coefficients[number] @ _DERIVATIVE.T
-    slope = values_at(slopes, x) / half
-    curvature = values_at(slopes @ _DERIVATIVE.T, x) / half / half
+    basis = _basis(x)
+    slope = _sums(slopes, basis) / half
+    curvature = _sums(slopes @ _DERIVATIVE.T, basis) / half / half
     lasting = np.zeros(len(time))
     return Roots(time, change, slope, curvature, fits.noise[number], near[number], lasting)
 
@@ -184,16 +213,18 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
     slopes = c @ _DERIVATIVE.T
     x = 0.5 * (low + high)
     for _ in range(80 if len(x) else 0):
-        value = values_at(c, x)
+        basis = _basis(x)
+        value = _sums(c, basis)
         is_beyond = sign * value > 0.0
         low, high = np.where(is_beyond, low, x), np.where(is_beyond, x, high)
         with np.errstate(divide="ignore", invalid="ignore"):
-            following = x - value / values_at(slopes, x)
+            following = x - value / _sums(slopes, basis)
         is_inside = (following >= low) & (following <= high)
         following = np.where(is_inside, following, 0.5 * (low + high))
         moved = np.abs(following - x)
         x = following
-        if not np.any(moved > 2e-16):
+        # The error of a Newton step is much smaller than its length.
+        if not np.any(moved > np.where(is_inside, _SHORT, 2e-16)):
             break
     return x
 

@@ -70,6 +70,15 @@ class Solution:
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
         return times, self.sol.normalized(_REFINED @ self.pieces.values)
 
+    @cached_property
+    def at_ends(self) -> tuple[Array, Array]:
+        """The first time, 0 and the last time (s), without repetition, and the states there."""
+        edges, (_, states) = self.pieces.edges, self.at_nodes
+        times = np.array(sorted({edges[0], 0.0, edges[-1]}))
+        # Time 0 is an edge.
+        first = states[np.searchsorted(edges, times[:-1]), 0]
+        return times, np.concatenate([first, states[-1:, -1]])
+
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
         """Return the values of an event's function at `times` (s)."""
         states = self.states(times) if states is None else states
@@ -84,29 +93,34 @@ class Solution:
         """Return the errors of a function due to errors of time, omega, attitude and rates."""
         return self.values_and_noise(g, times)[1]
 
-    def values_and_noise(self, g: EventFunction, times: Array) -> tuple[Array, Array, Array]:
+    def values_and_noise(
+        self, g: EventFunction, times: Array, states: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """Return values, their `noise`, and the part of it that is due to rounding errors."""
-        states = self.states(times)
+        states = self.states(times) if states is None else states
         n, width = states.shape
         # All arguments in one call: the state at a later time, the state, and with each component
         # changed; then the state with each rate changed.
-        sizes = self._sizes[self.pieces.numbers(times)]
-        moved = np.concatenate([states[None], states[None], with_changes(states, _SHIFT * sizes)])
-        every = np.tile(times, (width + 2, 1))
+        count = width + (5 if g.event.needs_rates else 2)
+        every = np.full((count, n), times)
         every[0] += _SHIFT * np.abs(times)
+        sizes = self._sizes[self.pieces.numbers(times)]
+        moved = states + np.eye(count, width, -2)[:, None] * (_SHIFT * sizes)
         rates = None
         if g.event.needs_rates:
-            rates = self.sol.rates(every[1:].ravel(), moved[1:].reshape(-1, width))[:, :3]
-            first = rates[:n]
-            largest = np.abs(first).max(axis=1, keepdims=True)
-            changed = with_changes(first, _SHIFT * np.broadcast_to(largest, first.shape))
-            rates = np.concatenate([first, rates, changed.reshape(-1, 3)])
-            every, moved = np.append(every, every[1:4], axis=0), np.append(moved, moved[[1] * 3], 0)
+            moved[width + 2 :] = states
+            rates = np.empty((count, n, 3))
+            rates[1:-3] = self.sol.rates(every[1:-3].ravel(), moved[1:-3].reshape(-1, width))[
+                :, :3
+            ].reshape(-1, n, 3)
+            rates[0] = rates[1]
+            largest = np.abs(rates[1]).max(axis=1, keepdims=True)
+            rates[-3:] = rates[1] + np.eye(3)[:, None] * (_SHIFT * largest)
+            rates = rates.reshape(-1, 3)
         found = g(every.ravel(), moved.reshape(-1, width), rates).reshape(-1, n)
-        apart = np.abs(found - found[1]) / _SHIFT
-        of_states = apart[2 : width + 2].sum(axis=0)
-        others = ROUNDING * (apart[0] + apart[width + 2 :].sum(axis=0))
-        return found[1], others + self.state_error * of_states, others + ROUNDING * of_states
+        errors = np.full((2, count), ROUNDING / _SHIFT)
+        errors[0, 2 : width + 2] = self.state_error / _SHIFT
+        return found[1], *(errors @ np.abs(found - found[1]))
 
     @property
     def state_error(self) -> float:
@@ -116,29 +130,17 @@ class Solution:
     @cached_property
     def _sizes(self) -> Array:
         """The sizes of the unknowns from time 0 to the end of each polynomial."""
-        sizes = np.abs(self.pieces.values).max(axis=1)
-        count = int(np.sum(self.pieces.edges[:-1] < 0.0))
-        before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
-        largest = np.concatenate([before, np.maximum.accumulate(after)])
+        largest = np.abs(self.pieces.values).max(axis=1)
+        count = np.searchsorted(self.pieces.edges[:-1], 0.0)
+        for side in (largest[:count][::-1], largest[count:]):
+            np.maximum.accumulate(side, out=side)
         return sizes_of(largest, self.sol.n_own)
 
 
-def with_changes(states: Array, changes: Array) -> Array:
-    """Return n states with each of m components changed by `changes`, (n, m): shape (m, n, m)."""
-    k = np.arange(states.shape[1])
-    found = np.tile(states, (len(k), 1, 1))
-    found[k, :, k] += changes.T
-    return found
-
-
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return converged polynomials through a function's values; elsewhere, its sign changes.
-
-    Both are in ascending order of time.
-    """
+    """Return converged polynomials through a function's values; elsewhere, its sign changes."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
-    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
     times, inner = solution.at_nodes
     values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
         times.shape
@@ -148,6 +150,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     first[1:] = last[:-1]
     done: list[Fits] = []
     rough: list[Roots] = []
+    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
     while low.size:
         c = values @ TO_COEFFICIENTS.T
         largest = np.abs(values).max(axis=1)
@@ -182,6 +185,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 
 
 def _all_fits(parts: list[Fits]) -> Fits:
+    """Return all polynomials in ascending order of time."""
     if len(parts) == 1:
         return parts[0]
     found = Fits(*map(np.concatenate, zip(*(x.columns for x in parts), strict=True)))
@@ -198,24 +202,30 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return polynomials with the noise of those that matter, and the ends that are roots.
-
-    Polynomials matter if they are `needed`, are small, or are the largest one.
-    """
-    which = np.flatnonzero(needed | _are_small(fits) | (fits.sizes == fits.sizes.max(initial=0.0)))
-    edges = solution.pieces.edges
-    ends = np.unique([edges[0], 0.0, edges[-1]])
-    inner = nodes(fits.low[which], fits.high[which], POINTS)[:, _SOME]
-    values, noise, rounding = solution.values_and_noise(g, np.append(inner, ends))
-    fits.noise[which] = noise[: inner.size].reshape(inner.shape).max(axis=1)
+    """Return polynomials with the noise of those that matter, and the ends that are roots."""
+    which = np.flatnonzero(needed | (fits.sizes <= fits.sizes.max(initial=0.0) / _SUDDEN))
+    if fits.low.size:
+        which = np.append(which, fits.sizes.argmax())
+    ends, states = solution.at_ends
+    # If no interval was divided, the states are known.
+    if np.may_share_memory(fits.low, solution.pieces.edges):
+        times, inner = (x[which, _SOME] for x in solution.at_nodes)
+    else:
+        times = nodes(fits.low[which], fits.high[which], POINTS)[:, _SOME]
+        inner = solution.states(times.ravel())
+    n = times.size
+    values, noise, rounding = solution.values_and_noise(
+        g, np.append(times, ends), np.concatenate([inner.reshape(n, -1), states])
+    )
+    fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
     # A function that is not 0 to rounding at an end is on one side of 0 there.
-    noise = 4.0 * rounding[inner.size :]
-    is_root = np.abs(values[inner.size :]) <= noise
+    is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
     if not is_root.any():
         return fits, NO_ROOTS
-    found = ends[is_root]
-    zeros = np.zeros(len(found))
-    return fits, Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros, zeros)
+    zeros = np.zeros(is_root.sum())
+    return fits, Roots(
+        ends[is_root], zeros.astype(int), zeros, zeros, 4.0 * rounding[n:][is_root], zeros, zeros
+    )
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
@@ -283,18 +293,17 @@ class ZeroIntervals:
         return found
 
 
-def _are_small(fits: Fits, limit: float = 0.0) -> Index:
-    """Return a mask of the polynomials that may be 0, if the largest one has the noise `limit`."""
-    # If no value is far above its error, all polynomials may be 0.
-    return fits.sizes <= max(fits.sizes.max(initial=0.0) / _SUDDEN, _SUDDEN * limit)
-
-
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
     """Return the zero intervals of a function, or None if there is none."""
     if not fits.low.size:
         return None
     sizes = fits.sizes
-    near = np.flatnonzero(_are_small(fits, fits.noise[sizes.argmax()]))
+    largest = sizes.argmax()
+    # If no value is far above its error, all polynomials may be 0.
+    is_near = sizes <= max(sizes[largest] / _SUDDEN, _SUDDEN * fits.noise[largest])
+    if not is_near.any():
+        return None
+    near = np.flatnonzero(is_near)
     unknown = near[fits.noise[near] == 0.0]
     if unknown.size:
         fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])

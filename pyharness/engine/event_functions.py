@@ -2,7 +2,7 @@
 
 import inspect
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from types import FunctionType
@@ -30,9 +30,6 @@ _CHECKED = 9  # values that are compared
 # Attributes that change the signature of a function.
 _SIGNED = {"__wrapped__", "__signature__"}
 _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
-
-# Omega, attitude and the derivative of omega, whose columns are the times.
-_Columns = tuple[Array, Array, Array | None]
 
 
 @dataclass(eq=False)
@@ -69,13 +66,13 @@ class EventFunction:
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
         """Return the values at n times (s), shape (n,); raise InputError if one is not finite."""
-        columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
-        found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
+        given = times, states, None if rates is None else rates[:, :3]
+        found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
             self.is_vectorized = False
-            found = self._of_tape(times, states, columns)
+            found = self._of_tape(*given)
         if found is None:
-            found = self._of_each(range(len(times)), times, *columns)
+            found = np.array(self._of_each(*given))
         if not np.isfinite(found).all():
             wrong = np.flatnonzero(~np.isfinite(found))[0]
             raise InputError(
@@ -84,13 +81,13 @@ class EventFunction:
             )
         return found
 
-    def _of_arrays(
-        self, times: Array, omega: Array, attitude: Array, rates: Array | None
-    ) -> Array | None:
+    def _of_arrays(self, times: Array, states: Array, rates: Array | None) -> Array | None:
         """Return the values for arrays, or None if the function does not accept arrays."""
+        omega, attitude = states[:, :3].T.copy(), states[:, 3:].T.copy()
+        rate = None if rates is None else rates.T
         try:
             with np.errstate(all="ignore"):
-                found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
+                found = self.event.function(times.copy(), omega, attitude, rate)
             found = np.array(found, dtype=np.float64)
             if found.shape != times.shape:
                 found = np.array(np.broadcast_to(found, times.shape))
@@ -99,21 +96,23 @@ class EventFunction:
                 raise
             return None
         if self.is_vectorized is None:
-            if not self._is_confirmed(found, times, (omega, attitude, rates)):
+            if not self._is_confirmed(found, times, states, rates):
                 return None
             # Agreement at few times does not show that the function accepts arrays.
             self.is_vectorized = True if len(times) > _CHECKED else None
         return found
 
-    def _is_confirmed(self, found: Array, times: Array, columns: _Columns) -> bool:
+    def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
         """Return whether values agree with those of single calls at a few times."""
         some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
-        each = self._of_each(some, times, *columns)
-        apart = np.abs(found[some] - each)
+        each = self._of_each(times[some], states[some], None if rates is None else rates[some])
+        scale = _AGREEMENT * max(map(abs, each))
         # Equal infinite values have no difference.
-        return bool(((apart <= _AGREEMENT * np.abs(each).max()) | (found[some] == each)).all())
+        return all(
+            x == y or abs(x - y) <= scale for x, y in zip(found[some].tolist(), each, strict=True)
+        )
 
-    def _of_tape(self, times: Array, states: Array, columns: _Columns) -> Array | None:
+    def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
         """Return the values by a record of the function; None if it can't be recorded."""
         is_new = not self._tapes
         if is_new:
@@ -122,7 +121,7 @@ class EventFunction:
         if tape is None:
             return None
         found: Array = outputs_at(tape, times, states)[:, 0]
-        if is_new and not self._is_confirmed(found, times, columns):
+        if is_new and not self._is_confirmed(found, times, states, rates):
             self._tapes[0] = None
             return None
         return found
@@ -143,26 +142,24 @@ class EventFunction:
         except InputError:
             return None
 
-    def _of_each(
-        self, numbers: Iterable[int], times: Array, omega: Array, attitude: Array, rates: Any
-    ) -> Array:
-        """Return the values at the times of these numbers, by single calls."""
+    def _of_each(self, times: Array, states: Array, rates: Array | None) -> list[float]:
+        """Return the values by single calls."""
+        each_rate = [None] * len(times) if rates is None else rates.copy()
         found = []
         with np.errstate(all="ignore"):
-            for k in numbers:
-                rate = None if rates is None else rates[:, k].copy()
-                time = float(times[k])
-                value = self.event.function(time, omega[:, k].copy(), attitude[:, k].copy(), rate)
+            for time, state, rate in zip(times.tolist(), states.copy(), each_rate, strict=True):
+                value = self.event.function(time, state[:3], state[3:], rate)
                 if isinstance(value, np.ndarray) and value.size == 1:
                     value = value.item()
-                value = converted(value)
+                if not isinstance(value, float):
+                    value = converted(value)
                 if isinstance(value, str):
                     raise InputError(
                         f"{self.name}: the function returned {value} at t = {time:g} s; "
                         "allowed: a number"
                     )
                 found.append(value)
-        return np.array(found)
+        return found
 
 
 def event_functions(

@@ -130,11 +130,9 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 def may_vanish(fits: Fits) -> Index:
     """Return a mask of the polynomials that may have a root."""
-    c = np.abs(fits.coefficients)
-    rest = c[:, 1:].sum(axis=1)
-    near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))
-    found: Index = (c[:, 0] <= rest + near) | ((fits.first < 0.0) != (fits.last < 0.0))
-    return found
+    first = np.abs(fits.coefficients[:, 0])
+    found: Index = first <= np.maximum(fits.noise, FIT_ERROR * fits.sizes) + (fits.sizes - first)
+    return found | ((fits.first < 0.0) != (fits.last < 0.0))
 
 
 def isolated(fits: Fits) -> Roots:

@@ -10,14 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pyharness.engine.event_fits import (
-    ROUNDING,
-    Solution,
-    fitted,
-    with_changes,
-    with_noise,
-    zero_intervals,
-)
+from pyharness.engine.event_fits import ROUNDING, Solution, fitted, with_noise, zero_intervals
 from pyharness.engine.event_functions import EventFunction
 from pyharness.engine.event_roots import FIT_ERROR, Index, Roots, isolated, joined, may_vanish
 from pyharness.engine.periodic_events import improved, repeated
@@ -39,14 +32,16 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
         kept = may_vanish(fits)
         fits, at_ends = with_noise(g, solution, fits, kept)
         zeros = zero_intervals(g, solution, fits)
-        found = [rough]
-        kept = kept & (fits.sizes > 2.0 * (fits.noise + ROUNDING * fits.sizes))
+        found = []
+        kept &= fits.sizes > 2.0 * (fits.noise + ROUNDING * fits.sizes)
         if kept.any():
             fits = fits.only(kept)
             fits.noise[:] += ROUNDING * fits.sizes
             for begin in range(0, len(fits.low), _BLOCK):
                 found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
-        roots = joined([_distinct(g, solution, joined(found)), at_ends])
+        roots = joined([_distinct(g, solution, joined(found)), rough, at_ends])
+        if zeros is None and not roots.time.size:
+            return roots
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
         roots = _polished(g, solution, _merged(g, solution, roots))
@@ -139,16 +134,15 @@ def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
     gap = np.diff(time)
     middle = time[:-1] + 0.5 * gap
     states = solution.states(middle)
+    n, width = states.shape
+    count = 2 * width + 1
     changes = max(_STATE_ROUNDING, solution.state_error) * sizes_of(
         np.abs(states), solution.sol.n_own
     )
     # The error of the state may decide the sign.
-    every = np.concatenate(
-        [states[None], with_changes(states, changes), with_changes(states, -changes)]
-    )
-    values = solution.values(
-        g, np.tile(middle, len(every)), every.reshape(-1, every.shape[2])
-    ).reshape(-1, len(middle))
+    signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
+    every = (states + signs[:, None] * changes).reshape(-1, width)
+    values = solution.values(g, np.full((count, n), middle).ravel(), every).reshape(-1, n)
     found: Index = (
         (np.abs(values[0]) <= noise)
         | ((values < 0.0) != (values[0] < 0.0)).any(axis=0)
@@ -296,10 +290,10 @@ def found_events(
         ]
         limits[side] = min(ends, default=math.inf)
         sides[side] = [times[np.abs(times) <= limits[side]] for times in lists] if ends else lists
-    # A root at time 0 may be in the lists of both sides.
-    times = [np.unique(np.concatenate(both)) for both in zip(*sides.values(), strict=True)]
-    states = np.zeros((0, solution.pieces.values.shape[2]))
-    if any(map(len, times)):
-        states = solution.sol(np.concatenate(times)).T
-    parts = np.split(states, np.cumsum([len(each) for each in times])[:-1])
-    return FoundEvents(times, parts[: len(times)], -limits[-1], limits[1])
+    found = no_events(len(functions), solution.pieces.values.shape[2])
+    for k, both in enumerate(zip(*sides.values(), strict=True)):
+        if any(map(len, both)):
+            # A root at time 0 may be in the lists of both sides.
+            found.times[k] = np.unique(np.concatenate(both))
+            found.states[k] = solution.sol(found.times[k]).T
+    return FoundEvents(found.times, found.states, -limits[-1], limits[1])

@@ -119,13 +119,9 @@ def _basis(x: Array) -> Array:
     return np.cos(_ORDERS * np.arccos(x)[:, None])
 
 
-def _sums(coefficients: Array, basis: Array) -> Array:
-    return np.asarray(np.einsum("nk,nk->n", coefficients, basis))
-
-
 def values_at(coefficients: Array, x: Array) -> Array:
     """Return the value of polynomial k at x[k], for all k."""
-    return _sums(coefficients, _basis(x))
+    return np.asarray(np.vecdot(coefficients, _basis(x)))
 
 
 def may_vanish(fits: Fits) -> Index:
@@ -141,6 +137,8 @@ def isolated(fits: Fits) -> Roots:
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and numbers of polynomials.
     found: list[tuple[Array, Index, Index]] = []
+    # Polynomials, the ends and sign changes of parts with one root, and how to map them to a point.
+    brackets: list[tuple[Any, ...]] = []
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))
     first, last, c = fits.first, fits.last, fits.coefficients
@@ -161,19 +159,24 @@ def isolated(fits: Fits) -> Roots:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         if is_tiny.any():
             found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
-        one = is_monotone & changes
-        if one.any():
-            x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
-            found.append((middle[one] + half[one] * x, sign[one], number[one]))
+        one = np.flatnonzero(is_monotone & changes)
+        if one.size:
+            begin, end = np.full(one.size, -1.0), np.ones(one.size)
+            brackets.append((c[one], begin, end, sign[one], middle[one], half[one], number[one]))
         split = ~(is_tiny | is_monotone)
         if not split.any():
             break
         is_bent = split & _has_no_root(slopes @ _DERIVATIVE.T)
-        if is_bent.any():
-            for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent],
-                                          slopes[is_bent], near[number[is_bent]]):  # fmt: skip
-                inner = middle[is_bent][which] + half[is_bent][which] * x
-                found.append((inner, change, number[is_bent][which]))
+        bent = np.flatnonzero(is_bent)
+        if bent.size:
+            x, touch, parts = _bent(c[bent], first[bent], last[bent], slopes[bent],
+                                    near[number[bent]])  # fmt: skip
+            touch, x = bent[touch], x[touch]
+            zeros = np.zeros(len(touch), dtype=int)
+            found.append((middle[touch] + half[touch] * x, zeros, number[touch]))
+            for begin, end, change, which in parts:
+                k = bent[which]
+                brackets.append((c[k], begin, end, change, middle[k], half[k], number[k]))
         split &= ~is_bent
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
@@ -182,6 +185,9 @@ def isolated(fits: Fits) -> Roots:
         values = np.column_stack([first[split], centre, centre, last[split]])
         first, last = values.reshape(-1, 2).T
         c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
+    if brackets:
+        c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
+        found.append((middle + half * _bracketed(c, low, high, sign), sign, number))
     if not found:
         return NO_ROOTS
     x, change, which = map(np.concatenate, zip(*found, strict=True))
@@ -201,36 +207,39 @@ def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Ar
     time = np.clip(time, fits.low[number], fits.high[number])
     slopes = fits.coefficients[number] @ _DERIVATIVE.T
     basis = _basis(x)
-    slope = _sums(slopes, basis) / half
-    curvature = _sums(slopes @ _DERIVATIVE.T, basis) / half / half
+    slope = np.vecdot(slopes, basis) / half
+    curvature = np.vecdot(slopes @ _DERIVATIVE.T, basis) / half / half
     lasting = np.zeros(len(time))
     return Roots(time, change, slope, curvature, fits.noise[number], near[number], lasting)
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
-    slopes = c @ _DERIVATIVE.T
+    """Return the roots of polynomials, one for each, between points of opposite signs."""
+    both = np.stack([c, c @ _DERIVATIVE.T], axis=1)
     x = 0.5 * (low + high)
     for _ in range(80 if len(x) else 0):
-        basis = _basis(x)
-        value = _sums(c, basis)
+        value, slope = np.vecdot(both, _basis(x)[:, None]).T
         is_beyond = sign * value > 0.0
         low, high = np.where(is_beyond, low, x), np.where(is_beyond, x, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            following = x - value / _sums(slopes, basis)
+        following = x - value / slope
         is_inside = (following >= low) & (following <= high)
         following = np.where(is_inside, following, 0.5 * (low + high))
         moved = np.abs(following - x)
         x = following
         # The error of a Newton step is much smaller than its length.
-        if not np.any(moved > np.where(is_inside, _SHORT, 2e-16)):
+        if not (moved > np.where(is_inside, _SHORT, 2e-16)).any():
             break
     return x
 
 
 def _bent(
     c: Array, first: Array, last: Array, slopes: Array, near: Array
-) -> list[tuple[Array, Index, Index]]:
-    """Return points, sign changes and row numbers of roots, in rows with at most one extremum."""
+) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
+    """Return the roots in rows of at most one extremum.
+
+    They are the points of the extrema, the numbers of those that may be 0, and the ends, sign
+    changes and numbers of parts with one root.
+    """
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)
@@ -248,11 +257,9 @@ def _bent(
     is_left = negative[one] != before[one]
     sign = np.where(after[one], -1, 1)
     inner = np.where(has_extremum[one], x[one], np.where(is_left, 1.0, -1.0))
-    single = _bracketed(c[one], np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign)
     turn = np.where(negative[two], -1, 1)
-    return [
-        (single, sign, one),
-        (x[touch], np.zeros(len(touch), dtype=int), touch),
-        (_bracketed(c[two], low[two], x[two], turn), turn, two),
-        (_bracketed(c[two], x[two], high[two], -turn), -turn, two),
-    ]
+    return x, touch, [
+        (np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign, one),
+        (low[two], x[two], turn, two),
+        (x[two], high[two], -turn, two),
+    ]  # fmt: skip

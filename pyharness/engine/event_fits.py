@@ -150,14 +150,13 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     first[1:] = last[:-1]
     done: list[Fits] = []
     rough: list[Roots] = []
-    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
-    while low.size:
+    for level in range(_MOST_DIVISIONS + 1):
         c = values @ TO_COEFFICIENTS.T
         largest = np.abs(values).max(axis=1)
         tail = np.abs(c[:, -_TAIL:]).max(axis=1)
         is_done = tail <= _LAST * largest
-        near = np.flatnonzero(~is_done)
-        if near.size:
+        if not is_done.all():
+            near = np.flatnonzero(~is_done)
             is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
         if is_done.all():
@@ -165,7 +164,8 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
             break
         done.append(fits.only(is_done))
         is_rough = ~is_done & (
-            (high - low <= np.maximum(smallest, 64.0 * np.spacing(np.abs(low) + np.abs(high))))
+            (high - low <= 64.0 * np.spacing(np.abs(low) + np.abs(high)))
+            | (level == _MOST_DIVISIONS)
             | (len(low) > max(_MOST_PIECES, 2 * len(edges)))
         )
         rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
@@ -173,7 +173,6 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         middle = 0.5 * low[split] + 0.5 * high[split]
         ends = np.column_stack([low[split], middle, middle, high[split]])
         low, high = ends.reshape(-1, 2).T
-        smallest = np.repeat(smallest[split], 2)
         first, last = first[split], last[split]
         if not low.size:
             break
@@ -203,9 +202,8 @@ def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
     """Return polynomials with the noise of those that matter, and the ends that are roots."""
-    which = np.flatnonzero(needed | (fits.sizes <= fits.sizes.max(initial=0.0) / _SUDDEN))
-    if fits.low.size:
-        which = np.append(which, fits.sizes.argmax())
+    sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
+    which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
     # If no interval was divided, the states are known.
     if np.may_share_memory(fits.low, solution.pieces.edges):
@@ -215,7 +213,7 @@ def with_noise(
         inner = solution.states(times.ravel())
     n = times.size
     values, noise, rounding = solution.values_and_noise(
-        g, np.append(times, ends), np.concatenate([inner.reshape(n, -1), states])
+        g, np.concatenate([times.ravel(), ends]), np.concatenate([inner.reshape(n, -1), states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
     # A function that is not 0 to rounding at an end is on one side of 0 there.

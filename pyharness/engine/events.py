@@ -69,7 +69,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     low, high = solution.pieces.edges[[0, -1]]
     for _ in range(_POLISHES):
         step = -value / slope
-        is_moved = np.isfinite(step) & (np.abs(step) > 0.5 * np.spacing(np.abs(time)))
+        is_moved = np.isfinite(step) & (np.abs(step) > np.spacing(np.abs(time)))
         if not is_moved.any():
             break
         trial = np.clip(np.where(is_moved, time + step, time), low, high)

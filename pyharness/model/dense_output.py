@@ -188,7 +188,7 @@ class DenseOutput:
         own = states.shape[-1] - self.n_own
         if own > 3:
             q = states[..., 3:own]
-            q /= np.sqrt((q * q).sum(axis=-1, keepdims=True))
+            q /= np.sqrt(np.vecdot(q, q))[..., None]
         return states
 
     def _checked(self, t: Any) -> tuple[Array, tuple[int, ...]]:

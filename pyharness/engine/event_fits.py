@@ -9,22 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import (
-    NO_ROOTS,
-    NODES,
-    POINTS,
-    TO_COEFFICIENTS,
-    Fits,
-    Index,
-    Roots,
-    joined,
-)
+from pyharness.engine.event_roots import POINTS, TO_COEFFICIENTS, Fits, Index, Roots, together
+from pyharness.model import dense_output
 from pyharness.model.array_type import Array
-from pyharness.model.dense_output import NODES as N_STATES
-from pyharness.model.dense_output import TO_COEFFICIENTS as STATES_TO_COEFFICIENTS
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
@@ -40,12 +29,9 @@ _SHIFT = 2.0**-26  # relative difference of an argument for a numerical derivati
 ROUNDING = 2.0**-50  # relative, of the arguments of a function
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
-_SOME = slice(NODES // 6, None, NODES // 3)  # three nodes at which noise is computed
-
-
-# From the values at the nodes of the solution's polynomials to those at this module's nodes.
-_REFINED = chebyshev.chebvander(POINTS, N_STATES - 1) @ STATES_TO_COEFFICIENTS
-_REFINED[::2] = np.eye(N_STATES)
+_SOME = slice(5, None, 11)  # three nodes at which noise is computed
+# From the values at the nodes of the solution's polynomials to those at POINTS.
+_REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +95,10 @@ class Solution:
         rates = None
         if g.event.needs_rates:
             moved[width + 2 :] = states
-            rates = np.empty((count, n, 3))
-            rates[1:-3] = self.sol.rates(every[1:-3].ravel(), moved[1:-3].reshape(-1, width))[
-                :, :3
-            ].reshape(-1, n, 3)
-            rates[0] = rates[1]
+            rates = self.sol.rates(np.tile(times, count), moved.reshape(-1, width))
+            rates = rates[:, :3].reshape(count, n, 3)
             largest = np.abs(rates[1]).max(axis=1, keepdims=True)
-            rates[-3:] = rates[1] + np.eye(3)[:, None] * (_SHIFT * largest)
+            rates[-3:] += np.eye(3)[:, None] * (_SHIFT * largest)
             rates = rates.reshape(-1, 3)
         found = g(every.ravel(), moved.reshape(-1, width), rates).reshape(-1, n)
         errors = np.full((2, count), ROUNDING / _SHIFT)
@@ -149,7 +132,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
     done: list[Fits] = []
-    rough: list[Roots] = []
+    rough = [Roots.bare(np.zeros(0), np.zeros(0, dtype=int))]
     for level in range(_MOST_DIVISIONS + 1):
         c = values @ TO_COEFFICIENTS.T
         largest = np.abs(values).max(axis=1)
@@ -180,15 +163,7 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         values = solution.values(g, times.ravel()).reshape(times.shape)
         centre = values[0::2, -1]
         first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
-    return _all_fits(done), joined(rough)
-
-
-def _all_fits(parts: list[Fits]) -> Fits:
-    """Return all polynomials in ascending order of time."""
-    if len(parts) == 1:
-        return parts[0]
-    found = Fits(*map(np.concatenate, zip(*(x.columns for x in parts), strict=True)))
-    return found.only(np.argsort(found.low))
+    return done[0] if len(done) == 1 else together(done, "low"), together(rough, "time")
 
 
 def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
@@ -218,12 +193,8 @@ def with_noise(
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
     # A function that is not 0 to rounding at an end is on one side of 0 there.
     is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
-    if not is_root.any():
-        return fits, NO_ROOTS
-    zeros = np.zeros(is_root.sum())
-    return fits, Roots(
-        ends[is_root], zeros.astype(int), zeros, zeros, 4.0 * rounding[n:][is_root], zeros, zeros
-    )
+    zeros = np.zeros(is_root.sum(), dtype=int)
+    return fits, Roots.bare(ends[is_root], zeros, 4.0 * rounding[n:][is_root])
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
@@ -233,9 +204,7 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
     is_negative = values < 0.0
     row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
     change = np.where(is_negative[row, column], 1, -1)
-    zeros = np.zeros(len(row))
-    middle = 0.5 * times[row, column] + 0.5 * times[row, column + 1]
-    return Roots(middle, change, zeros, zeros, zeros, zeros, zeros)
+    return Roots.bare(0.5 * times[row, column] + 0.5 * times[row, column + 1], change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,9 +238,8 @@ class ZeroIntervals:
         # An interval around time 0 is reached on both sides.
         both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
         time, change = (np.append(x[is_root], x[both]) for x in (time, change))
-        zeros = np.zeros(len(time))
         lasting = np.append(lasting[is_root], self.low[both])
-        return Roots(time, change.astype(int), zeros, zeros, zeros, zeros, lasting)
+        return Roots.bare(time, change.astype(int), lasting=lasting)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
         """Return which roots are in an interval, or so near that the function is 0 in between."""
@@ -293,9 +261,9 @@ class ZeroIntervals:
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
     """Return the zero intervals of a function, or None if there is none."""
-    if not fits.low.size:
-        return None
     sizes = fits.sizes
+    if not sizes.size:
+        return None
     largest = sizes.argmax()
     # If no value is far above its error, all polynomials may be 0.
     is_near = sizes <= max(sizes[largest] / _SUDDEN, _SUDDEN * fits.noise[largest])

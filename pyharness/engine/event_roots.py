@@ -8,7 +8,7 @@ is missed (Trefethen 2013, Approximation Theory and Approximation Practice, chap
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -45,7 +45,26 @@ _ORDERS = np.arange(NODES)
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
+class _Columns:
+    """Rows whose columns are the attributes."""
+
+    def only(self, kept: Index) -> Self:
+        """Return the rows that an index or a mask selects."""
+        return type(self)(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
+
+
+C = TypeVar("C", bound=_Columns)
+
+
+def together(parts: list[C], order: str) -> C:
+    """Return the rows of all parts in the ascending order of a column."""
+    names = parts[0].__dataclass_fields__
+    found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
+    return found.only(np.argsort(getattr(found, order), kind="stable"))
+
+
+@dataclass(frozen=True, eq=False)
+class Fits(_Columns):
     """Polynomials on p intervals from `low` to `high` (s), with `coefficients`, (p, NODES).
 
     `first` and `last` are the function's values at `low` and `high`, equal at common ends of
@@ -59,15 +78,6 @@ class Fits:
     coefficients: Array
     noise: Array
 
-    @property
-    def columns(self) -> list[Array]:
-        """The attributes in order."""
-        return [getattr(self, name) for name in self.__dataclass_fields__]
-
-    def only(self, kept: Index) -> "Fits":
-        """Return the polynomials that an index or a mask selects."""
-        return Fits(*(each[kept] for each in self.columns))
-
     @cached_property
     def sizes(self) -> Array:
         """The upper bounds of the magnitudes of the polynomials, shape (p,)."""
@@ -76,7 +86,7 @@ class Fits:
 
 
 @dataclass(frozen=True, eq=False)
-class Roots:
+class Roots(_Columns):
     """Candidates for roots at n times (s).
 
     `change` is the sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
@@ -93,25 +103,19 @@ class Roots:
     near: Array
     lasting: Array
 
-    def only(self, kept: Index) -> "Roots":
-        """Return the roots that an index or a mask selects."""
-        return Roots(*(each[kept] for each in vars(self).values()))
-
-
-NO_ROOTS = Roots(np.zeros(0), np.zeros(0, dtype=int), *(np.zeros(0) for _ in range(5)))
+    @classmethod
+    def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
+        """Return roots without derivatives."""
+        zeros = np.zeros(len(time))
+        return cls(time, change, zeros, zeros, zeros + noise, zeros, zeros + lasting)
 
 
 def joined(parts: list[Roots]) -> Roots:
     """Return the roots of all parts in ascending order of time."""
     parts = [each for each in parts if each.time.size]
-    if len(parts) < 2:
-        return parts[0] if parts else NO_ROOTS
-    columns = map(np.concatenate, zip(*(vars(each).values() for each in parts), strict=True))
-    return _sorted(Roots(*columns))
-
-
-def _sorted(roots: Roots) -> Roots:
-    return roots.only(np.argsort(roots.time, kind="stable"))
+    if not parts:
+        return Roots.bare(np.zeros(0), np.zeros(0, dtype=int))
+    return parts[0] if len(parts) == 1 else together(parts, "time")
 
 
 def _basis(x: Array) -> Array:
@@ -137,7 +141,7 @@ def isolated(fits: Fits) -> Roots:
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and numbers of polynomials.
     found: list[tuple[Array, Index, Index]] = []
-    # Polynomials, the ends and sign changes of parts with one root, and how to map them to a point.
+    # Parts with one root: polynomial, ends, sign change, and how to map a point of it.
     brackets: list[tuple[Any, ...]] = []
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))
@@ -189,9 +193,10 @@ def isolated(fits: Fits) -> Roots:
         c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
         found.append((middle + half * _bracketed(c, low, high, sign), sign, number))
     if not found:
-        return NO_ROOTS
+        return joined([])
     x, change, which = map(np.concatenate, zip(*found, strict=True))
-    return _sorted(_describe_roots(fits, x, change, which, near))
+    roots = _describe_roots(fits, x, change, which, near)
+    return roots.only(np.argsort(roots.time, kind="stable"))
 
 
 def _has_no_root(coefficients: Array) -> Array:
@@ -214,7 +219,6 @@ def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Ar
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
-    """Return the roots of polynomials, one for each, between points of opposite signs."""
     both = np.stack([c, c @ _DERIVATIVE.T], axis=1)
     x = 0.5 * (low + high)
     for _ in range(80 if len(x) else 0):
@@ -235,11 +239,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     c: Array, first: Array, last: Array, slopes: Array, near: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return the roots in rows of at most one extremum.
-
-    They are the points of the extrema, the numbers of those that may be 0, and the ends, sign
-    changes and numbers of parts with one root.
-    """
+    """Return the extrema, numbers of those that are roots, and parts with one root, of rows."""
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)

@@ -40,12 +40,11 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
             for begin in range(0, len(fits.low), _BLOCK):
                 found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
         roots = joined([_distinct(g, solution, joined(found)), rough, at_ends])
-        if zeros is None and not roots.time.size:
-            return roots
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
-        roots = _polished(g, solution, _merged(g, solution, roots))
-        return joined([roots, zeros.roots(g.event.counts_touches)] if zeros else [roots])
+        if roots.time.size:
+            roots = _polished(g, solution, _merged(g, solution, roots))
+        return roots if zeros is None else joined([roots, zeros.roots(g.event.counts_touches)])
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
@@ -61,23 +60,20 @@ def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    if not roots.time.size:
-        return roots
     time, value = roots.time, solution.values(g, roots.time)
     is_simple = (roots.change != 0) & (roots.slope * roots.change > 0.0)
     slope = np.where(is_simple, roots.slope, math.inf)
     low, high = solution.pieces.edges[[0, -1]]
     for _ in range(_POLISHES):
         step = -value / slope
-        is_moved = np.isfinite(step) & (np.abs(step) > np.spacing(np.abs(time)))
+        is_moved = np.abs(step) > np.spacing(np.abs(time))
         if not is_moved.any():
             break
         trial = np.clip(np.where(is_moved, time + step, time), low, high)
         other = solution.values(g, trial)
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
-        if not better.any():
-            break
+        slope = np.where(better, slope, math.inf)
     return replace(roots, time=_bisected(g, solution, time, roots.change))
 
 
@@ -95,7 +91,9 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
     while wide.size:
         low[wide] = np.maximum(times[wide] - width[wide], bounds[wide])
         high[wide] = np.minimum(times[wide] + width[wide], bounds[wide + 1])
-        has_change = _have_change(g, solution, low[wide], high[wide], changes[wide])
+        ends = np.concatenate([low[wide], high[wide]])
+        before, after = solution.values(g, ends).reshape(2, -1) * changes[wide]
+        has_change = (before < 0.0) & (after > 0.0)
         open_ones.append(wide[has_change & (width[wide] > _EXACT * rounding[wide])])
         is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
         wide = wide[~(has_change | is_whole)]
@@ -107,15 +105,6 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
         is_late = solution.values(g, middle) * changes[k] >= 0.0
         low[k], high[k] = np.where(is_late, low[k], middle), np.where(is_late, middle, high[k])
         found[k] = high[k]
-    return found
-
-
-def _have_change(
-    g: EventFunction, solution: Solution, low: Array, high: Array, changes: Index
-) -> Index:
-    values = solution.values(g, np.concatenate([low, high]))
-    first, last = values.reshape(2, -1) * changes
-    found: Index = (first < 0.0) & (last > 0.0)
     return found
 
 
@@ -239,7 +228,7 @@ def _repeated(
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
-    if last == end:
+    if last == end or period == 0.0:
         return times
     found, kept = repeated(side * times, period, abs(end), g.name)
     found *= side
@@ -277,12 +266,10 @@ def found_events(
     sides: dict[int, list[Array]] = {}
     limits: dict[int, float] = {}
     for side in (-1, 1):
-        lists = [side_events(g, solution, x, side) for g, x in zip(functions, roots, strict=True)]
-        if period > 0.0:
-            lists = [
-                _repeated(g, solution, times, side, period)
-                for g, times in zip(functions, lists, strict=True)
-            ]
+        lists = [
+            _repeated(g, solution, side_events(g, solution, x, side), side, period)
+            for g, x in zip(functions, roots, strict=True)
+        ]
         ends = [
             abs(times[int(g.limit) - 1])
             for g, times in zip(functions, lists, strict=True)

@@ -52,13 +52,13 @@ class Solution:
 
     @cached_property
     def at_nodes(self) -> tuple[Array, Array]:
-        """The times (s) of the nodes of each polynomial, and the states there."""
+        """The times (s) of the nodes of each polynomial, and the states."""
         times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
         return times, self.sol.normalized(_REFINED @ self.pieces.values)
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
-        """The first time, 0 and the last time (s), without repetition, and the states there."""
+        """The times (s) of the ends, including 0, and the states."""
         edges, (_, states) = self.pieces.edges, self.at_nodes
         times = np.array(sorted({edges[0], 0.0, edges[-1]}))
         # Time 0 is an edge.
@@ -72,7 +72,7 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values at `times` (s) from the dense output, not the polynomials."""
+        """Return the values from the dense output, not the polynomials."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
@@ -82,7 +82,7 @@ class Solution:
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return values, their `noise`, and the part of it that is due to rounding errors."""
+        """Return values, their `noise`, and its part by rounding errors."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # All arguments in one call: the state at a later time, the state, and with each component
@@ -142,10 +142,9 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
             near = np.flatnonzero(~is_done)
             is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
+        done.append(fits if is_done.all() else fits.only(is_done))
         if is_done.all():
-            done.append(fits)
             break
-        done.append(fits.only(is_done))
         is_rough = ~is_done & (
             (high - low <= 64.0 * np.spacing(np.abs(low) + np.abs(high)))
             | (level == _MOST_DIVISIONS)
@@ -167,7 +166,6 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
 
 
 def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
-    """Return the largest noise at three nodes of each interval."""
     times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel()).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
@@ -176,7 +174,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return polynomials with the noise of those that matter, and the ends that are roots."""
+    """Return polynomials, with noise where it matters, and roots at the ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -198,7 +196,6 @@ def with_noise(
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
-    """Return the sign changes between adjacent nodes as roots."""
     values = values.copy()
     values[:, 0] = first
     is_negative = values < 0.0
@@ -260,7 +257,7 @@ class ZeroIntervals:
 
 
 def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
-    """Return the zero intervals of a function, or None if there is none."""
+    """Return the zero intervals of a function, if any."""
     sizes = fits.sizes
     if not sizes.size:
         return None

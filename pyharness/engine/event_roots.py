@@ -57,7 +57,7 @@ C = TypeVar("C", bound=_Columns)
 
 
 def together(parts: list[C], order: str) -> C:
-    """Return the rows of all parts in the ascending order of a column."""
+    """Return all rows in ascending order of a column."""
     names = parts[0].__dataclass_fields__
     found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
     return found.only(np.argsort(getattr(found, order), kind="stable"))
@@ -111,7 +111,7 @@ class Roots(_Columns):
 
 
 def joined(parts: list[Roots]) -> Roots:
-    """Return the roots of all parts in ascending order of time."""
+    """Return all roots in ascending order of time."""
     parts = [each for each in parts if each.time.size]
     if not parts:
         return Roots.bare(np.zeros(0), np.zeros(0, dtype=int))
@@ -119,7 +119,6 @@ def joined(parts: list[Roots]) -> Roots:
 
 
 def _basis(x: Array) -> Array:
-    """Return the Chebyshev polynomials at each x, shape (n, NODES)."""
     return np.cos(_ORDERS * np.arccos(x)[:, None])
 
 
@@ -129,7 +128,7 @@ def values_at(coefficients: Array, x: Array) -> Array:
 
 
 def may_vanish(fits: Fits) -> Index:
-    """Return a mask of the polynomials that may have a root."""
+    """Return which polynomials may have a root."""
     first = np.abs(fits.coefficients[:, 0])
     found: Index = first <= np.maximum(fits.noise, FIT_ERROR * fits.sizes) + (fits.sizes - first)
     return found | ((fits.first < 0.0) != (fits.last < 0.0))
@@ -150,10 +149,9 @@ def isolated(fits: Fits) -> Roots:
         rest = np.abs(c[:, 1:]).sum(axis=1)
         changes = (first < 0.0) != (last < 0.0)
         kept = changes | (np.abs(c[:, 0]) <= rest + near[number])
-        if not kept.all():
-            number, low, high, first, last, c, rest, changes = (
-                each[kept] for each in (number, low, high, first, last, c, rest, changes)
-            )
+        number, low, high, first, last, c, rest, changes = (
+            each[kept] for each in (number, low, high, first, last, c, rest, changes)
+        )
         if not number.size:
             break
         sign = np.where(last < 0.0, -1, 1)
@@ -161,27 +159,19 @@ def isolated(fits: Fits) -> Roots:
         is_tiny = (np.abs(c[:, 0]) + rest <= smallest[number]) | (level == _MOST_DIVISIONS)
         is_monotone = ~is_tiny & _has_no_root(slopes)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        if is_tiny.any():
-            found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
+        found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
         one = np.flatnonzero(is_monotone & changes)
-        if one.size:
-            begin, end = np.full(one.size, -1.0), np.ones(one.size)
-            brackets.append((c[one], begin, end, sign[one], middle[one], half[one], number[one]))
+        parts = [(np.full(one.size, -1.0), np.ones(one.size), sign[one], one)]
         split = ~(is_tiny | is_monotone)
+        if split.any():
+            bent = np.flatnonzero(split & _has_no_root(slopes @ _DERIVATIVE.T))
+            split[bent] = False
+            x, touch, more = _bent(bent, c, first, last, slopes, near[number])
+            found.append((middle[touch] + half[touch] * x, 0 * touch, number[touch]))
+            parts += more
+        brackets += [(c[k], *ends, middle[k], half[k], number[k]) for *ends, k in parts]
         if not split.any():
             break
-        is_bent = split & _has_no_root(slopes @ _DERIVATIVE.T)
-        bent = np.flatnonzero(is_bent)
-        if bent.size:
-            x, touch, parts = _bent(c[bent], first[bent], last[bent], slopes[bent],
-                                    near[number[bent]])  # fmt: skip
-            touch, x = bent[touch], x[touch]
-            zeros = np.zeros(len(touch), dtype=int)
-            found.append((middle[touch] + half[touch] * x, zeros, number[touch]))
-            for begin, end, change, which in parts:
-                k = bent[which]
-                brackets.append((c[k], begin, end, change, middle[k], half[k], number[k]))
-        split &= ~is_bent
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
         ends = np.column_stack([low[split], middle[split], middle[split], high[split]])
@@ -189,11 +179,10 @@ def isolated(fits: Fits) -> Roots:
         values = np.column_stack([first[split], centre, centre, last[split]])
         first, last = values.reshape(-1, 2).T
         c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
-    if brackets:
-        c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
-        found.append((middle + half * _bracketed(c, low, high, sign), sign, number))
     if not found:
         return joined([])
+    c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
+    found.append((middle + half * _bracketed(c, low, high, sign), sign, number))
     x, change, which = map(np.concatenate, zip(*found, strict=True))
     roots = _describe_roots(fits, x, change, which, near)
     return roots.only(np.argsort(roots.time, kind="stable"))
@@ -237,9 +226,10 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 
 
 def _bent(
-    c: Array, first: Array, last: Array, slopes: Array, near: Array
+    rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return the extrema, numbers of those that are roots, and parts with one root, of rows."""
+    """Return the extrema that are roots, their rows, and parts with one root."""
+    c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)
@@ -258,8 +248,8 @@ def _bent(
     sign = np.where(after[one], -1, 1)
     inner = np.where(has_extremum[one], x[one], np.where(is_left, 1.0, -1.0))
     turn = np.where(negative[two], -1, 1)
-    return x, touch, [
-        (np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign, one),
-        (low[two], x[two], turn, two),
-        (x[two], high[two], -turn, two),
+    return x[touch], rows[touch], [
+        (np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign, rows[one]),
+        (low[two], x[two], turn, rows[two]),
+        (x[two], high[two], -turn, rows[two]),
     ]  # fmt: skip

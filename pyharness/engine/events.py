@@ -117,7 +117,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
-    """Return a mask of the pairs of adjacent roots between which the function may be 0."""
+    """Return which adjacent roots may be one."""
     time = roots.time
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
@@ -141,7 +141,6 @@ def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
 
 
 def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
-    """Return one root for each group of roots that are the same as the next one."""
     is_jump = (roots.change != 0) & (roots.slope == 0.0)
     begin = np.flatnonzero(np.append(True, ~is_same))
     change = np.sign(np.add.reduceat(roots.change, begin))
@@ -154,7 +153,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return a mask of the pairs of adjacent roots around an extremum that is 0 to within noise."""
+    """Return which adjacent roots are around an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A far root is not beside the extremum, however flat the function is there.

@@ -65,13 +65,8 @@ class Pieces:
 
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        if len(times) <= _BLOCK:
-            return self._evaluate(times)
-        found = np.empty((len(times), self.values.shape[2]))
-        for begin in range(0, len(times), _BLOCK):
-            block = slice(begin, begin + _BLOCK)
-            found[block] = self._evaluate(times[block])
-        return found
+        begins = range(0, len(times) or 1, _BLOCK)
+        return np.concatenate([self._evaluate(times[k : k + _BLOCK]) for k in begins])
 
     def _evaluate(self, times: Array) -> Array:
         piece = self.numbers(times)
@@ -84,12 +79,11 @@ class Pieces:
             found /= weights.sum(axis=1)[:, None]
         # The formula fails at the nodes, where the values are known.
         row, node = np.nonzero(apart == 0.0)
-        if row.size:
-            found[row] = values[row, node]
+        found[row] = values[row, node]
         return found
 
     def numbers(self, times: Array) -> NDArray[np.intp]:
-        """Return the number of the interval of each time; at a common edge, the later one."""
+        """Return the number of the interval of each time."""
         return np.searchsorted(self.edges[1:-1], times, side="right")
 
 

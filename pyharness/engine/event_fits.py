@@ -125,14 +125,13 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
-    values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
-        times.shape
-    )
+    inner = inner.reshape(times.size, -1)
+    values = solution.values(g, times.ravel(), inner).reshape(times.shape)
     first, last = values[:, 0].copy(), values[:, -1]
     # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
     done: list[Fits] = []
-    rough = [Roots.bare(np.zeros(0), np.zeros(0, dtype=int))]
+    rough = [Roots.bare(np.zeros(0), 0)]
     for level in range(_MOST_DIVISIONS + 1):
         c = values @ TO_COEFFICIENTS.T
         largest = np.abs(values).max(axis=1)
@@ -191,8 +190,7 @@ def with_noise(
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
     # A function that is not 0 to rounding at an end is on one side of 0 there.
     is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
-    zeros = np.zeros(is_root.sum(), dtype=int)
-    return fits, Roots.bare(ends[is_root], zeros, 4.0 * rounding[n:][is_root])
+    return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
@@ -281,10 +279,9 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     low, high = fits.low[begins], fits.high[ends]
     earlier = np.minimum(fits.low[begins - 1], low)
     later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
-    low = _refined(
-        g, solution, low, earlier, np.maximum(2.0 * sizes[begins], noise[begins] / _SUDDEN)
-    )
-    high = _refined(g, solution, high, later, np.maximum(2.0 * sizes[ends], noise[ends] / _SUDDEN))
+    level = np.maximum(2.0 * sizes, noise / _SUDDEN)
+    low = _refined(g, solution, low, earlier, level[begins])
+    high = _refined(g, solution, high, later, level[ends])
     noise = noise[begins]
     earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
     both = np.concatenate([earlier, later])

@@ -74,10 +74,10 @@ class EventFunction:
         if found is None:
             found = np.array(self._of_each(*given))
         if not np.isfinite(found).all():
-            wrong = np.flatnonzero(~np.isfinite(found))[0]
+            wrong = np.flatnonzero(~np.isfinite(found))
             raise InputError(
-                f"{self.name}: the function returned {found[wrong]:g} at t = "
-                f"{times[wrong]:g} s; allowed: finite numbers"
+                f"{self.name}: the function returned {found[wrong[0]]:g} at t = "
+                f"{times[wrong[0]]:g} s; allowed: finite numbers"
             )
         return found
 
@@ -145,21 +145,21 @@ class EventFunction:
     def _of_each(self, times: Array, states: Array, rates: Array | None) -> list[float]:
         """Return the values by single calls."""
         each_rate = [None] * len(times) if rates is None else rates.copy()
-        found = []
+        values = []
         with np.errstate(all="ignore"):
             for time, state, rate in zip(times.tolist(), states.copy(), each_rate, strict=True):
-                value = self.event.function(time, state[:3], state[3:], rate)
-                if isinstance(value, np.ndarray) and value.size == 1:
-                    value = value.item()
-                if not isinstance(value, float):
-                    value = converted(value)
-                if isinstance(value, str):
+                found = self.event.function(time, state[:3], state[3:], rate)
+                if isinstance(found, np.ndarray) and found.size == 1:
+                    found = found.item()
+                if not isinstance(found, float):
+                    found = converted(found)
+                if isinstance(found, str):
                     raise InputError(
-                        f"{self.name}: the function returned {value} at t = {time:g} s; "
+                        f"{self.name}: the function returned {found} at t = {time:g} s; "
                         "allowed: a number"
                     )
-                found.append(value)
-        return found
+                values.append(found)
+        return values
 
 
 def event_functions(

@@ -107,14 +107,16 @@ class Roots(_Columns):
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
         """Return roots without derivatives."""
         zeros = np.zeros(len(time))
-        return cls(time, change, zeros, zeros, zeros + noise, zeros, zeros + lasting)
+        return cls(
+            time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
+        )
 
 
 def joined(parts: list[Roots]) -> Roots:
     """Return all roots in ascending order of time."""
     parts = [each for each in parts if each.time.size]
     if not parts:
-        return Roots.bare(np.zeros(0), np.zeros(0, dtype=int))
+        return Roots.bare(np.zeros(0), 0)
     return parts[0] if len(parts) == 1 else together(parts, "time")
 
 

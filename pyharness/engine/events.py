@@ -32,13 +32,10 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
         kept = may_vanish(fits)
         fits, at_ends = with_noise(g, solution, fits, kept)
         zeros = zero_intervals(g, solution, fits)
-        found = []
-        kept &= fits.sizes > 2.0 * (fits.noise + ROUNDING * fits.sizes)
-        if kept.any():
-            fits = fits.only(kept)
-            fits.noise[:] += ROUNDING * fits.sizes
-            for begin in range(0, len(fits.low), _BLOCK):
-                found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
+        fits.noise[:] += ROUNDING * fits.sizes
+        fits = fits.only(kept & (fits.sizes > 2.0 * fits.noise))
+        blocks = [slice(k, k + _BLOCK) for k in range(0, len(fits.low), _BLOCK)]
+        found = [isolated(fits.only(block)) for block in blocks]
         roots = joined([_distinct(g, solution, joined(found)), rough, at_ends])
         if zeros is not None:
             roots = roots.only(~zeros.contain(g, solution, roots))
@@ -158,8 +155,6 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A far root is not beside the extremum, however flat the function is there.
     is_close = np.diff(roots.time) <= np.minimum(widest[:-1], widest[1:])
-    if not is_close.any():
-        return found
     for k in (slice(None, -1), slice(1, None)):
         step = -roots.slope[k] / roots.curvature[k]
         near = np.flatnonzero(is_close & (np.abs(step) <= widest[k]))

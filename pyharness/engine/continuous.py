@@ -53,14 +53,17 @@ def with_events(
         # The tolerance 1 stands for a fixed step.
         own = tolerance if tolerance < 1.0 else 0.0
         events = found_events(functions, Solution(pieces, sol, own), period)
-    kept = (found.time >= events.first) & (found.time <= events.last)
-    cut: dict[str, Any] = {name: getattr(found, name)[kept] for name in row_names(found)}
+    cut: dict[str, Any] = {}
+    is_terminal = math.isfinite(events.first) or math.isfinite(events.last)
+    if is_terminal:
+        kept = (found.time >= events.first) & (found.time <= events.last)
+        cut |= {name: getattr(found, name)[kept] for name in row_names(found)}
     # An overflow that no terminal event precedes remains the ending.
     overflowed = found.ended == "overflow" and (
         (events.first == -math.inf and ends[0] < min(found.time, default=0.0))
         or (events.last == math.inf and ends[1] > max(found.time, default=0.0))
     )
-    if (math.isfinite(events.first) or math.isfinite(events.last)) and not overflowed:
+    if is_terminal and not overflowed:
         cut["ended"] = "event"
     if found.sol is not None:
         low, high = max(sol.t_min, events.first), min(sol.t_max, events.last)

@@ -5,14 +5,14 @@ reaches it by a kink or a jump, but not if it decays to 0.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from pyharness.engine.event_functions import EventFunction
-from pyharness.engine.event_roots import NODES, POINTS, TO_COEFFICIENTS, Fits, Index, Roots, joined
+from pyharness.engine.event_roots import POINTS, TO_COEFFICIENTS, Fits, Index, Roots, together
+from pyharness.model import dense_output
 from pyharness.model.array_type import Array
 from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 
@@ -29,6 +29,9 @@ _SHIFT = 2.0**-26  # relative difference of an argument for a numerical derivati
 ROUNDING = 2.0**-50  # relative, of the arguments of a function
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
+_SOME = slice(5, None, 11)  # three nodes at which noise is computed
+# From the values at the nodes of the solution's polynomials to those at POINTS.
+_REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,21 @@ class Solution:
         """Return omega, attitude and own states at n `times` (s), shape (n, m)."""
         return self.sol.normalized(self.pieces(times))
 
+    @cached_property
+    def at_nodes(self) -> tuple[Array, Array]:
+        """The times (s) of the nodes of each polynomial, and the states."""
+        times = nodes(self.pieces.edges[:-1], self.pieces.edges[1:], POINTS)
+        return times, self.sol.normalized(_REFINED @ self.pieces.values)
+
+    @cached_property
+    def at_ends(self) -> tuple[Array, Array]:
+        """The times (s) of the ends, including 0, and the states."""
+        edges, (_, states) = self.pieces.edges, self.at_nodes
+        times = np.array(sorted({edges[0], 0.0, edges[-1]}))
+        # Time 0 is an edge.
+        first = states[np.searchsorted(edges, times[:-1]), 0]
+        return times, np.concatenate([first, states[-1:, -1]])
+
     def values(self, g: EventFunction, times: Array, states: Array | None = None) -> Array:
         """Return the values of an event's function at `times` (s)."""
         states = self.states(times) if states is None else states
@@ -54,38 +72,38 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values at `times` (s) from the dense output, not the polynomials."""
+        """Return the values from the dense output, not the polynomials."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
         """Return the errors of a function due to errors of time, omega, attitude and rates."""
-        states = self.states(times)
+        return self.values_and_noise(g, times)[1]
+
+    def values_and_noise(
+        self, g: EventFunction, times: Array, states: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Return values, their `noise`, and its part by rounding errors."""
+        states = self.states(times) if states is None else states
         n, width = states.shape
-        shift = _SHIFT * np.abs(times)
-        later = np.where(times + shift > times, times + shift, times)
         # All arguments in one call: the state at a later time, the state, and with each component
-        # changed.
-        moved = np.tile(states, (width + 2, 1, 1))
-        sizes = sizes_of(self._largest_until(times), self.sol.n_own)
-        for k in range(width):
-            moved[k + 2, :, k] += _SHIFT * sizes[:, k]
-        every = np.concatenate([later, np.tile(times, width + 1)])
+        # changed; then the state with each rate changed.
+        count = width + (5 if g.event.needs_rates else 2)
+        every = np.full((count, n), times)
+        every[0] += _SHIFT * np.abs(times)
+        sizes = self._sizes[self.pieces.numbers(times)]
+        moved = states + np.eye(count, width, -2)[:, None] * (_SHIFT * sizes)
         rates = None
         if g.event.needs_rates:
-            rates = self.sol.rates(every[n:], moved[1:].reshape(-1, width))
-            rates = np.concatenate([rates[:n], rates])
-        after, value, *others = g(every, moved.reshape(-1, width), rates).reshape(-1, n)
-        found = ROUNDING * np.abs(after - value) / _SHIFT
-        for other in others:
-            found += self.state_error * np.abs(other - value) / _SHIFT
-        if rates is not None:
-            rates = rates[:n]
-            largest = np.abs(rates[:, :3]).max(axis=1)
-            for k in range(3):
-                changed = rates.copy()
-                changed[:, k] += _SHIFT * largest
-                found += ROUNDING * np.abs(g(times, states, changed) - value) / _SHIFT
-        return np.asarray(found)
+            moved[width + 2 :] = states
+            rates = self.sol.rates(np.tile(times, count), moved.reshape(-1, width))
+            rates = rates[:, :3].reshape(count, n, 3)
+            largest = np.abs(rates[1]).max(axis=1, keepdims=True)
+            rates[-3:] += np.eye(3)[:, None] * (_SHIFT * largest)
+            rates = rates.reshape(-1, 3)
+        found = g(every.ravel(), moved.reshape(-1, width), rates).reshape(-1, n)
+        errors = np.full((2, count), ROUNDING / _SHIFT)
+        errors[0, 2 : width + 2] = self.state_error / _SHIFT
+        return found[1], *(errors @ np.abs(found - found[1]))
 
     @property
     def state_error(self) -> float:
@@ -93,46 +111,42 @@ class Solution:
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
-    def _largest(self) -> Array:
-        """The largest values of each unknown from time 0 to the end of each polynomial."""
-        sizes = np.abs(self.pieces.values).max(axis=1)
-        count = int(np.sum(self.pieces.edges[:-1] < 0.0))
-        before, after = np.maximum.accumulate(sizes[:count][::-1])[::-1], sizes[count:]
-        return np.concatenate([before, np.maximum.accumulate(after)])
-
-    def _largest_until(self, times: Array) -> Array:
-        piece = np.searchsorted(self.pieces.edges, times, side="right") - 1
-        return self._largest[np.clip(piece, 0, len(self._largest) - 1)]
+    def _sizes(self) -> Array:
+        """The sizes of the unknowns from time 0 to the end of each polynomial."""
+        largest = np.abs(self.pieces.values).max(axis=1)
+        count = np.searchsorted(self.pieces.edges[:-1], 0.0)
+        for side in (largest[:count][::-1], largest[count:]):
+            np.maximum.accumulate(side, out=side)
+        return sizes_of(largest, self.sol.n_own)
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
     """Return converged polynomials through a function's values; elsewhere, its sign changes."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
-    smallest = (high - low) * 2.0**-_MOST_DIVISIONS
-    coefficients = solution.pieces.coefficients
-    basis = chebyshev.chebvander(POINTS, coefficients.shape[1] - 1)
-    inner = solution.sol.normalized(basis @ coefficients)
-    times = nodes(low, high, POINTS)
-    values = solution.values(g, times.ravel(), inner.reshape(-1, inner.shape[2])).reshape(
-        times.shape
-    )
+    times, inner = solution.at_nodes
+    inner = inner.reshape(times.size, -1)
+    values = solution.values(g, times.ravel(), inner).reshape(times.shape)
     first, last = values[:, 0].copy(), values[:, -1]
     # Equal signs at the common end of adjacent intervals, so that no root is lost or doubled.
     first[1:] = last[:-1]
     done: list[Fits] = []
-    rough: list[Roots] = []
-    while low.size:
+    rough = [Roots.bare(np.zeros(0), 0)]
+    for level in range(_MOST_DIVISIONS + 1):
         c = values @ TO_COEFFICIENTS.T
         largest = np.abs(values).max(axis=1)
         tail = np.abs(c[:, -_TAIL:]).max(axis=1)
         is_done = tail <= _LAST * largest
-        near = np.flatnonzero(~is_done)
-        is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
+        if not is_done.all():
+            near = np.flatnonzero(~is_done)
+            is_done[near] = tail[near] <= _noise_of(g, solution, low[near], high[near])
         fits = Fits(low, high, first, last, c, np.zeros(len(low)))
-        done.append(fits.only(is_done))
+        done.append(fits if is_done.all() else fits.only(is_done))
+        if is_done.all():
+            break
         is_rough = ~is_done & (
-            (high - low <= np.maximum(smallest, 64.0 * np.spacing(np.abs(low) + np.abs(high))))
+            (high - low <= 64.0 * np.spacing(np.abs(low) + np.abs(high)))
+            | (level == _MOST_DIVISIONS)
             | (len(low) > max(_MOST_PIECES, 2 * len(edges)))
         )
         rough.append(_sign_changes(times[is_rough], values[is_rough], first[is_rough]))
@@ -140,7 +154,6 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         middle = 0.5 * low[split] + 0.5 * high[split]
         ends = np.column_stack([low[split], middle, middle, high[split]])
         low, high = ends.reshape(-1, 2).T
-        smallest = np.repeat(smallest[split], 2)
         first, last = first[split], last[split]
         if not low.size:
             break
@@ -148,39 +161,45 @@ def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
         values = solution.values(g, times.ravel()).reshape(times.shape)
         centre = values[0::2, -1]
         first, last = np.column_stack([first, centre, centre, last]).reshape(-1, 2).T
-    return _all_fits(done), joined(rough)
-
-
-def _all_fits(parts: list[Fits]) -> Fits:
-    return Fits(*(np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0])))
+    return done[0] if len(done) == 1 else together(done, "low"), together(rough, "time")
 
 
 def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> Array:
-    """Return the largest noise at three nodes of each interval."""
-    if not low.size:
-        return np.zeros(0)
-    times = nodes(low, high, POINTS)[:, NODES // 6 :: NODES // 3]
+    times = nodes(low, high, POINTS)[:, _SOME]
     noise = solution.noise(g, times.ravel()).reshape(times.shape)
     return np.asarray(noise.max(axis=1))
 
 
-def with_noise(g: EventFunction, solution: Solution, fits: Fits) -> Fits:
-    """Return the polynomials that may exceed twice their noise, with the noise stored."""
-    noise = _noise_of(g, solution, fits.low, fits.high) + ROUNDING * fits.sizes
-    fits = replace(fits, noise=noise)
-    return fits.only(fits.sizes > 2.0 * noise)
+def with_noise(
+    g: EventFunction, solution: Solution, fits: Fits, needed: Index
+) -> tuple[Fits, Roots]:
+    """Return polynomials, with noise where it matters, and roots at the ends."""
+    sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
+    which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
+    ends, states = solution.at_ends
+    # If no interval was divided, the states are known.
+    if np.may_share_memory(fits.low, solution.pieces.edges):
+        times, inner = (x[which, _SOME] for x in solution.at_nodes)
+    else:
+        times = nodes(fits.low[which], fits.high[which], POINTS)[:, _SOME]
+        inner = solution.states(times.ravel())
+    n = times.size
+    values, noise, rounding = solution.values_and_noise(
+        g, np.concatenate([times.ravel(), ends]), np.concatenate([inner.reshape(n, -1), states])
+    )
+    fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
+    # A function that is not 0 to rounding at an end is on one side of 0 there.
+    is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
+    return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
 
 
 def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
-    """Return the sign changes between adjacent nodes as roots."""
     values = values.copy()
     values[:, 0] = first
     is_negative = values < 0.0
     row, column = np.nonzero(is_negative[:, 1:] != is_negative[:, :-1])
     change = np.where(is_negative[row, column], 1, -1)
-    zeros = np.zeros(len(row))
-    middle = 0.5 * times[row, column] + 0.5 * times[row, column + 1]
-    return Roots(middle, change, zeros, zeros, zeros, zeros, zeros)
+    return Roots.bare(0.5 * times[row, column] + 0.5 * times[row, column + 1], change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,14 +233,11 @@ class ZeroIntervals:
         # An interval around time 0 is reached on both sides.
         both = np.flatnonzero(is_root & is_first & (self.low < 0.0) & (self.high > 0.0))
         time, change = (np.append(x[is_root], x[both]) for x in (time, change))
-        zeros = np.zeros(len(time))
         lasting = np.append(lasting[is_root], self.low[both])
-        return Roots(time, change.astype(int), zeros, zeros, zeros, zeros, lasting)
+        return Roots.bare(time, change.astype(int), lasting=lasting)
 
     def contain(self, g: EventFunction, solution: Solution, roots: Roots) -> Index:
         """Return which roots are in an interval, or so near that the function is 0 in between."""
-        if not self.low.size:
-            return np.zeros(len(roots.time), dtype=bool)
         following = np.searchsorted(self.low, roots.time, side="right")
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
@@ -238,21 +254,24 @@ class ZeroIntervals:
         return found
 
 
-def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals:
-    """Return the zero intervals of a function."""
-    none = ZeroIntervals(*(np.zeros(0) for _ in range(5)))
-    if not fits.low.size:
-        return none
-    fits = fits.only(np.argsort(fits.low))
-    sizes, noise = fits.sizes, np.zeros(len(fits.low))
-    largest = [sizes.argmax()]
-    limit = _noise_of(g, solution, fits.low[largest], fits.high[largest])[0]
+def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroIntervals | None:
+    """Return the zero intervals of a function, if any."""
+    sizes = fits.sizes
+    if not sizes.size:
+        return None
+    largest = sizes.argmax()
     # If no value is far above its error, all polynomials may be 0.
-    near = np.flatnonzero(sizes <= max(sizes.max() / _SUDDEN, _SUDDEN * limit))
-    noise[near] = 2.0 * _noise_of(g, solution, fits.low[near], fits.high[near])
+    is_near = sizes <= max(sizes[largest] / _SUDDEN, _SUDDEN * fits.noise[largest])
+    if not is_near.any():
+        return None
+    near = np.flatnonzero(is_near)
+    unknown = near[fits.noise[near] == 0.0]
+    if unknown.size:
+        fits.noise[unknown] = _noise_of(g, solution, fits.low[unknown], fits.high[unknown])
+    noise = 2.0 * fits.noise
     zero = near[sizes[near] <= noise[near]]
     if not zero.size:
-        return none
+        return None
     is_begin = np.append(True, fits.low[zero[1:]] != fits.high[zero[:-1]])[: len(zero)]
     begins = np.flatnonzero(is_begin)
     ends = np.append(begins[1:], len(zero))[: len(begins)] - 1
@@ -260,10 +279,9 @@ def zero_intervals(g: EventFunction, solution: Solution, fits: Fits) -> ZeroInte
     low, high = fits.low[begins], fits.high[ends]
     earlier = np.minimum(fits.low[begins - 1], low)
     later = np.maximum(fits.high[(ends + 1) % len(sizes)], high)
-    low = _refined(
-        g, solution, low, earlier, np.maximum(2.0 * sizes[begins], noise[begins] / _SUDDEN)
-    )
-    high = _refined(g, solution, high, later, np.maximum(2.0 * sizes[ends], noise[ends] / _SUDDEN))
+    level = np.maximum(2.0 * sizes, noise / _SUDDEN)
+    low = _refined(g, solution, low, earlier, level[begins])
+    high = _refined(g, solution, high, later, level[ends])
     noise = noise[begins]
     earlier, later = _beside(solution, low, -1), _beside(solution, high, 1)
     both = np.concatenate([earlier, later])

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,9 @@ _FUNCTIONS_ALLOWED = (
 _AGREEMENT = 1e-10
 _CHECKED = 9  # values that are compared
 
-
-# Omega, attitude and the derivative of omega, whose columns are the times.
-_Columns = tuple[Array, Array, Array | None]
+# Attributes that change the signature of a function.
+_SIGNED = {"__wrapped__", "__signature__"}
+_MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
 
 @dataclass(eq=False)
@@ -65,48 +66,53 @@ class EventFunction:
 
     def __call__(self, times: Array, states: Array, rates: Array | None = None) -> Array:
         """Return the values at n times (s), shape (n,); raise InputError if one is not finite."""
-        columns = (states[:, :3].T, states[:, 3:].T, None if rates is None else rates[:, :3].T)
-        found = self._of_arrays(times, *columns) if self.is_vectorized is not False else None
+        given = times, states, None if rates is None else rates[:, :3]
+        found = self._of_arrays(*given) if self.is_vectorized is not False else None
         if found is None:
             self.is_vectorized = False
-            found = self._of_tape(times, states, columns)
+            found = self._of_tape(*given)
         if found is None:
-            found = np.array([self._of_one(k, times, *columns) for k in range(len(times))])
-        wrong = np.flatnonzero(~np.isfinite(found))
-        if wrong.size:
+            found = np.array(self._of_each(*given))
+        if not np.isfinite(found).all():
+            wrong = np.flatnonzero(~np.isfinite(found))
             raise InputError(
                 f"{self.name}: the function returned {found[wrong[0]]:g} at t = "
                 f"{times[wrong[0]]:g} s; allowed: finite numbers"
             )
         return found
 
-    def _of_arrays(
-        self, times: Array, omega: Array, attitude: Array, rates: Array | None
-    ) -> Array | None:
+    def _of_arrays(self, times: Array, states: Array, rates: Array | None) -> Array | None:
         """Return the values for arrays, or None if the function does not accept arrays."""
+        omega, attitude = states[:, :3].T.copy(), states[:, 3:].T.copy()
+        rate = None if rates is None else rates.T
         try:
             with np.errstate(all="ignore"):
-                found = self.event.function(times.copy(), omega.copy(), attitude.copy(), rates)
-            found = np.array(np.broadcast_to(np.asarray(found, dtype=np.float64), times.shape))
+                found = self.event.function(times.copy(), omega, attitude, rate)
+            found = np.array(found, dtype=np.float64)
+            if found.shape != times.shape:
+                found = np.array(np.broadcast_to(found, times.shape))
         except Exception:  # the function may raise anything where it expects one number
             if self.is_vectorized:
                 raise
             return None
         if self.is_vectorized is None:
-            if not self._is_confirmed(found, times, (omega, attitude, rates)):
+            if not self._is_confirmed(found, times, states, rates):
                 return None
             # Agreement at few times does not show that the function accepts arrays.
             self.is_vectorized = True if len(times) > _CHECKED else None
         return found
 
-    def _is_confirmed(self, found: Array, times: Array, columns: _Columns) -> bool:
+    def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
         """Return whether values agree with those of single calls at a few times."""
-        some = np.unique(np.linspace(0, len(times) - 1, _CHECKED).astype(int))
-        each = np.array([self._of_one(k, times, *columns) for k in some])
-        scale = _AGREEMENT * np.abs(each).max()
-        return bool(np.all((found[some] == each) | (np.abs(found[some] - each) <= scale)))
+        some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
+        each = self._of_each(times[some], states[some], None if rates is None else rates[some])
+        scale = _AGREEMENT * max(map(abs, each))
+        # Equal infinite values have no difference.
+        return all(
+            x == y or abs(x - y) <= scale for x, y in zip(found[some].tolist(), each, strict=True)
+        )
 
-    def _of_tape(self, times: Array, states: Array, columns: _Columns) -> Array | None:
+    def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
         """Return the values by a record of the function; None if it can't be recorded."""
         is_new = not self._tapes
         if is_new:
@@ -115,7 +121,7 @@ class EventFunction:
         if tape is None:
             return None
         found: Array = outputs_at(tape, times, states)[:, 0]
-        if is_new and not self._is_confirmed(found, times, columns):
+        if is_new and not self._is_confirmed(found, times, states, rates):
             self._tapes[0] = None
             return None
         return found
@@ -136,21 +142,24 @@ class EventFunction:
         except InputError:
             return None
 
-    def _of_one(
-        self, k: int, times: Array, omega: Array, attitude: Array, rates: Array | None
-    ) -> float:
-        time = float(times[k])
-        rate = None if rates is None else rates[:, k].copy()
+    def _of_each(self, times: Array, states: Array, rates: Array | None) -> list[float]:
+        """Return the values by single calls."""
+        each_rate = [None] * len(times) if rates is None else rates.copy()
+        values = []
         with np.errstate(all="ignore"):
-            value = self.event.function(time, omega[:, k].copy(), attitude[:, k].copy(), rate)
-        if isinstance(value, np.ndarray) and value.size == 1:
-            value = value.item()
-        found = converted(value)
-        if isinstance(found, str):
-            raise InputError(
-                f"{self.name}: the function returned {found} at t = {time:g} s; allowed: a number"
-            )
-        return found
+            for time, state, rate in zip(times.tolist(), states.copy(), each_rate, strict=True):
+                found = self.event.function(time, state[:3], state[3:], rate)
+                if isinstance(found, np.ndarray) and found.size == 1:
+                    found = found.item()
+                if not isinstance(found, float):
+                    found = converted(found)
+                if isinstance(found, str):
+                    raise InputError(
+                        f"{self.name}: the function returned {found} at t = {time:g} s; "
+                        "allowed: a number"
+                    )
+                values.append(found)
+        return values
 
 
 def event_functions(
@@ -215,6 +224,12 @@ def _with_own(
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
     """Return the number of arguments that a function accepts, 2 or 3, beside own states."""
+    if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
+        code = given.__code__
+        count = code.co_argcount - with_own
+        # A function without defaults and flags for others has so many arguments and no other.
+        if count in (2, 3) and not (code.co_kwonlyargcount or code.co_flags & _MORE_ARGUMENTS):
+            return count
     try:
         signature = inspect.signature(given)
     except (TypeError, ValueError):

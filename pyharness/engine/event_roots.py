@@ -7,7 +7,8 @@ is missed (Trefethen 2013, Approximation Theory and Approximation Practice, chap
 """
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -25,6 +26,7 @@ _MOST_DIVISIONS = 50
 # A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
 # of an interval is never lost to rounding.
 _MARGIN = 1.001
+_SHORT = 1e-11  # length of the last Newton step
 # Largest error of a polynomial, relative to its largest value on the interval.
 FIT_ERROR = 4e-13
 
@@ -43,7 +45,26 @@ _ORDERS = np.arange(NODES)
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
+class _Columns:
+    """Rows whose columns are the attributes."""
+
+    def only(self, kept: Index) -> Self:
+        """Return the rows that an index or a mask selects."""
+        return type(self)(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
+
+
+C = TypeVar("C", bound=_Columns)
+
+
+def together(parts: list[C], order: str) -> C:
+    """Return all rows in ascending order of a column."""
+    names = parts[0].__dataclass_fields__
+    found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
+    return found.only(np.argsort(getattr(found, order), kind="stable"))
+
+
+@dataclass(frozen=True, eq=False)
+class Fits(_Columns):
     """Polynomials on p intervals from `low` to `high` (s), with `coefficients`, (p, NODES).
 
     `first` and `last` are the function's values at `low` and `high`, equal at common ends of
@@ -57,11 +78,7 @@ class Fits:
     coefficients: Array
     noise: Array
 
-    def only(self, kept: Index) -> "Fits":
-        """Return the polynomials that an index or a mask selects."""
-        return Fits(*(each[kept] for each in vars(self).values()))
-
-    @property
+    @cached_property
     def sizes(self) -> Array:
         """The upper bounds of the magnitudes of the polynomials, shape (p,)."""
         found: Array = np.abs(self.coefficients).sum(axis=1)
@@ -69,7 +86,7 @@ class Fits:
 
 
 @dataclass(frozen=True, eq=False)
-class Roots:
+class Roots(_Columns):
     """Candidates for roots at n times (s).
 
     `change` is the sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
@@ -86,31 +103,37 @@ class Roots:
     near: Array
     lasting: Array
 
-    def only(self, kept: Index) -> "Roots":
-        """Return the roots that an index or a mask selects."""
-        return Roots(*(each[kept] for each in vars(self).values()))
+    @classmethod
+    def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
+        """Return roots without derivatives."""
+        zeros = np.zeros(len(time))
+        return cls(
+            time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
+        )
 
 
 def joined(parts: list[Roots]) -> Roots:
-    """Return the roots of all parts in ascending order of time."""
-    columns = (np.concatenate([getattr(x, name) for x in parts]) for name in vars(parts[0]))
-    found = Roots(*columns)
-    return found.only(np.argsort(found.time, kind="stable"))
+    """Return all roots in ascending order of time."""
+    parts = [each for each in parts if each.time.size]
+    if not parts:
+        return Roots.bare(np.zeros(0), 0)
+    return parts[0] if len(parts) == 1 else together(parts, "time")
+
+
+def _basis(x: Array) -> Array:
+    return np.cos(_ORDERS * np.arccos(x)[:, None])
 
 
 def values_at(coefficients: Array, x: Array) -> Array:
     """Return the value of polynomial k at x[k], for all k."""
-    angles = _ORDERS * np.arccos(x)[:, None]
-    return np.asarray(np.einsum("nk,nk->n", coefficients, np.cos(angles)))
+    return np.asarray(np.vecdot(coefficients, _basis(x)))
 
 
-def may_vanish(fits: Fits) -> Array:
-    """Return a mask of the polynomials that may have a root."""
-    c = np.abs(fits.coefficients)
-    rest = c[:, 1:].sum(axis=1)
-    near = np.maximum(fits.noise, FIT_ERROR * (c[:, 0] + rest))
-    found: Array = (c[:, 0] <= rest + near) | ((fits.first < 0.0) != (fits.last < 0.0))
-    return found
+def may_vanish(fits: Fits) -> Index:
+    """Return which polynomials may have a root."""
+    first = np.abs(fits.coefficients[:, 0])
+    found: Index = first <= np.maximum(fits.noise, FIT_ERROR * fits.sizes) + (fits.sizes - first)
+    return found | ((fits.first < 0.0) != (fits.last < 0.0))
 
 
 def isolated(fits: Fits) -> Roots:
@@ -119,6 +142,8 @@ def isolated(fits: Fits) -> Roots:
     smallest = np.maximum(fits.noise / 16.0, 1e-15 * fits.sizes)
     # Points from -1 to 1, sign changes and numbers of polynomials.
     found: list[tuple[Array, Index, Index]] = []
+    # Parts with one root: polynomial, ends, sign change, and how to map a point of it.
+    brackets: list[tuple[Any, ...]] = []
     number = np.arange(len(fits.low))  # of the original polynomial
     low, high = np.full(len(number), -1.0), np.ones(len(number))
     first, last, c = fits.first, fits.last, fits.coefficients
@@ -133,22 +158,22 @@ def isolated(fits: Fits) -> Roots:
             break
         sign = np.where(last < 0.0, -1, 1)
         slopes = c @ _DERIVATIVE.T
-        bends = slopes @ _DERIVATIVE.T
         is_tiny = (np.abs(c[:, 0]) + rest <= smallest[number]) | (level == _MOST_DIVISIONS)
         is_monotone = ~is_tiny & _has_no_root(slopes)
-        is_bent = ~is_tiny & ~is_monotone & _has_no_root(bends)
-        middle = 0.5 * (low + high)
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
         found.append((middle[is_tiny], (sign * changes)[is_tiny], number[is_tiny]))
-        one = is_monotone & changes
-        x = _bracketed(c[one], np.full(one.sum(), -1.0), np.ones(one.sum()), sign[one])
-        x = middle[one] + 0.5 * (high - low)[one] * x
-        found.append((x, sign[one], number[one]))
-        if is_bent.any():
-            for x, change, which in _bent(c[is_bent], first[is_bent], last[is_bent],
-                                          slopes[is_bent], near[number[is_bent]]):  # fmt: skip
-                inner = middle[is_bent][which] + 0.5 * (high - low)[is_bent][which] * x
-                found.append((inner, change, number[is_bent][which]))
-        split = ~(is_tiny | is_monotone | is_bent)
+        one = np.flatnonzero(is_monotone & changes)
+        parts = [(np.full(one.size, -1.0), np.ones(one.size), sign[one], one)]
+        split = ~(is_tiny | is_monotone)
+        if split.any():
+            bent = np.flatnonzero(split & _has_no_root(slopes @ _DERIVATIVE.T))
+            split[bent] = False
+            x, touch, more = _bent(bent, c, first, last, slopes, near[number])
+            found.append((middle[touch] + half[touch] * x, 0 * touch, number[touch]))
+            parts += more
+        brackets += [(c[k], *ends, middle[k], half[k], number[k]) for *ends, k in parts]
+        if not split.any():
+            break
         centre = values_at(c[split], np.zeros(split.sum()))
         number = np.repeat(number[split], 2)
         ends = np.column_stack([low[split], middle[split], middle[split], high[split]])
@@ -157,9 +182,12 @@ def isolated(fits: Fits) -> Roots:
         first, last = values.reshape(-1, 2).T
         c = np.stack([c[split] @ _LEFT.T, c[split] @ _RIGHT.T], axis=1).reshape(-1, NODES)
     if not found:
-        found = [(np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int))]
+        return joined([])
+    c, low, high, sign, middle, half, number = map(np.concatenate, zip(*brackets, strict=True))
+    found.append((middle + half * _bracketed(c, low, high, sign), sign, number))
     x, change, which = map(np.concatenate, zip(*found, strict=True))
-    return joined([_describe_roots(fits, x, change, which, near)])
+    roots = _describe_roots(fits, x, change, which, near)
+    return roots.only(np.argsort(roots.time, kind="stable"))
 
 
 def _has_no_root(coefficients: Array) -> Array:
@@ -174,34 +202,36 @@ def _describe_roots(fits: Fits, x: Array, change: Index, number: Index, near: Ar
     time = 0.5 * fits.low[number] + 0.5 * fits.high[number] + half * x
     time = np.clip(time, fits.low[number], fits.high[number])
     slopes = fits.coefficients[number] @ _DERIVATIVE.T
-    slope = values_at(slopes, x) / half
-    curvature = values_at(slopes @ _DERIVATIVE.T, x) / half / half
+    basis = _basis(x)
+    slope = np.vecdot(slopes, basis) / half
+    curvature = np.vecdot(slopes @ _DERIVATIVE.T, basis) / half / half
     lasting = np.zeros(len(time))
     return Roots(time, change, slope, curvature, fits.noise[number], near[number], lasting)
 
 
 def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
-    slopes = c @ _DERIVATIVE.T
+    both = np.stack([c, c @ _DERIVATIVE.T], axis=1)
     x = 0.5 * (low + high)
     for _ in range(80 if len(x) else 0):
-        value = values_at(c, x)
+        value, slope = np.vecdot(both, _basis(x)[:, None]).T
         is_beyond = sign * value > 0.0
         low, high = np.where(is_beyond, low, x), np.where(is_beyond, x, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            following = x - value / values_at(slopes, x)
+        following = x - value / slope
         is_inside = (following >= low) & (following <= high)
         following = np.where(is_inside, following, 0.5 * (low + high))
         moved = np.abs(following - x)
         x = following
-        if not np.any(moved > 2e-16):
+        # The error of a Newton step is much smaller than its length.
+        if not (moved > np.where(is_inside, _SHORT, 2e-16)).any():
             break
     return x
 
 
 def _bent(
-    c: Array, first: Array, last: Array, slopes: Array, near: Array
-) -> list[tuple[Array, Index, Index]]:
-    """Return points, sign changes and row numbers of roots, in rows with at most one extremum."""
+    rows: Index, *given: Array
+) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
+    """Return the extrema that are roots, their rows, and parts with one root."""
+    c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)
     starts, ends = values_at(slopes, low), values_at(slopes, high)
@@ -219,11 +249,9 @@ def _bent(
     is_left = negative[one] != before[one]
     sign = np.where(after[one], -1, 1)
     inner = np.where(has_extremum[one], x[one], np.where(is_left, 1.0, -1.0))
-    single = _bracketed(c[one], np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign)
     turn = np.where(negative[two], -1, 1)
-    return [
-        (single, sign, one),
-        (x[touch], np.zeros(len(touch), dtype=int), touch),
-        (_bracketed(c[two], low[two], x[two], turn), turn, two),
-        (_bracketed(c[two], x[two], high[two], -turn), -turn, two),
-    ]
+    return x[touch], rows[touch], [
+        (np.where(is_left, -1.0, inner), np.where(is_left, inner, 1.0), sign, rows[one]),
+        (low[two], x[two], turn, rows[two]),
+        (x[two], high[two], -turn, rows[two]),
+    ]  # fmt: skip

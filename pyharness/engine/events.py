@@ -29,45 +29,48 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
     """Return all roots of an event's function, with sign changes in the order of time."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         fits, rough = fitted(g, solution)
+        kept = may_vanish(fits)
+        fits, at_ends = with_noise(g, solution, fits, kept)
         zeros = zero_intervals(g, solution, fits)
-        fits = with_noise(g, solution, fits.only(may_vanish(fits)))
-        found = [rough]
-        for begin in range(0, len(fits.low), _BLOCK):
-            found.append(isolated(fits.only(slice(begin, begin + _BLOCK))))
-        roots = _distinct(g, solution, joined(found))
-        roots = joined([roots, _at_ends(g, solution)])
-        roots = roots.only(~zeros.contain(g, solution, roots))
-        roots = _polished(g, solution, _merged(g, solution, roots))
-        return joined([roots, zeros.roots(g.event.counts_touches)])
+        fits.noise[:] += ROUNDING * fits.sizes
+        fits = fits.only(kept & (fits.sizes > 2.0 * fits.noise))
+        blocks = [slice(k, k + _BLOCK) for k in range(0, len(fits.low), _BLOCK)]
+        found = [isolated(fits.only(block)) for block in blocks]
+        roots = joined([_distinct(g, solution, joined(found)), rough, at_ends])
+        if zeros is not None:
+            roots = roots.only(~zeros.contain(g, solution, roots))
+        if roots.time.size:
+            roots = _polished(g, solution, _merged(g, solution, roots))
+        return roots if zeros is None else joined([roots, zeros.roots(g.event.counts_touches)])
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
     """Return the roots with the noise at their times, without extrema that are not near 0."""
     if not roots.time.size:
         return roots
-    noise = solution.noise(g, roots.time) + ROUNDING / FIT_ERROR * roots.near
-    noise = np.minimum(noise, roots.noise)
-    value = solution.values(g, roots.time)
+    value, noise, _ = solution.values_and_noise(g, roots.time)
+    noise = np.minimum(noise + ROUNDING / FIT_ERROR * roots.near, roots.noise)
     # At an extremum beyond 0, the polynomial has missed two roots.
     is_root = (roots.change != 0) | (np.abs(value) <= noise) | (value * roots.curvature < 0.0)
-    return replace(roots, noise=noise).only(is_root)
+    roots = replace(roots, noise=noise)
+    return roots if is_root.all() else roots.only(is_root)
 
 
 def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    if not roots.time.size:
-        return roots
     time, value = roots.time, solution.values(g, roots.time)
     is_simple = (roots.change != 0) & (roots.slope * roots.change > 0.0)
+    slope = np.where(is_simple, roots.slope, math.inf)
     low, high = solution.pieces.edges[[0, -1]]
     for _ in range(_POLISHES):
-        step = np.where(is_simple, -value / np.where(is_simple, roots.slope, 1.0), 0.0)
-        step[~np.isfinite(step)] = 0.0
-        trial = np.clip(time + step, low, high)
-        if not np.any(trial != time):
+        step = -value / slope
+        is_moved = np.abs(step) > np.spacing(np.abs(time))
+        if not is_moved.any():
             break
+        trial = np.clip(np.where(is_moved, time + step, time), low, high)
         other = solution.values(g, trial)
         better = np.abs(other) < np.abs(value)
         time, value = np.where(better, trial, time), np.where(better, other, value)
+        slope = np.where(better, slope, math.inf)
     return replace(roots, time=_bisected(g, solution, time, roots.change))
 
 
@@ -85,7 +88,9 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
     while wide.size:
         low[wide] = np.maximum(times[wide] - width[wide], bounds[wide])
         high[wide] = np.minimum(times[wide] + width[wide], bounds[wide + 1])
-        has_change = _have_change(g, solution, low[wide], high[wide], changes[wide])
+        ends = np.concatenate([low[wide], high[wide]])
+        before, after = solution.values(g, ends).reshape(2, -1) * changes[wide]
+        has_change = (before < 0.0) & (after > 0.0)
         open_ones.append(wide[has_change & (width[wide] > _EXACT * rounding[wide])])
         is_whole = (low[wide] == bounds[wide]) & (high[wide] == bounds[wide + 1])
         wide = wide[~(has_change | is_whole)]
@@ -100,76 +105,52 @@ def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index
     return found
 
 
-def _have_change(
-    g: EventFunction, solution: Solution, low: Array, high: Array, changes: Index
-) -> Index:
-    values = solution.values(g, np.concatenate([low, high]))
-    first, last = values.reshape(2, -1) * changes
-    found: Index = (first < 0.0) & (last > 0.0)
-    return found
-
-
-def _at_ends(g: EventFunction, solution: Solution) -> Roots:
-    edges = solution.pieces.edges
-    ends = np.unique([edges[0], 0.0, edges[-1]])
-    # A function that is not 0 to rounding at an end is on one side of 0 there.
-    values = solution.values(g, ends)
-    noise = 4.0 * replace(solution, tolerance=0.0).noise(g, ends)
-    is_root = np.abs(values) <= noise
-    found = ends[is_root]
-    zeros = np.zeros(len(found))
-    return Roots(found, zeros.astype(int), zeros, zeros, noise[is_root], zeros, zeros)
-
-
 def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    count = len(roots.time)
-    if not count:
-        return roots
+    ends = (*solution.pieces.edges[[0, -1]].tolist(), 0.0)
+    is_same = _are_same(g, solution, roots) if len(roots.time) > 1 else np.zeros(0, dtype=bool)
+    if is_same.any():
+        roots = _grouped(roots, is_same, ends)
+    return _with_extrema(g, solution, roots, ends)
+
+
+def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
+    """Return which adjacent roots may be one."""
     time = roots.time
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
-    middle = solution.values(g, time[:-1] + 0.5 * gap) if count > 1 else gap
-    is_same = (
-        (np.abs(middle) <= noise)
-        | _have_one_extremum(g, solution, roots, noise)
+    middle = time[:-1] + 0.5 * gap
+    states = solution.states(middle)
+    n, width = states.shape
+    count = 2 * width + 1
+    changes = max(_STATE_ROUNDING, solution.state_error) * sizes_of(
+        np.abs(states), solution.sol.n_own
+    )
+    # The error of the state may decide the sign.
+    signs = np.eye(count, width, -1) - np.eye(count, width, -1 - width)
+    every = (states + signs[:, None] * changes).reshape(-1, width)
+    values = solution.values(g, np.full((count, n), middle).ravel(), every).reshape(-1, n)
+    found: Index = (
+        (np.abs(values[0]) <= noise)
+        | ((values < 0.0) != (values[0] < 0.0)).any(axis=0)
         | (gap <= 8.0 * np.spacing(np.abs(time[1:])))
     )
+    return found | _have_one_extremum(g, solution, roots, noise)
+
+
+def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
     is_jump = (roots.change != 0) & (roots.slope == 0.0)
-    between = np.flatnonzero(~is_same)
-    is_same[between] = _have_any_sign(g, solution, (time[:-1] + 0.5 * gap)[between])
-    group = np.concatenate([[0], np.cumsum(~is_same)])
-    total = np.zeros(group[-1] + 1, dtype=int)
-    np.add.at(total, group, roots.change)
-    change = np.sign(total)
-    begin = np.flatnonzero(np.diff(group, prepend=-1))
-    chosen, size = begin.copy(), np.diff(begin, append=count)
-    ends = (*solution.pieces.edges[[0, -1]].tolist(), 0.0)
+    begin = np.flatnonzero(np.append(True, ~is_same))
+    change = np.sign(np.add.reduceat(roots.change, begin))
+    chosen, size = begin.copy(), np.diff(begin, append=len(roots.time))
     # A jump there and back by rounding is no event.
     is_event = (change != 0) | ~np.minimum.reduceat(is_jump, begin)
     for k in np.flatnonzero(size > 1):
         chosen[k] = _chosen(roots, np.arange(begin[k], begin[k] + size[k]), change[k], ends)
-    merged = replace(roots.only(chosen), change=change).only(is_event)
-    return _with_extrema(g, solution, merged, ends)
-
-
-def _have_any_sign(g: EventFunction, solution: Solution, times: Array) -> Index:
-    """Return a mask of the times at which the error of the state decides the sign."""
-    found: Index = np.zeros(len(times), dtype=bool)
-    if not times.size:
-        return found
-    states = solution.states(times)
-    is_negative = solution.values(g, times, states) < 0.0
-    sizes = sizes_of(np.abs(states), solution.sol.n_own)
-    for k in range(states.shape[1]):
-        for side in (-1.0, 1.0):
-            moved = states.copy()
-            moved[:, k] += side * max(_STATE_ROUNDING, solution.state_error) * sizes[:, k]
-            found |= (solution.values(g, times, moved) < 0.0) != is_negative
-    return found
+    return replace(roots.only(chosen), change=change).only(is_event)
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return a mask of the pairs of adjacent roots around an extremum that is 0 to within noise."""
+    """Return which adjacent roots are around an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A far root is not beside the extremum, however flat the function is there.
@@ -187,9 +168,9 @@ def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
     """Return the roots, with double roots moved to the extremum."""
-    is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
-    if not is_double.any():
+    if roots.change.all():
         return roots
+    is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
     step = np.zeros(len(roots.time))
     step[is_double] = -roots.slope[is_double] / roots.curvature[is_double]
     # Errors of the polynomial may have moved the root this far.
@@ -217,7 +198,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
     change to the value 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
-    if side * end <= 0.0:
+    if side * end <= 0.0 or not roots.time.size:
         return np.zeros(0)
     roots = roots.only((side * roots.time >= 0.0) & (side * (roots.time + roots.lasting) >= 0.0))
     time, change, lasting = (side * x[::side] for x in (roots.time, roots.change, roots.lasting))
@@ -241,7 +222,7 @@ def _repeated(
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
-    if last == end:
+    if last == end or period == 0.0:
         return times
     found, kept = repeated(side * times, period, abs(end), g.name)
     found *= side
@@ -279,20 +260,21 @@ def found_events(
     sides: dict[int, list[Array]] = {}
     limits: dict[int, float] = {}
     for side in (-1, 1):
-        lists = [side_events(g, solution, x, side) for g, x in zip(functions, roots, strict=True)]
-        if period > 0.0:
-            lists = [
-                _repeated(g, solution, times, side, period)
-                for g, times in zip(functions, lists, strict=True)
-            ]
+        lists = [
+            _repeated(g, solution, side_events(g, solution, x, side), side, period)
+            for g, x in zip(functions, roots, strict=True)
+        ]
         ends = [
             abs(times[int(g.limit) - 1])
             for g, times in zip(functions, lists, strict=True)
             if len(times) >= g.limit
         ]
         limits[side] = min(ends, default=math.inf)
-        sides[side] = [times[np.abs(times) <= limits[side]] for times in lists]
-    # A root at time 0 may be in the lists of both sides.
-    times = [np.unique(np.concatenate(both)) for both in zip(*sides.values(), strict=True)]
-    states = [solution.sol(each).T for each in times]
-    return FoundEvents(times, states, -limits[-1], limits[1])
+        sides[side] = [times[np.abs(times) <= limits[side]] for times in lists] if ends else lists
+    found = no_events(len(functions), solution.pieces.values.shape[2])
+    for k, both in enumerate(zip(*sides.values(), strict=True)):
+        if any(map(len, both)):
+            # A root at time 0 may be in the lists of both sides.
+            found.times[k] = np.unique(np.concatenate(both))
+            found.states[k] = solution.sol(found.times[k]).T
+    return FoundEvents(found.times, found.states, -limits[-1], limits[1])

@@ -176,11 +176,11 @@ def solve(
         parts[0] = in_reverse(parts[0])
     found = parts[0] if len(parts) == 1 else joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
-    found = replace(found, moments=moments, tolerance=reported, scene=given)
+    steps = found.sol
+    found = replace(found, moments=moments, tolerance=reported, scene=given, sol=None)
     if axes is not None:
         turned_to = partial(states_in_scene_axes, axes=axes, own=7 if attitude else 3)
-        steps = transformed_steps(found.sol, turned_to)
-        found = replace(in_scene_axes(found, axes), sol=steps)
+        steps, found = transformed_steps(steps, turned_to), in_scene_axes(found, axes)
     if found.ended == "unchecked" and (dense_output or functions is not None):
         raise InputError(
             f"dense output and events of {method} need the series of a recorded torque, which ends "
@@ -190,11 +190,11 @@ def solve(
         found = replace(found, reason=with_text(found.reason, given))
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
     if dense_output or functions is not None:
-        if found.sol is None:
+        if steps is None:
             sol = solution_of(given, found, rows, method, tolerance)
         else:
-            sol = replace(found.sol, rates=partial(rates_of, given))
-        found = replace(found, sol=sol if dense_output else None)
+            sol = replace(steps, rates=partial(rates_of, given))
+        found = replace(found, sol=sol) if dense_output else found
     if functions is not None:
         ends = values[0], values[-1]
         found = with_events(given, found, sol, functions, ends, rows, method, tolerance)

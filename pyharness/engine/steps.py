@@ -28,14 +28,16 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
     """
     bare, axes = principal(scene)
     bare = with_constant_body(bare)
-    torque = of_law(bare.torque) if isinstance(bare.torque, TorqueLaw) else bare.torque
-    bare = replace(bare, torque=torque)
-    omega, attitude, own = np.split(state, [3, state.shape[1] - len(scene.states)], axis=1)
-    inner = omega @ axes
-    if attitude.size:
-        turned = product(attitude.T, quaternion_of_axes(axes))
-        inner = np.column_stack([inner, *turned])
-    inner = np.column_stack([inner, own])
+    torque = bare.torque
+    if isinstance(torque, TorqueLaw):
+        torque = of_law(torque)
+        bare = replace(bare, torque=torque)
+    end = state.shape[1] - len(scene.states)
+    omega, attitude, own = state[:, :3], state[:, 3:end], state[:, end:]
+    inner = state
+    if scene.inertia is not None:
+        turned = product(attitude.T, quaternion_of_axes(axes)) if attitude.size else []
+        inner = np.column_stack([omega @ axes, *turned, own])
     more = own
     if torque.tape is not None:
         tape = system_of(bare, bool(attitude.size and own.size))
@@ -45,7 +47,8 @@ def rates(scene: Scene, times: Array, state: Array) -> Array:
         slopes = slopes_of(bare)
         rows = zip(times.tolist(), inner.tolist(), strict=True)
         found = np.array([slopes(*row)[:3] for row in rows]).reshape(-1, 3)
-    found = found @ axes.T
+    if scene.inertia is not None:
+        found = found @ axes.T
     if attitude.size:
         found = np.column_stack([found, *quaternion_rates(omega.T, attitude.T)])
     return np.column_stack([found, more]) if own.size else found

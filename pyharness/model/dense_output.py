@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.array_type import Array
 from pyharness.model.errors import InputError
@@ -62,33 +63,28 @@ class Pieces:
     edges: Array
     values: Array
 
-    @property
-    def coefficients(self) -> Array:
-        """The Chebyshev coefficients, shape (p, NODES, m)."""
-        found: Array = np.einsum("kj,pjm->pkm", TO_COEFFICIENTS, self.values)
-        return found
-
     def __call__(self, times: Array) -> Array:
         """Return the values at `times` (s), shape (n, m)."""
-        found = np.empty((len(times), self.values.shape[2]))
-        for begin in range(0, len(times), _BLOCK):
-            block = slice(begin, begin + _BLOCK)
-            found[block] = self._evaluate(times[block])
-        return found
+        begins = range(0, len(times) or 1, _BLOCK)
+        return np.concatenate([self._evaluate(times[k : k + _BLOCK]) for k in begins])
 
     def _evaluate(self, times: Array) -> Array:
-        last = len(self.edges) - 2
-        piece = np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, last)
+        piece = self.numbers(times)
         low, high = self.edges[piece], self.edges[piece + 1]
         apart = (((times - low) - (high - times)) / (high - low))[:, None] - POINTS
         values = self.values[piece]
         with np.errstate(divide="ignore", invalid="ignore"):
             weights = _WEIGHTS / apart
-            found: Array = np.einsum("nj,njm->nm", weights, values) / weights.sum(axis=1)[:, None]
+            found: Array = np.einsum("nj,njm->nm", weights, values)
+            found /= weights.sum(axis=1)[:, None]
         # The formula fails at the nodes, where the values are known.
         row, node = np.nonzero(apart == 0.0)
         found[row] = values[row, node]
         return found
+
+    def numbers(self, times: Array) -> NDArray[np.intp]:
+        """Return the number of the interval of each time."""
+        return np.searchsorted(self.edges[1:-1], times, side="right")
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
@@ -180,7 +176,8 @@ class DenseOutput:
         """Return states, shape (..., m), whose quaternions, if any, have norm 1."""
         own = states.shape[-1] - self.n_own
         if own > 3:
-            states[..., 3:own] /= np.linalg.norm(states[..., 3:own], axis=-1, keepdims=True)
+            q = states[..., 3:own]
+            q /= np.sqrt(np.vecdot(q, q))[..., None]
         return states
 
     def _at(self, t: Any, function: Callable[[Array, Array], Array]) -> Array:

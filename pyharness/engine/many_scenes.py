@@ -204,14 +204,14 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return the arrays of bodies and torques that are not None, with checked shapes."""
-    others = ("omega", "attitude", "coefficients")
-    return checked_rows({name: each for name, each in arrays.items() if name not in others})
+    starts = ("omega", "attitude")
+    return checked_rows({name: each for name, each in arrays.items() if name not in starts})
 
 
 def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return copies of the arrays, with one row for each body or for all."""
     rows = rows_of_bodies(arrays)
-    for name in ("coefficients", "omega", "attitude"):
+    for name in ("omega", "attitude"):
         rows |= checked_rows({name: arrays[name]})
     if "attitude" in rows:
         rows["attitude"] = unit_quaternions(rows["attitude"])

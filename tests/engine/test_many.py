@@ -122,6 +122,15 @@ def test_many_bodies_are_those_of_the_prepared_solver(method: str) -> None:
         assert np.abs(omega - alone).max() <= (tolerance or 1e-13) * np.abs(alone).max()
 
 
+def test_bodies_by_coefficients_under_a_torque_of_the_state() -> None:
+    rows = np.array([(0.1, 0.2, -0.3), (0.2, 0.1, -0.3)])
+    scene = Scene("", (1, 2, 3), coefficients=rows[0], torque=torques.damping(0.1))
+    found = solve_many(scene, 2.0, coefficients=rows)
+    for row, omega in zip(rows, found.omega, strict=True):
+        alone = solve(replace(scene, coefficients=row), 2.0)
+        assert omega == pytest.approx(alone.omega[0], rel=1e-9)
+
+
 def test_kernels_refuse_a_method_that_they_do_not_have() -> None:
     """A method that was added in Python alone had the results of rk4."""
     scene = replace(TOP, torque=TorqueLaw((0.3, -0.2, 0.1)), step_size=0.05)

@@ -28,9 +28,8 @@ from pyharness.model.scene_file import (
 )
 from pyharness.model.values import boolean, finite, integer, number, three
 from pyharness.sweep.axes import ATTITUDE, CHOICES, RIVALS, Axis, axis_of, check_name
-from pyharness.sweep.batches import listing_of
+from pyharness.sweep.batches import check_state_axis, check_state_solver, listing_of
 from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
-from pyharness.sweep.state_torques import check_state_axis, check_state_solver
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 Claim = Callable[[Batch], NDArray[Any]]

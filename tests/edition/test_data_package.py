@@ -18,9 +18,8 @@ from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
 from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
-from pyharness.edition.data_package import data_package
+from pyharness.edition.data_package import data_package, outcomes_table
 from pyharness.edition.decks import TITLES
-from pyharness.edition.machine_bundle import outcomes_table
 from pyharness.edition.report import package_report
 from pyharness.history import identifiers
 from pyharness.history.ablation import entries

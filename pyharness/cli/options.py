@@ -197,16 +197,16 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
     Warn of readings and conjectures without effect.
     """
     chosen_programs(options)
-    listing = subset(
-        options.program,
-        options.listing,
-        names(options.fix),
-        keep=names(options.keep),
-        readings=names(options.reading),
-        conjectures=None if options.conjecture is None else names(options.conjecture),
-    )
+    listing = subset(options.program, options.listing, **changes_of(options))
     tell_inactive(options, [listing])
     return listing
+
+
+def changes_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the names in --fix, --keep, --reading and --conjecture."""
+    found = {"fix": options.fix, "keep": options.keep, "readings": options.reading}
+    assumed = None if options.conjecture is None else names(options.conjecture)
+    return {**{each: names(text) for each, text in found.items()}, "conjectures": assumed}
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Sequence
 
 from pyharness.checks.compare.comparison import compare_methods, compare_programs, listings_for
+from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
 from pyharness.engine.registry import METHODS, SCIPY_METHODS
@@ -60,14 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if options.ablate:
         return _ablate(options, scene, programs)
     lipschitz = shared.chosen_lipschitz(options)
-    listings = listings_for(
-        programs,
-        options.listing,
-        shared.names(options.fix),
-        shared.names(options.keep),
-        shared.names(options.reading),
-        None if options.conjecture is None else shared.names(options.conjecture),
-    )
+    listings = listings_for(programs, options.listing, **shared.changes_of(options))
     shared.tell_inactive(options, listings)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
@@ -83,8 +77,12 @@ def run(options: argparse.Namespace) -> int:
         word=options.word or BINARY64,
         methods=options.numerics or not forms <= _WITHOUT_METHODS,
     )
-    shared.show(comparison_report(found, options.numerics), options)
-    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
+    return _show(options, found)
+
+
+def _show(options: argparse.Namespace, found: Comparison) -> int:
+    failed = found.unexpected or (options.strict and found.is_sensitive)
+    return shared.show(comparison_report(found, options.numerics), options, failed=failed)
 
 
 def _methods(options: argparse.Namespace) -> int:
@@ -98,8 +96,7 @@ def _methods(options: argparse.Namespace) -> int:
         effort=shared.chosen_effort(options),
         attitude=options.attitude,
     )
-    shared.show(comparison_report(found), options)
-    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
+    return _show(options, found)
 
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:

@@ -39,9 +39,8 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(
         options, any_axes=True, any_torque=True, any_state=True, changing=True
     )
-    times = [scene.times()[-1]]
-    if options.times is not None:
-        times = shared.numbers(options.times, "--times")
+    end = [scene.times()[-1]]
+    times = end if options.times is None else shared.numbers(options.times, "--times")
     digits = shared.whole_up_to(MOST_DIGITS, options.digits, "--digits", _DIGITS)
     effort = shared.chosen_effort(options)
     shared.check_outputs(options)
@@ -73,5 +72,5 @@ def _check(options: argparse.Namespace) -> int:
     for number, name in enumerate(names):
         shared.progress(number, len(names), name)
         found.append((name, *check_file(name)))
-    shared.show(certificates_report(found), options)
-    return int(any(proved is None for _, proved, _ in found))
+    failed = any(proved is None for _, proved, _ in found)
+    return shared.show(certificates_report(found), options, failed=failed)

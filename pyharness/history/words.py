@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.assumptions import assumption_records, case_mark, legend, mark
-from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.report import (
@@ -220,18 +220,16 @@ def _record(runs: Sequence[WordRun], cells: Sequence[WordCell]) -> dict[str, Any
 
 
 def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
-    return [(case_scene(cell.double.case), [_listing(cell)]) for cell in cells]
-
-
-def _listing(cell: WordCell) -> Listing:
-    is_original = cell.double.listing == "original"
-    return (Listing.original if is_original else Listing.corrected)(cell.double.program)
+    return [
+        (case_scene(cell.double.case), [subset(cell.double.program, cell.double.listing)])
+        for cell in cells
+    ]
 
 
 def _head(cell: WordCell) -> list[Any]:
     """Return case, program and listing, with marks on what is assumed."""
     case, program, listing, *_ = cell.double
-    on_cards = mark(case_scene(case), _listing(cell))
+    on_cards = mark(case_scene(case), subset(program, listing))
     return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
+from itertools import product, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,7 @@ _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
 _MAPS = 6
+_KEYS = ("id", "whole", "in part", "not", "bits")
 _PERCENT = digits(".2f", 100.0)
 _VERDICTS = (Column("whole %", _PERCENT), Column("in part %", _PERCENT), Column("not %", _PERCENT))
 _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 3))
@@ -166,10 +167,7 @@ def atlas_report(atlas: Atlas) -> Report:
         "claims",
         sections,
         record=lambda: {
-            "claims": [
-                dict(zip(("id", "whole", "in part", "not", "bits"), row, strict=True))
-                for row in claims.rows
-            ],
+            "claims": [dict(zip(_KEYS, row, strict=True)) for row in claims.rows],
             "best": best,
             "starts": [list(atlas.start(at)) for at in places],
         },
@@ -222,11 +220,9 @@ def _by_case(atlas: Atlas) -> Table:
             row += [float(held.mean()), *ends]
         rows.append(row)
     size = digits(".3g")
-    columns = [
-        Column("case"), Column("claims"),
-        Column("hold %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
-        Column("whole %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
-    ]  # fmt: skip
+    columns = [Column("case"), Column("claims")]
+    for head in ("hold %", "whole %"):
+        columns += [Column(head, _PERCENT), Column("from rad/s", size), Column("to rad/s", size)]
     return Table(columns, rows)
 
 
@@ -284,16 +280,10 @@ def atlas_picture(atlas: Atlas) -> Picture:
         [[sum_of_points([each]).mean() for each in atlas.codes[name][0, 0]] for name in names]
     )
     _draw_claims(claims, atlas, names, means)
-    rows = [
-        (
-            name,
-            float(magnitude),
-            float(means[k, m]),
-            float((atlas.codes[name][0, 0, m] != FAILS).mean()),
-        )
-        for k, name in enumerate(names)
-        for m, magnitude in enumerate(atlas.magnitudes)
-    ]
+    rows: list[tuple[Any, ...]] = []
+    for name, points in zip(names, means.tolist(), strict=True):
+        shares = [float((each != FAILS).mean()) for each in atlas.codes[name][0, 0]]
+        rows += zip(repeat(name), atlas.magnitudes.tolist(), points, shares, strict=False)
     title = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
     return Picture(
         figure,

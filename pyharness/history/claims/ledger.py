@@ -131,17 +131,8 @@ def assignments() -> list[Assignment]:
         for start in starts():
             laboratory = Laboratory(True, Assumptions(start=start))
             table.append({each["id"]: outcome(each, laboratory).verdict for each in about})
-        unresolvable = {
-            identity
-            for identity, verdict in table[0].items()
-            if not verdict.startswith(REPRODUCED)
-            and all(each[identity] == verdict for each in table)
-        }
+        fixed = {name for name in table[0] if len({each[name] for each in table}) == 1}
         for start, told in zip(starts(), table, strict=True):
-            holds = all(
-                verdict.startswith(REPRODUCED)
-                for identity, verdict in told.items()
-                if identity not in unresolvable
-            )
-            found.append(Assignment(case, start, told, holds))
+            held = (name in fixed or told[name].startswith(REPRODUCED) for name in told)
+            found.append(Assignment(case, start, told, all(held)))
     return found

@@ -6,6 +6,7 @@ One set has the curves of the original programs, another those of the corrected 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,15 +122,13 @@ class FigureFinding:
 
 def plans() -> list[FigurePlan]:
     """Return the plans of all figures, first those of the original programs."""
-    return [
-        FigurePlan(
-            entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
-            entry["caption" if each == "original" else "corrected_caption"], entry["source"],
-            entry.get("limit_of", "") if each == "original" else "",
-        )
-        for each in SETS
-        for entry in facts("figures")["figure"]
-    ]  # fmt: skip
+    found = []
+    for each, entry in product(SETS, facts("figures")["figure"]):
+        number, part, programs = entry["number"], entry.get("part", ""), tuple(entry[each])
+        limit_of = entry.get("limit_of", "") if each == "original" else ""
+        texts = entry["caption" if each == "original" else "corrected_caption"], entry["source"]
+        found.append(FigurePlan(number, part, each, entry["case"], programs, *texts, limit_of))
+    return found
 
 
 def findings() -> Iterator[FigureFinding]:
@@ -154,36 +153,23 @@ def figures_report(findings: Sequence[FigureFinding]) -> Report:
         on_cards = (mark(each.scene, curve.listing) for curve in each.curves)
         case = f"{each.plan.case}{max(case_mark(each.plan.case), *on_cards)}"
         rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", case, curves])
-    return Report(
-        "figures",
-        text=[[Table(words("files case curves"), rows)], legend(list(map(_runs, findings)))],
-        record=lambda: {
-            "figures": list(map(_record, findings)),
-            "build": build_record(),
-            "assumptions": assumption_records(map(_runs, findings)),
-        },
-    )
+    runs = [(each.scene, [curve.listing for curve in each.curves]) for each in findings]
 
+    def record() -> dict[str, Any]:
+        told = {"figures": list(map(_record, findings)), "build": build_record()}
+        return told | {"assumptions": assumption_records(runs)}
 
-def _runs(finding: FigureFinding) -> tuple[Scene, list[Listing]]:
-    return finding.scene, [curve.listing for curve in finding.curves]
+    return Report("figures", [[Table(words("files case curves"), rows)], legend(runs)], record)
 
 
 def _record(finding: FigureFinding) -> dict[str, Any]:
-    plan = finding.plan
-    return {
-        "figure": plan.title,
-        **{name: getattr(plan, name) for name in ("case", "set", "caption", "source", "files")},
-        "curves": [
-            {
-                "program": each.listing.program,
-                "listing": each.listing.label,
-                "steps": each.trajectory.steps,
-                "ended": each.trajectory.ended,
-            }
-            for each in finding.curves
-        ],
-    }
+    plan, curves = finding.plan, []
+    for each in finding.curves:
+        listing, run = each.listing, each.trajectory
+        names = {"program": listing.program, "listing": listing.label}
+        curves.append(names | {"steps": run.steps, "ended": run.ended})
+    told = {name: getattr(plan, name) for name in ("case", "set", "caption", "source", "files")}
+    return {"figure": plan.title, **told, "curves": curves}
 
 
 def curve_numbers(finding: FigureFinding) -> Table:

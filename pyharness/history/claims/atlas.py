@@ -85,12 +85,8 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
         raise InputError(
             "--atlas: chunks of the store are missing; 'pyharness sweep' computes them"
         )
-    return Atlas(
-        codes,
-        [str(each) for each in axes["reading"]],
-        [int(each) for each in axes["steps"]],
-        *(axes[name] for name in WHERE),
-    )
+    readings, steps = [*map(str, axes["reading"])], [*map(int, axes["steps"])]
+    return Atlas(codes, readings, steps, *(axes[name] for name in WHERE))
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
@@ -126,10 +122,7 @@ def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}
-    return {
-        start: {name: int(codes[k]) for name, codes in found.items()}
-        for k, start in enumerate(given)
-    }
+    return {start: {name: int(x[k]) for name, x in found.items()} for k, start in enumerate(given)}
 
 
 def atlas_report(atlas: Atlas) -> Report:
@@ -163,17 +156,13 @@ def atlas_report(atlas: Atlas) -> Report:
                 _percentage_turned(atlas),
             ],
         ]
-    return Report(
-        "claims",
-        sections,
-        record=lambda: {
-            "claims": [dict(zip(_KEYS, row, strict=True)) for row in claims.rows],
-            "best": best,
-            "starts": [list(atlas.start(at)) for at in places],
-        },
-        data=claims,
-        pictures={"atlas": partial(atlas_picture, atlas)},
-    )
+
+    def record() -> dict[str, Any]:
+        found = [dict(zip(_KEYS, row, strict=True)) for row in claims.rows]
+        return {"claims": found, "best": best, "starts": [list(atlas.start(at)) for at in places]}
+
+    pictures = {"atlas": partial(atlas_picture, atlas)}
+    return Report("claims", sections, record, claims, pictures=pictures)
 
 
 def _claims(atlas: Atlas) -> Table:

@@ -45,13 +45,11 @@ KINDS = {
 
 def claims_report(judgements: Sequence[Judgement]) -> Report:
     """Return the report of our verdicts, one line for each claim."""
-    rows = [
-        [
-            each.claim["id"], each.claim["kind"], each.claim["where"], each.original.verdict,
-            each.corrected.verdict, ", ".join(_hangs_on(each)) or "-",
-        ]
-        for each in judgements
-    ]  # fmt: skip
+    rows = []
+    for each in judgements:
+        place = [each.claim[name] for name in ("id", "kind", "where")]
+        needed = ", ".join(_hangs_on(each)) or "-"
+        rows.append([*place, each.original.verdict, each.corrected.verdict, needed])
     legend = "; ".join(name for _, name in _VERDICTS.values())
     text: list[Section] = [
         [
@@ -135,21 +133,18 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
         f"all hold at once for {math.prod(holding)} of {every} assignments, "
         "but for claims that fail with every start"
     )
-    record = {"assignments": [asdict(each) for each in assignments]}
-    return Report("claims", [*text, [Line(end)]], record=lambda: record)
+    record = {"assignments": list(map(asdict, assignments))}
+    return Report("claims", [*text, [Line(end)]], lambda: record)
 
 
 def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
-    entries = [
-        {
-            **{name: each.claim[name] for name in ("id", "kind", "where", "quote")},
-            "original": each.original.verdict,
-            "corrected": each.corrected.verdict,
-            "numbers": {"original": each.original.numbers, "corrected": each.corrected.numbers},
-            "assumptions": list(map(asdict, each.survivals)),
-        }
-        for each in judgements
-    ]
+    entries = []
+    for each in judgements:
+        about = {name: each.claim[name] for name in ("id", "kind", "where", "quote")}
+        both = {"original": each.original, "corrected": each.corrected}
+        numbers = {"numbers": {name: found.numbers for name, found in both.items()}}
+        about |= {name: found.verdict for name, found in both.items()} | numbers
+        entries.append(about | {"assumptions": list(map(asdict, each.survivals))})
     return {"claims": entries, "assumptions": _supplied(judgements)}
 
 
@@ -165,14 +160,11 @@ def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
 
 
 def _hangs_on(judgement: Judgement) -> list[str]:
-    turning = (
-        each.assumption.replace("conjecture ", "").replace("reading ", "")
-        for each in judgement.survivals
-        if not each.survives
-    )
-    return list(
-        dict.fromkeys("omega(0)" if x.startswith("omega") else x.partition(":")[0] for x in turning)
-    )
+    found = []
+    for each in (each.assumption for each in judgement.survivals if not each.survives):
+        name = each.replace("conjecture ", "").replace("reading ", "").partition(":")[0]
+        found.append("omega(0)" if name.startswith("omega") else name)
+    return list(dict.fromkeys(found))
 
 
 def written(x: float) -> str:

@@ -70,13 +70,9 @@ def listing_of(program: str, listing: str, reading: str) -> Listing:
 def looped_fields(sweep: Sweep) -> list[str]:
     """Return the varied fields whose values must be equal in all scenes of a batch."""
     of_arrays = () if sweep.solver.program is None else OF_PROGRAMS
-    return [
-        name
-        for name in (axis.field for axis in sweep.axes if axis.field not in of_arrays)
-        if name in CHOICES
-        or number_field(name).looped
-        or (name.startswith("body.") and follows_body(sweep.scene))
-    ]
+    own = ("body.",) if follows_body(sweep.scene) else ()
+    names = [axis.field for axis in sweep.axes if axis.field not in of_arrays]
+    return [x for x in names if x in CHOICES or number_field(x).looped or x.startswith(own)]
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
@@ -100,11 +96,8 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     bodies = {name: shared.pop(name) for name in list(shared) if name.startswith("body.")}
     own = {**own, **{name: np.full(n, value) for name, value in bodies.items()}}
     body, values = _body(scene, own, n)
-    constants = {
-        name.removeprefix(CONSTANTS): float(shared.pop(name))
-        for name in list(shared)
-        if name.startswith(CONSTANTS)
-    }
+    names = [name for name in shared if name.startswith(CONSTANTS)]
+    constants = {name.removeprefix(CONSTANTS): float(shared.pop(name)) for name in names}
     if constants or bodies:
         changed = values[0].tolist() if bodies and values is not None else None
         try:

@@ -36,10 +36,8 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
     `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file is unreadable,
     not regular, or larger than `limit` (bytes).
     """
-    lines = [
-        f"# pyharness sweep store, schema {label.schema}, version {label.version}, "
-        f"sweep {label.fingerprint}, {part}"
-    ]
+    identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
+    lines = [f"# pyharness sweep store, {identity}, {part}"]
     lines += [f"{_digest(folder, name, limit)}  {name}" for name in names]
     return "\n".join(lines).encode() + b"\n"
 

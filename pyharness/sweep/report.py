@@ -104,27 +104,19 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
         text.append([Table(_FOUND, found)])
     if flags:
         text.append([Table(_FLAGS, flags)])
-    return Report(
-        "sweep",
-        text=text,
-        record=lambda: {
-            "name": sweep.name,
-            "store": path,
-            "sweep_sha256": sweep.fingerprint,
-            "scenes": sweep.n_scenes,
-            "chunks": sweep.n_chunks,
-            "computed": outcome.computed,
-            "repaired": outcome.repaired,
-            "seconds": outcome.seconds,
-            "axes": [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes],
-            "reductions": [each._asdict() for each in found],
-            "counts": [
-                {"reduction": name, "value": value, "scenes": n} for name, value, n in flags
-            ],
-        },
-        data=Table(_FOUND, found),
-        page=text,
-    )
+    counts = [{"reduction": name, "value": value, "scenes": n} for name, value, n in flags]
+    record = {
+        "name": sweep.name,
+        "store": path,
+        "sweep_sha256": sweep.fingerprint,
+        "scenes": sweep.n_scenes,
+        "chunks": sweep.n_chunks,
+        **{name: getattr(outcome, name) for name in ("computed", "repaired", "seconds")},
+        "axes": [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes],
+        "reductions": [each._asdict() for each in found],
+        "counts": counts,
+    }
+    return Report("sweep", text, lambda: record, Table(_FOUND, found), text)
 
 
 def _did(outcome: Outcome) -> str:
@@ -153,14 +145,8 @@ _COLUMNS = 3  # of panels
 # A logarithmic scale is used if no value is negative, and the positive values extend over more than
 # this number of orders of magnitude.
 _ORDERS = 3.0
-
-
-class _Scale(NamedTuple):
-    """The ends of a scale for all panels."""
-
-    least: float
-    largest: float
-    is_logarithmic: bool
+# The ends of a scale for all panels, and whether it is logarithmic.
+Scale = tuple[float, float, bool]
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
@@ -206,7 +192,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
         if len(shown) == 2:
             last = _map(plot, axes, values, panel, scale)
         else:
-            _dots(plot, axes, values, panel, scale.is_logarithmic)
+            _dots(plot, axes, values, panel, scale[-1])
         pairs = zip(itertools.product(*values), panel.ravel().tolist(), strict=True)
         numbers += [(told, *map(float, here), value) for here, value in pairs]
     for plot in plots[len(panels) :]:
@@ -247,12 +233,12 @@ def _panels(
 
 
 def _map(
-    plot: "Axes", axes: Sequence[Axis], values: Sequence[Any], panel: Array, scale: _Scale
+    plot: "Axes", axes: Sequence[Axis], values: Sequence[Any], panel: Array, scale: Scale
 ) -> Any:
     from matplotlib.colors import LogNorm, Normalize
 
-    logarithmic = scale.is_logarithmic
-    norm = (LogNorm if logarithmic else Normalize)(scale.least, scale.largest)
+    least, largest, logarithmic = scale
+    norm = (LogNorm if logarithmic else Normalize)(least, largest)
     seen = np.ma.masked_invalid(np.where(panel > 0.0, panel, np.nan) if logarithmic else panel)
     y, x = values
     drawn = plot.pcolormesh(x, y, seen, norm=norm, shading="nearest", rasterized=True)
@@ -289,7 +275,7 @@ def _thinned(count: int, most: int) -> Any:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
-def _scale(values: Sequence[Array]) -> _Scale:
+def _scale(values: Sequence[Array]) -> Scale:
     every = np.concatenate([each.ravel() for each in values])
     every = every[np.isfinite(every)]
     above = every[every > 0.0]
@@ -298,7 +284,7 @@ def _scale(values: Sequence[Array]) -> _Scale:
     )
     every = above if is_logarithmic else every
     least, largest = (float(every.min()), float(every.max())) if len(every) else (0.0, 1.0)
-    return _Scale(least, largest if largest > least else least + 1.0, is_logarithmic)
+    return least, largest if largest > least else least + 1.0, is_logarithmic
 
 
 def _label_of(axis: Axis, index: int) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pyharness.model.distribution import version
 from pyharness.model.scene_file import scene_text
@@ -61,10 +62,8 @@ def metadata_files(sweep: Sweep) -> list[str]:
     labels = {REDUCTIONS[asked.reduction].dimension for asked in sweep.reductions} - {""}
     values = [*(axis.field for axis in sweep.axes), *sorted(labels)]
     described = ["", CHECKSUMS, *values, *(asked.name for asked in sweep.reductions)]
-    return [
-        *(f"{name}/zarr.json".lstrip("/") for name in described),
-        *(f"{name}/c/0" for name in values),
-    ]
+    files = [f"{name}/zarr.json".lstrip("/") for name in described]
+    return [*files, *(f"{name}/c/0" for name in values)]
 
 
 @contextlib.contextmanager
@@ -106,18 +105,23 @@ def _fill_group(group: Any, sweep: Sweep) -> None:
         CHECKSUMS, attributes={"long_name": "SHA-256 of each file, as `sha256sum --check` reads it"}
     )
     for axis in sweep.axes:
-        values = axis.coordinates()
-        array = group.create_array(
-            axis.field,
-            shape=values.shape,
-            chunks=values.shape,
-            dtype=str if axis.is_choice else values.dtype,
-            dimension_names=[axis.dimension],
-            attributes={"units": units_of(axis.field)} if units_of(axis.field) else {},
-        )
-        array[:] = values
+        _write_values(group, axis.field, axis.dimension, axis.coordinates(), units_of(axis.field))
     for asked in sweep.reductions:
         _make_array(group, sweep, asked)
+
+
+def _write_values(
+    group: Any, name: str, dimension: str, values: NDArray[Any], units: str = ""
+) -> None:
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        chunks=values.shape,
+        dtype=str if values.dtype == object else values.dtype,
+        dimension_names=[dimension],
+        attributes={"units": units} if units else {},
+    )
+    array[:] = values
 
 
 def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
@@ -129,14 +133,8 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
         shape, chunk = (*shape, len(reduction.labels)), (*chunk, len(reduction.labels))
         dimensions.append(reduction.dimension)
         if reduction.dimension not in group:
-            labels = group.create_array(
-                reduction.dimension,
-                shape=(len(reduction.labels),),
-                chunks=(len(reduction.labels),),
-                dtype=str,
-                dimension_names=[reduction.dimension],
-            )
-            labels[:] = np.array(reduction.labels, dtype=object)
+            labels = np.array(reduction.labels, dtype=object)
+            _write_values(group, reduction.dimension, reduction.dimension, labels)
     attributes: dict[str, Any] = {"long_name": reduction.title, "units": reduction.units}
     if reduction.flags:
         attributes["flag_values"] = list(reduction.flags)

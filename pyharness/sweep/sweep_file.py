@@ -101,6 +101,7 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         raise InputError("[scene]: allowed: case, or file, or the tables of a scene file")
     if given == ["case"]:
         return case_scene(table["case"]), b""
+    more = b""
     if given == ["file"]:
         if not isinstance(table["file"], str):
             raise InputError(f"[scene] file is {kind_of(table['file'])}; it must be text")
@@ -108,12 +109,12 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         named = f"scene file '{beside}'"
         content = read_file(beside, named)
         # The zero byte separates the files in the SHA-256.
-        return checked_scene(
-            scene_of_file(content, beside.stem, named), any_axes=True, any_state=True
-        ), b"\0" + content
-    if not table:
+        scene, more = scene_of_file(content, beside.stem, named), b"\0" + content
+    elif table:
+        scene = scene_of(table, path.stem)
+    else:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene_of(table, path.stem), any_axes=True, any_state=True), b""
+    return checked_scene(scene, any_axes=True, any_state=True), more
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
@@ -318,11 +319,8 @@ def _check_solvers(sweep: Sweep) -> None:
     programs = list(_choices(sweep, "program", solver.program))
     own = [] if programs else _choices(sweep, "method", solver.method)
     against = [dict(each.parameters).get("against") for each in sweep.reductions]
-    check_state_solver(
-        sweep.scene,
-        [name for name in (*own, *filter(None, against)) if name in REGISTRY],
-        bool(programs),
-    )
+    named = [name for name in (*own, *filter(None, against)) if name in REGISTRY]
+    check_state_solver(sweep.scene, named, bool(programs))
     if any(programs):
         checked_scene(sweep.scene, any_state=True)
     for program in programs:

@@ -86,10 +86,7 @@ def _atlas(options: argparse.Namespace) -> int:
             raise InputError(
                 f"--atlas '{options.atlas}': is not finished; 'pyharness sweep' continues it"
             )
-        codes = {
-            dict(asked.parameters)["id"]: store.array(asked.name)[...]
-            for asked in sweep.reductions
-            if asked.reduction == "claim"
-        }
-    shared.show(atlas_report(atlas_of(codes, {d: axes[d] for d in sweep.dimensions})), options)
-    return 0
+        judged = (asked for asked in sweep.reductions if asked.reduction == "claim")
+        codes = {dict(x.parameters)["id"]: store.array(x.name)[...] for x in judged}
+    atlas = atlas_of(codes, {each: axes[each] for each in sweep.dimensions})
+    return shared.show(atlas_report(atlas), options)

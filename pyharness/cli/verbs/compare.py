@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from typing import Any
 
 from pyharness.checks.compare.comparison import compare_methods, compare_programs, listings_for
 from pyharness.checks.compare.findings import Comparison
@@ -60,23 +61,15 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:.2g} to 1")
     if options.ablate:
         return _ablate(options, scene, programs)
-    lipschitz = shared.chosen_lipschitz(options)
+    stops = shared.chosen_stops(options)
     listings = listings_for(programs, options.listing, **shared.changes_of(options))
     shared.tell_inactive(options, listings)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     forms = {options.format or shared.FORMATS[0], *shared.also_files(options).values()}
-    found = compare_programs(
-        scene,
-        listings,
-        lipschitz=lipschitz,
-        may_stop=not options.no_stop,
-        tolerance=tolerance,
-        effort=effort,
-        attitude=options.attitude,
-        word=options.word or BINARY64,
-        methods=options.numerics or not forms <= _WITHOUT_METHODS,
-    )
+    more: dict[str, Any] = {"attitude": options.attitude, "word": options.word or BINARY64}
+    more["methods"] = options.numerics or not forms <= _WITHOUT_METHODS
+    found = compare_programs(scene, listings, **stops, tolerance=tolerance, effort=effort, **more)
     return _show(options, found)
 
 
@@ -89,13 +82,9 @@ def _methods(options: argparse.Namespace) -> int:
     shared.refuse(options, "--method", ("program", *shared.LISTING, "word", "ablate", "numerics"))
     scene = shared.chosen_scene(options, any_state=True)
     shared.check_outputs(options)
-    found = compare_methods(
-        scene,
-        shared.names(options.method),
-        tolerance=shared.chosen_tolerance(options),
-        effort=shared.chosen_effort(options),
-        attitude=options.attitude,
-    )
+    tolerance, effort = shared.chosen_tolerance(options), shared.chosen_effort(options)
+    more: dict[str, Any] = {"tolerance": tolerance, "effort": effort, "attitude": options.attitude}
+    found = compare_methods(scene, shared.names(options.method), **more)
     return _show(options, found)
 
 

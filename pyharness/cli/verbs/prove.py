@@ -45,15 +45,8 @@ def run(options: argparse.Namespace) -> int:
     effort = shared.chosen_effort(options)
     shared.check_outputs(options)
     if options.certificate is None:
-        found = enclose(
-            scene,
-            times,
-            digits,
-            velocity=options.velocity,
-            transition=options.transition,
-            effort=effort,
-            progress=shared.progress,
-        )
+        more = {"velocity": options.velocity, "transition": options.transition}
+        found = enclose(scene, times, digits, **more, effort=effort, progress=shared.progress)
     else:
         shared.refuse(options, "--certificate", ("velocity", "transition"))
         check_writable(options.certificate, "--certificate")

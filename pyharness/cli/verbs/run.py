@@ -4,6 +4,7 @@ import argparse
 import sys
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from pyharness.cli import options as shared
 from pyharness.engine.report import trajectory_report
@@ -135,21 +136,14 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     shared.refuse(options, "--program", ("times", "tolerance", "strict", "animate"))
     listing = shared.chosen_listing(options)
     name = listing.program
-    lipschitz = shared.chosen_lipschitz(options)
+    stops = shared.chosen_stops(options)
     word = options.word or BINARY64
     implementation = options.implementation or ("fortran" if word == BINARY64 else "python")
     shared.check_known("implementation", implementation, IMPLEMENTATIONS)
     checked_word(word, implementation)
     shared.check_outputs(options)
-    trajectory = run_program(
-        scene,
-        listing,
-        implementation,
-        lipschitz=lipschitz,
-        may_stop=not options.no_stop,
-        effort=shared.chosen_effort(options),
-        word=word,
-    )
+    effort = shared.chosen_effort(options)
+    trajectory = run_program(scene, listing, implementation, **stops, effort=effort, word=word)
     if options.attitude is not None:
         from pyharness.engine.from_rows import attitude_from_rows
 
@@ -182,15 +176,8 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
             )
         check_animation(options.animate, scene.changing or principal(scene)[0].moments)
         attitude = True
-    trajectory = solve(
-        scene,
-        times,
-        name,
-        tolerance,
-        effort=shared.chosen_effort(options),
-        attitude=attitude,
-        dense_output=options.animate is not None,
-    )
+    more: dict[str, Any] = {"attitude": attitude, "dense_output": options.animate is not None}
+    trajectory = solve(scene, times, name, tolerance, effort=shared.chosen_effort(options), **more)
     if options.animate is not None:
         trajectory.animate(options.animate)
     title = f"method {name}: {METHODS[name].title}"

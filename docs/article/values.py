@@ -21,8 +21,7 @@ from pyharness.engine.linearised import jacobians
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, largest
-from pyharness.history.claims.ledger import judgement, judgements
-from pyharness.history.claims.report import kinds_table
+from pyharness.history.claims.ledger import judgement, judgements, kinds_table
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.stories import prose
 from pyharness.history.identifiers import text_digest

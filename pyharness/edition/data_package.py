@@ -15,21 +15,23 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
-from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
-from pyharness.edition.crate import (
+from pyharness.edition.citation import (
     CRATE,
     KEPT,
     MANIFEST,
     PACKAGE_MARK,
     Part,
+    bibtex,
+    codemeta,
     crate_record,
+    data_description,
+    data_name,
     described,
 )
 from pyharness.edition.made_pages import table
 from pyharness.history import printed_page
 from pyharness.history.ablation import apparatus_report, case_truth, entries
-from pyharness.history.claims.ledger import judgements
-from pyharness.history.claims.report import claims_report
+from pyharness.history.claims.ledger import claims_report, judgements
 from pyharness.history.figures import curve_numbers, findings
 from pyharness.history.identifiers import (
     card_identifier,
@@ -65,14 +67,10 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     content = {each.path: each.content for each in parts}
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
-    mark = {
-        "schema": SCHEMAS["data package"],
-        "version": codemeta()["version"],
-        "text": text_digest(),
-        "data": data_identifier(),
-        # The manifest has this file's checksum, so that its identifier is not known here.
-        "files": {**listed, MANIFEST: None},
-    }
+    mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
+    # The manifest has this file's checksum, so that its identifier is not known here.
+    files = {**listed, MANIFEST: None}
+    mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
     # The form that `sha256sum -c` reads.
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
@@ -116,16 +114,12 @@ def _list_files(progress: Progress) -> Iterator[Part]:
 
 def _cards(program: str) -> bytes:
     found = deck(program)
-    rows = [
-        [
-            card.number, found.statement_kind(card), card.text.rstrip(), card.scan,
-            " ".join(card.entries),
-            *(" ".join(f"{place.file}:{place.line}" for place in places.get(card.number, ()))
-              for places in (found.port, found.twin)),
-            card_identifier(card),
-        ]
-        for card in found.cards.values()
-    ]  # fmt: skip
+    rows = []
+    for n, card in found.cards.items():
+        both = (places.get(n, ()) for places in (found.port, found.twin))
+        where = (" ".join(f"{each.file}:{each.line}" for each in places) for places in both)
+        ours = (n, found.statement_kind(card), card.text.rstrip(), card.scan)
+        rows.append([*ours, " ".join(card.entries), *where, card_identifier(card)])
     return csv_text(numbers(_COLUMNS, rows)).encode()
 
 
@@ -229,15 +223,10 @@ def machine_parts() -> Iterator[Part]:
     jobs = [*_jobs(texts)]
     yield from jobs
     yield described("judge", Path(printed_page.__file__).read_bytes())
-    readme = facts("machine")["readme"].format(
-        jobs=table(
-            "job | content",
-            [[f"`{each.path.removeprefix('machine/')}`", each.title] for each in jobs],
-        ).rstrip(),
-        pages=table("page | rows | printed by", [*_shared(texts, rows)]).rstrip(),
-        outcomes=outcomes_table(),
-    )
-    yield described("guide", readme.encode())
+    titles = [[f"`{each.path.removeprefix('machine/')}`", each.title] for each in jobs]
+    tables = {"jobs": table("job | content", titles).rstrip(), "outcomes": outcomes_table()}
+    tables["pages"] = table("page | rows | printed by", [*_shared(texts, rows)]).rstrip()
+    yield described("guide", facts("machine")["readme"].format(**tables).encode())
 
 
 def outcomes_table() -> str:

@@ -76,18 +76,12 @@ def card_record(card: Card) -> dict[str, Any]:
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
-    return {
-        "program": card.program,
-        "card": card.number,
-        "statement": card.statement,
-        "scan": scan,
-        "differences": [each._asdict() for each in card.differences],
-        "entries": list(card.entries),
-        "fortran": [each._asdict() for each in found.port.get(card.number, [])],
-        "twin": [each._asdict() for each in found.twin.get(card.number, [])],
-        "absent": found.absent.get(card.number),
-        "parallels": [each.name for each in parallels(card)],
-    }
+    differences = [each._asdict() for each in card.differences]
+    port, twin = ([x._asdict() for x in of.get(card.number, [])] for of in (found.port, found.twin))
+    about = {"program": card.program, "card": card.number, "statement": card.statement}
+    text = {"scan": scan, "differences": differences, "entries": list(card.entries)}
+    versions = {"fortran": port, "twin": twin, "absent": found.absent.get(card.number)}
+    return about | text | versions | {"parallels": [each.name for each in parallels(card)]}
 
 
 def scan_report(

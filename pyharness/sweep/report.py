@@ -105,17 +105,11 @@ def sweep_report(store: Store, outcome: Outcome, path: str) -> Report:
     if flags:
         text.append([Table(_FLAGS, flags)])
     counts = [{"reduction": name, "value": value, "scenes": n} for name, value, n in flags]
-    record = {
-        "name": sweep.name,
-        "store": path,
-        "sweep_sha256": sweep.fingerprint,
-        "scenes": sweep.n_scenes,
-        "chunks": sweep.n_chunks,
-        **{name: getattr(outcome, name) for name in ("computed", "repaired", "seconds")},
-        "axes": [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes],
-        "reductions": [each._asdict() for each in found],
-        "counts": counts,
-    }
+    record: dict[str, Any] = {"name": sweep.name, "store": path, "sweep_sha256": sweep.fingerprint}
+    record |= {"scenes": sweep.n_scenes, "chunks": sweep.n_chunks}
+    record |= {name: getattr(outcome, name) for name in ("computed", "repaired", "seconds")}
+    record["axes"] = [dict(zip(_AXIS_KEYS, row, strict=True)) for row in axes]
+    record |= {"reductions": [each._asdict() for each in found], "counts": counts}
     return Report("sweep", text, lambda: record, Table(_FOUND, found), text)
 
 

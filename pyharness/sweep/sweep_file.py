@@ -142,17 +142,13 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
     if not lipschitz >= 0.0:
         raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")
+    method = given.get("method", "auto") if program is None else None
     tolerance, t_end = given.get("tolerance"), given.get("t_end")
-    return Solver(
-        method=given.get("method", "auto") if program is None else None,
-        program=program,
-        tolerance=None if tolerance is None else number("[solve] tolerance", tolerance),
-        t_end=None if t_end is None else finite("[solve] t_end", t_end),
-        listing=given.get("listing", "original"),
-        reading=given.get("reading", "adopted"),
-        lipschitz=lipschitz,
-        may_stop=boolean("[solve] may_stop", given.get("may_stop", True)),
-    )
+    tolerance = None if tolerance is None else number("[solve] tolerance", tolerance)
+    t_end = None if t_end is None else finite("[solve] t_end", t_end)
+    listing, reading = given.get("listing", "original"), given.get("reading", "adopted")
+    may_stop = boolean("[solve] may_stop", given.get("may_stop", True))
+    return Solver(method, program, tolerance, t_end, listing, reading, lipschitz, may_stop)
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:

@@ -3,8 +3,15 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.claims.ledger import assignments, claim, claims, judgement
-from pyharness.history.claims.report import assignments_report, claims_report, explanation
+from pyharness.history.claims.ledger import (
+    assignments,
+    assignments_report,
+    claim,
+    claims,
+    claims_report,
+    explanation,
+    judgement,
+)
 from pyharness.model.errors import InputError
 from pyharness.thesis.programs import BINARY64, WORD_NAMES
 

@@ -15,14 +15,13 @@ import numpy as np
 from pyharness.checks.compare.comparison import compare_programs
 from pyharness.checks.compare.findings import Comparison, ProgramFinding
 from pyharness.edition import ledger, story
+from pyharness.edition.data_package import FAULTS_CASE
 from pyharness.edition.decks import TITLES
-from pyharness.edition.package_runs import FAULTS_CASE
 from pyharness.engine.linearised import jacobians
 from pyharness.history.ablation import CaseEffects, effects_of, entries, entry
 from pyharness.history.cards_report import scan_report
 from pyharness.history.claims.laboratory import Assumptions, Laboratory, largest
-from pyharness.history.claims.ledger import judgement, judgements
-from pyharness.history.claims.report import kinds_table
+from pyharness.history.claims.ledger import judgement, judgements, kinds_table
 from pyharness.history.claims.rules import COLLOCATION
 from pyharness.history.claims.stories import prose
 from pyharness.history.identifiers import text_digest

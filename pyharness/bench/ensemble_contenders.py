@@ -61,7 +61,7 @@ class EnsembleLoad:
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
         """Return the load of the bodies in `rows`."""
         given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
-        own: dict[str, Any] = {}
+        own: dict[str, Any]
         own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}
         return replace(self, **own)
 
@@ -113,10 +113,8 @@ def draw(seed: str, n: int) -> list[EnsembleLoad]:
     source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)
-    return [
-        EnsembleLoad("no torque", omega0, None),
-        EnsembleLoad("constant torque, each its own", omega0, torque),
-    ]
+    pushed = EnsembleLoad("constant torque, each its own", omega0, torque)
+    return [EnsembleLoad("no torque", omega0, None), pushed]
 
 
 def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
@@ -129,12 +127,11 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 def own_ensembles() -> list[EnsembleContender]:
     """Return our contenders: the closed form, the Taylor method and RK4."""
+    one, closed = EnsembleContender, _make_own("closed-form")
     return [
-        EnsembleContender(
-            "closed-form", "none", _make_own("closed-form"), torque_free=True, attitude=True
-        ),
-        EnsembleContender("taylor", "tolerance", _make_own("taylor"), attitude=True),
-        EnsembleContender("rk4", "steps", _make_own("rk4")),
+        one("closed-form", "none", closed, torque_free=True, attitude=True),
+        one("taylor", "tolerance", _make_own("taylor"), attitude=True),
+        one("rk4", "steps", _make_own("rk4")),
     ]
 
 

@@ -14,12 +14,13 @@ import numpy as np
 from pyharness.bench.contenders import refuse_rounding
 from pyharness.bench.ensemble_contenders import (
     HORIZON,
+    MOMENTS,
     EnsembleContender,
     EnsembleLoad,
     coefficients,
 )
 from pyharness.bench.peers import heyoka_equations
-from pyharness.model.attitude import quaternion_rates
+from pyharness.model.attitude import IDENTITY
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
@@ -115,17 +116,11 @@ def _integrator(
     """Return a compiled integrator of `size` bodies, of `scene` or of the benchmark."""
     import heyoka
 
-    x, y, z = heyoka.make_vars("x", "y", "z")
-    a, b, c = coefficients()
-    rates = [a * y * z, b * x * z, c * x * y]
-    if with_torque:
-        rates = [rate + heyoka.par[axis] for axis, rate in enumerate(rates)]
-    equations = list(zip((x, y, z), rates, strict=True))
-    if with_attitude:
-        q = heyoka.make_vars("q0", "q1", "q2", "q3")
-        equations += zip(q, quaternion_rates((x, y, z), q), strict=True)
-    if scene is not None:
-        equations = heyoka_equations(scene)
+    attitude = IDENTITY if with_attitude else None
+    equations = heyoka_equations(scene or Scene("", (0.0, 0.0, 0.0), MOMENTS, attitude=attitude))
+    if scene is None and with_torque:
+        for axis, (component, rate) in enumerate(equations[:3]):
+            equations[axis] = component, rate + heyoka.par[axis]
     start = np.ones((len(equations), size))
     return heyoka.taylor_adaptive_batch(equations, start, tol=tolerance, compact_mode=False)
 
@@ -282,9 +277,7 @@ def _numba_kernels() -> tuple[Any, Any]:
             for _ in range(steps):
                 for i in range(LANES):
                     x, y, z = step(w[0, i], w[1, i], w[2, i], m[0, i], m[1, i], m[2, i], a, b, c, h)
-                    w[0, i] = x
-                    w[1, i] = y
-                    w[2, i] = z
+                    w[0, i], w[1, i], w[2, i] = x, y, z
             for i in range(there):
                 for k in range(3):
                     ends[first + i, k] = w[k, i]

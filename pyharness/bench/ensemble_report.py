@@ -7,7 +7,7 @@ from operator import attrgetter
 from typing import Any
 
 from pyharness.bench.ensemble_measure import STEPS, Memory, Rate, Rates, Size
-from pyharness.bench.report import grouped, measured_report
+from pyharness.bench.report import grouped, measured_report, power
 from pyharness.model.report import Column, Picture, Report, Table, digits, numbers, short
 
 _DRIFT = (
@@ -85,7 +85,7 @@ def _make_tables(found: Ensembles) -> list[tuple[str, Table]]:
 def _setting(value: float | None) -> str:
     if value is None:
         return "-"
-    return f"{value:.0f} steps" if value > 1.0 else f"{value:.0e}".replace("e-0", "e-")
+    return f"{value:.0f} steps" if value > 1.0 else power(value)
 
 
 def _ratio(value: float | None) -> str:
@@ -113,20 +113,15 @@ def _data(rates: Rates) -> Table:
 
 
 def _record(found: Ensembles) -> dict[str, Any]:
-    return {
-        "seed": found.rates.seed,
-        "bodies": found.rates.bodies,
-        "rows": [
-            asdict(row) | {"bodies_a_second": row.bodies_a_second, "note": row.note or None}
-            for row in found.rates.rows
-        ],
-        "refused": [
-            {"place": place or None, "method": name, "reason": why}
-            for place, name, why in found.rates.refused
-        ],
-        "growth": [asdict(each) for each in found.sizes],
-        "memory": [asdict(each) | {"ratio": each.ratio} for each in found.memory],
-    }
+    rates, rows, refused = found.rates, [], []
+    for row in rates.rows:
+        more = {"bodies_a_second": row.bodies_a_second, "note": row.note or None}
+        rows.append(asdict(row) | more)
+    for place, name, why in rates.refused:
+        refused.append({"place": place or None, "method": name, "reason": why})
+    memory = [asdict(each) | {"ratio": each.ratio} for each in found.memory]
+    told = {"seed": rates.seed, "bodies": rates.bodies, "rows": rows, "refused": refused}
+    return told | {"growth": list(map(asdict, found.sizes)), "memory": memory}
 
 
 def size_picture(sizes: Sequence[Size]) -> Picture:

@@ -148,10 +148,8 @@ def workloads(
         asked += [(n, LONG_HORIZON) for n in cases if n in long]
     marks = {HORIZON: "", LONG_HORIZON: "L"}
     start = IDENTITY if attitude else None
-    return [
-        Workload(f"{n}{marks.get(t, f' T={t:g}')}", replace(case_scene(n), attitude=start), t)
-        for n, t in asked
-    ]
+    scenes = {n: replace(case_scene(n), attitude=start) for n in cases}
+    return [Workload(f"{n}{marks.get(t, f' T={t:g}')}", scenes[n], t) for n, t in asked]
 
 
 def measure(

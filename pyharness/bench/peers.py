@@ -297,23 +297,18 @@ def steps_source(scene: Scene, formula: Tableau) -> str:
     omega at the end.
     """
     stages, weights, nodes = formula
-    lines = [
-        "def function(omega0, t_end, steps, omega):",
-        "    h = t_end / steps",
-        "    x, y, z = omega0[0], omega0[1], omega0[2]",
-        "    for step in range(steps):",
-        "        t = step * h",
-    ]
+    step = ["t = step * h"]
     for i, row in enumerate(stages):
-        for name in "xyz":
-            lines.append(f"        {name}s = {name}{_increment(row, name)}")
+        step += [f"{name}s = {name}{_increment(row, name)}" for name in "xyz"]
         time = f"t + {nodes[i]!r} * h" if nodes[i] else "t"
-        for name, rate in zip("xyz", rates(scene, time, ("xs", "ys", "zs")), strict=True):
-            lines.append(f"        k{name}{i} = {rate}")
-    for name in "xyz":
-        lines.append(f"        {name} = {name}{_increment(weights, name)}")
-    lines.append("    omega[0], omega[1], omega[2] = x, y, z")
-    return "\n".join(lines) + "\n"
+        found = zip("xyz", rates(scene, time, ("xs", "ys", "zs")), strict=True)
+        step += [f"k{name}{i} = {rate}" for name, rate in found]
+    step += [f"{name} = {name}{_increment(weights, name)}" for name in "xyz"]
+    start = "h = t_end / steps", "x, y, z = omega0[0], omega0[1], omega0[2]"
+    lines = (*start, "for step in range(steps):", *(f"    {line}" for line in step))
+    body = (*lines, "omega[0], omega[1], omega[2] = x, y, z")
+    head = "def function(omega0, t_end, steps, omega):\n"
+    return head + "".join(f"    {line}\n" for line in body)
 
 
 def _increment(factors: Sequence[float], name: str) -> str:

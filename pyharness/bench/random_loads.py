@@ -26,24 +26,12 @@ WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
 LAWS = ("no torque", "constant torque", "ramp", *WAVES)
 # Ranges of the frequencies of waves, relative to the initial |omega|.
 SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
-# Moments in an arbitrary unit, from a random generator.
+# Moments in an arbitrary unit, from a random generator x.
 BODIES: dict[str, Callable[[Random], list[float]]] = {
-    "compact": lambda source: [source.uniform(2.0, 3.0) for _ in range(3)],
-    "flat": lambda source: [
-        a := source.uniform(1.0, 3.0),
-        b := source.uniform(1.0, 3.0),
-        (a + b) * source.uniform(0.95, 1.0),
-    ],
-    "needle-like": lambda source: [
-        low := source.uniform(0.01, 0.1),
-        1.0,
-        1.0 + low * source.uniform(0.0, 1.0),
-    ],
-    "nearly symmetric": lambda source: [
-        1.0,
-        1.0 + _log(source, 1e-6, 1e-2),
-        source.uniform(0.2, 1.9),
-    ],
+    "compact": lambda x: [x.uniform(2.0, 3.0) for _ in range(3)],
+    "flat": lambda x: _flat(x, x.uniform(1.0, 3.0), x.uniform(1.0, 3.0)),
+    "needle-like": lambda x: [low := x.uniform(0.01, 0.1), 1.0, 1.0 + low * x.uniform(0.0, 1.0)],
+    "nearly symmetric": lambda x: [1.0, 1.0 + _log(x, 1e-6, 1e-2), x.uniform(0.2, 1.9)],
 }
 MOST_GROWTH = 1e3  # limit of the error amplification of an accepted scene
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
@@ -126,6 +114,10 @@ def by_torque(source: Random, name: str, law: str, speed: str, body: str) -> tup
         sines = source.randint(0, len(waves))
         found = TorqueLaw(sines=waves[:sines], cosines=waves[sines:])
     return Scene(name, omega, moments, torque=found), horizon
+
+
+def _flat(source: Random, a: float, b: float) -> list[float]:
+    return [a, b, (a + b) * source.uniform(0.95, 1.0)]
 
 
 def _log(source: Random, low: float, high: float) -> float:

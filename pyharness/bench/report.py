@@ -6,6 +6,7 @@ A ratio is the run time of the baseline solver divided by that of another, at eq
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -47,26 +48,16 @@ def measured_report(
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
-    versions = [
-        *here.items(),
-        ("pyharness", built.version),
-        ("Fortran compiler", f"{built.compiler}, {built.flags}"),
-        ("Python", built.python),
-        ("NumPy", built.numpy),
-        ("SciPy", built.scipy),
-        ("platform", built.platform),
-    ]
+    compiler = f"{built.compiler}, {built.flags}"
+    versions = [*here.items(), ("pyharness", built.version), ("Fortran compiler", compiler)]
+    names = ("Python", "NumPy", "SciPy", "platform")
+    versions += [(name, getattr(built, name.lower())) for name in names]
     mark = "#" + title.split()[0]
     tables: list[Section] = [[Line(f"{mark} {head}"), table] for head, table in parts]
-    page: list[Section] = [
-        [Line(title)],
-        [Line(f"Made by `{command}`; run that again to have it for another machine.")],
-        [Line(worth)],
-        [Table((Column(""), Column("version")), versions)],
-        *tables,
-        [Line(f"{mark} Notes")],
-        [Line(f"- {line}") for line in notes],
-    ]
+    made = f"Made by `{command}`; run that again to have it for another machine."
+    page: list[Section] = [[Line(told)] for told in (title, made, worth)]
+    page += [[Table((Column(""), Column("version")), versions)], *tables]
+    page += [[Line(f"{mark} Notes")], [Line(f"- {line}") for line in notes]]
     about = {"machine": here, "build": asdict(built)}
     return found._replace(record=lambda: found.record() | about, page=page)
 
@@ -96,13 +87,10 @@ def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Rep
     """
     drawn, data = _random(finding), _data(finding)
     title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
-    found = Report(
-        "bench",
-        [*(_spread_parts if drawn else _make_tables)(finding), _notes(finding)],
-        lambda: _record(finding),
-        _spread_data(finding) if drawn else data,
-        pictures={"precision": lambda: bench_picture(finding, data)},
-    )
+    text = [*(_spread_parts if drawn else _make_tables)(finding), _notes(finding)]
+    shown = _spread_data(finding) if drawn else data
+    pictures = {"precision": partial(bench_picture, finding, data)}
+    found = Report("bench", text, partial(_record, finding), shown, pictures=pictures)
     return measured_report(title, _DRIFT, found, packages, command)
 
 
@@ -125,7 +113,7 @@ def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
         title = f"{yardstick(finding)} time / time of {each.method}, at errors of "
         scenes = f"{each.reached} of {each.scenes}"
         row = [each.kind, scenes, each.mean, each.smallest, *each.quartiles]
-        tables.setdefault(title + _power(each.target), []).append(row)
+        tables.setdefault(title + power(each.target), []).append(row)
     return [(title, Table(columns, rows)) for title, rows in tables.items()]
 
 
@@ -174,16 +162,15 @@ def growth_report(found: Mapping[int, Sequence[Growth]]) -> Report:
 
 def _record(finding: Finding) -> dict[str, Any]:
     drawn = _random(finding)
+    rows, what = [], "scene" if drawn else "case"
+    for row in finding.rows:
+        own = {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
+        rows.append(_settings_of(row) | own | {"note": row.note or None})
     found: dict[str, Any] = {
-        "rows": [
-            _settings_of(row)
-            | {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
-            | {"note": row.note or None}
-            for row in finding.rows
-        ],
+        "rows": rows,
         "refused": [_settings_of(each) | {"reason": each.reason} for each in finding.refused],
         "compile_seconds": [
-            {"scene" if drawn else "case": place, "method": method, "seconds": seconds}
+            {what: place, "method": method, "seconds": seconds}
             for (place, method), seconds in finding.preparation.items()
         ],
         "reference_error": finding.doubt,
@@ -192,11 +179,9 @@ def _record(finding: Finding) -> dict[str, Any]:
     }
     if drawn:
         found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
-        found["scenes"] = [
-            {"scene": load.scene.name}
-            | {name: getattr(load, name) for name in ("kinds", "growth", "turns")}
-            for load in finding.workloads
-        ]
+        scenes = attrgetter("scene.name", "kinds", "growth", "turns")
+        names = ("scene", "kinds", "growth", "turns")
+        found["scenes"] = [dict(zip(names, scenes(x), strict=True)) for x in finding.workloads]
     return found
 
 
@@ -225,7 +210,7 @@ def ratio(value: float | None) -> str:
 
 
 def _make_tables(finding: Finding) -> list[tuple[str, Table]]:
-    targets = list(map(_power, TARGETS))
+    targets = list(map(power, TARGETS))
     columns = [Column("us per solve to", left=True)]
     for name in targets:
         columns += [Column(name, microseconds, unit="s"), Column("ratio", ratio)]
@@ -261,7 +246,8 @@ def _of_the_reference(finding: Finding, load: Workload) -> str:
     return f", error of the reference at most {text}{warning}"
 
 
-def _power(target: float) -> str:
+def power(target: float) -> str:
+    """Return a power of ten as text, such as 1e-6."""
     return f"{target:.0e}".replace("e-0", "e-")
 
 

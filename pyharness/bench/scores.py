@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -64,6 +65,10 @@ def scores(finding: Finding, load: Workload, targets: Sequence[float] = TARGETS)
     return found
 
 
+def _ratios(finding: Finding, load: Workload) -> dict[str, tuple[float | None, ...]]:
+    return {each.method: each.ratios for each in scores(finding, load)}
+
+
 def groups(finding: Finding) -> dict[str, list[Workload]]:
     """Return the groups of workloads by name, ordered by end time and name."""
     found: dict[str, list[Workload]] = {}
@@ -77,7 +82,7 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
     A mean is None if the contender or the baseline misses the error on a workload.
     """
-    tables = [{each.method: each.ratios for each in scores(finding, load)} for load in loads]
+    tables = [_ratios(finding, load) for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)
     nowhere = (None,) * len(TARGETS)
     found = {}
@@ -89,19 +94,14 @@ def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float |
 
 def spreads(finding: Finding, kinds: Sequence[str]) -> list[Spread]:
     """Return the distributions of ratios by contender, error and kind, without the baseline."""
-    tables = {
-        load.label: {each.method: each.ratios for each in scores(finding, load)}
-        for load in finding.workloads
-    }
+    tables = {load.label: _ratios(finding, load) for load in finding.workloads}
     names = dict.fromkeys(name for table in tables.values() for name in table)
-    return [
-        _spread(name, kind, place, [tables[load.label].get(name) for load in loads])
-        for name in names
-        if name != yardstick(finding)
-        for place in range(len(TARGETS))
-        for kind in kinds
-        if (loads := [load for load in finding.workloads if kind in load.kinds])
-    ]
+    first, found = yardstick(finding), []
+    for name, place, kind in product(names, range(len(TARGETS)), kinds):
+        tables_of = [tables[load.label] for load in finding.workloads if kind in load.kinds]
+        if tables_of and name != first:
+            found.append(_spread(name, kind, place, [each.get(name) for each in tables_of]))
+    return found
 
 
 def _spread(
@@ -116,12 +116,8 @@ def _spread(
 
 
 def _time_to(rows: Sequence[Row], target: float) -> float | None:
-    times = [
-        row.seconds
-        for row in rows
-        if row.error is not None and row.seconds is not None and row.error <= target
-    ]
-    return min(times, default=None)
+    reaching = [row for row in rows if row.error is not None and row.error <= target]
+    return min((row.seconds for row in reaching if row.seconds is not None), default=None)
 
 
 def _ratio(by: float | None, seconds: float | None) -> float | None:

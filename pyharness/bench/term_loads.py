@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -88,12 +89,8 @@ def term_scenes() -> list[TermScene]:
         "magnetic damping": (field_terms.magnetic_damping(_COILS, _FIELD), _magnetic_damping),
         "in_space": (field_terms.in_space(_PUSH), _in_space),
     }
-    found = [
-        TermScene(READY, _scene(name, torque), formula) for name, (torque, formula) in ready.items()
-    ]
-    return found + [
-        TermScene(EXPRESSION, _scene(name, torque)) for name, torque in EXPRESSIONS.items()
-    ]
+    found = [TermScene(READY, _scene(name, x), formula) for name, (x, formula) in ready.items()]
+    return found + [TermScene(EXPRESSION, _scene(*each)) for each in EXPRESSIONS.items()]
 
 
 def _scene(name: str, torque: Any) -> Scene:
@@ -103,14 +100,12 @@ def _scene(name: str, torque: Any) -> Scene:
 
 def term_loads(scenes: Sequence[TermScene]) -> list[Workload]:
     """Return a workload for each scene and end time."""
-    return [
-        Workload(
-            each.scene.name, each.scene, time, (each.kind,), reference(each.scene, [time]),
-            scale=max(map(abs, each.scene.omega)),
-        )
-        for each in scenes
-        for time in HORIZONS
-    ]  # fmt: skip
+    found = []
+    for each, time in product(scenes, HORIZONS):
+        scene, scale = each.scene, max(map(abs, each.scene.omega))
+        truth = reference(scene, [time])
+        found.append(Workload(scene.name, scene, time, (each.kind,), truth, scale=scale))
+    return found
 
 
 def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodies]:
@@ -118,9 +113,8 @@ def term_bodies(scenes: Sequence[TermScene], seed: str, n: int) -> list[TermBodi
     source = text_generator(f"terms/{seed}")
     omega0 = np.array(_OMEGA) + source.uniform(-_SPREAD, _SPREAD, (n, 3))
     horizon = HORIZONS[0]
-    return [
-        TermBodies(each.scene.name, omega0, None, each.scene, horizon=horizon) for each in scenes
-    ]
+    of = (each.scene for each in scenes)
+    return [TermBodies(scene.name, omega0, None, scene, horizon=horizon) for scene in of]
 
 
 def _wind(t: Any, w: Any, q: Any) -> Any:
@@ -167,14 +161,13 @@ def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
 def _about_body(vector: Sequence[Any], q: Sequence[Any]) -> list[Any]:
     """Return R^T times a vector, where R rotates from body to space."""
     a, b, c, d = q
+    x, y, z = vector
     rows = [
         [1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
         [2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)],
         [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)],
     ]
-    return [
-        rows[0][i] * vector[0] + rows[1][i] * vector[1] + rows[2][i] * vector[2] for i in range(3)
-    ]
+    return [first * x + second * y + third * z for first, second, third in zip(*rows, strict=True)]
 
 
 def _damping(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
@@ -222,11 +215,8 @@ def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
 
 def term_methods() -> list[SceneContender]:
     """Return our contender for single bodies, `auto`, without coarse tolerances."""
-    return [
-        replace(each, settings=_TOLERANCES[:-1])
-        for each in list_own_contenders()
-        if each.name == OURS
-    ]
+    own = (each for each in list_own_contenders() if each.name == OURS)
+    return [replace(each, settings=_TOLERANCES[:-1]) for each in own]
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:

@@ -14,7 +14,14 @@ from typing import Any
 from pyharness.bench.ensemble_measure import TARGETS as BODY_TARGETS
 from pyharness.bench.ensemble_measure import Rate, Rates
 from pyharness.bench.measure import Finding, Row, Workload
-from pyharness.bench.report import grouped, measured_report, microseconds, not_measured, ratio
+from pyharness.bench.report import (
+    grouped,
+    measured_report,
+    microseconds,
+    not_measured,
+    power,
+    ratio,
+)
 from pyharness.bench.scores import geometric_mean, scores
 from pyharness.bench.term_loads import (
     DOP853,
@@ -195,7 +202,7 @@ def _many_table(found: Terms, names: Sequence[str]) -> Table:
 
 
 def _target(target: float | None) -> str:
-    return "all" if target is None else f"{target:.0e}".replace("e-0", "e-")
+    return "all" if target is None else power(target)
 
 
 def _milliseconds(seconds: float | None) -> str:
@@ -256,22 +263,18 @@ def _data(found: Terms) -> Table:
 
 
 def _record(found: Terms) -> dict[str, Any]:
-    table = _data(found)
+    table, many = _data(found), found.many
     names = [each.head for each in table.columns]
-    return {
-        "rows": [dict(zip(names, row, strict=True)) | {"note": row[-1] or None}
-                 for row in table.rows],
-        "refused": [
-            {"torque": each.workload.label, "horizon": each.workload.horizon, "bodies": 1,
-             "method": each.method, "setting": each.setting, "reason": each.reason}
-            for each in found.single.refused
-        ] + [
-            {"torque": place or None, "horizon": HORIZONS[0], "bodies": found.many.bodies,
-             "method": name, "setting": None, "reason": why}
-            for place, name, why in found.many.refused
-        ],
-        "means": [asdict(each) for each in summaries(found)],
-        "reference_error": found.single.doubt,
-        "seed": found.many.seed,
-        "bodies": found.many.bodies,
-    }  # fmt: skip
+    rows = [dict(zip(names, row, strict=True)) | {"note": row[-1] or None} for row in table.rows]
+    values = attrgetter("workload.label", "workload.horizon", "method", "setting", "reason")
+    missed: list[tuple[Any, ...]] = [(1, *values(each)) for each in found.single.refused]
+    for place, name, why in many.refused:
+        missed.append((many.bodies, place or None, HORIZONS[0], name, None, why))
+    refused = []
+    for bodies, torque, horizon, method, setting, reason in missed:
+        where = {"torque": torque, "horizon": horizon, "bodies": bodies}
+        refused.append(where | {"method": method, "setting": setting, "reason": reason})
+    told: dict[str, Any] = {"rows": rows, "refused": refused}
+    told["means"] = list(map(asdict, summaries(found)))
+    told |= {"reference_error": found.single.doubt, "seed": many.seed, "bodies": many.bodies}
+    return told

@@ -45,8 +45,8 @@ def check_port(options: argparse.Namespace, programs: Sequence[str], cases: Sequ
         shared.progress(len(checks), len(cells), check.id)
     if checks[0].value is None:
         refuse_integrator(options.port)
-    shared.show(port_report(options.port, checks, len(cells), used if drawn else ""), options)
-    return 0 if all(check.passed for check in checks) else 1
+    report = port_report(options.port, checks, len(cells), used if drawn else "")
+    return shared.show(report, options, failed=not all(check.passed for check in checks))
 
 
 def _port_self_test(options: argparse.Namespace, cells: Sequence[Cell]) -> int:
@@ -90,8 +90,8 @@ def check_integrator(options: argparse.Namespace) -> int:
         refuse_port(command)
     from pyharness.checks.integrators.report import integrator_report
 
-    shared.show(integrator_report(found, seed), options)
-    return 0 if all(check.passed for check in found.checks) else 1
+    failed = not all(check.passed for check in found.checks)
+    return shared.show(integrator_report(found, seed), options, failed=failed)
 
 
 def _check_names(names: list[str]) -> None:
@@ -134,5 +134,5 @@ def show_self_test(
         shared.progress(len(found), count + 1, each.check.id)
     if not found[0].passed:
         refuse()
-    shared.show(self_test_report(title, found, again, **extra), options)
-    return 0 if all(each.passed for each in found) else 1
+    report = self_test_report(title, found, again, **extra)
+    return shared.show(report, options, failed=not all(each.passed for each in found))

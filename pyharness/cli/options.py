@@ -197,16 +197,16 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
     Warn of readings and conjectures without effect.
     """
     chosen_programs(options)
-    listing = subset(
-        options.program,
-        options.listing,
-        names(options.fix),
-        keep=names(options.keep),
-        readings=names(options.reading),
-        conjectures=None if options.conjecture is None else names(options.conjecture),
-    )
+    listing = subset(options.program, options.listing, **changes_of(options))
     tell_inactive(options, [listing])
     return listing
+
+
+def changes_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the names in --fix, --keep, --reading and --conjecture."""
+    found = {"fix": options.fix, "keep": options.keep, "readings": options.reading}
+    assumed = None if options.conjecture is None else names(options.conjecture)
+    return {**{each: names(text) for each, text in found.items()}, "conjectures": assumed}
 
 
 def tell_inactive(options: argparse.Namespace, listings: Iterable[Listing]) -> None:
@@ -225,13 +225,14 @@ def listing_text(listing: Listing) -> str:
     return f"{listing.label} listing: {active}{''.join(told)}"
 
 
-def chosen_lipschitz(options: argparse.Namespace) -> float:
-    """Return the stop test's limit (1/s), by default 500 as on the cards."""
+def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the stop test's limit (1/s), by default 500 as on the cards, and if it may stop."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
         refuse(options, "--no-stop", ("lipschitz",))
-    return positive(options.lipschitz, "--lipschitz", facts("cases")["deck"]["lipschitz"])
+    limit = positive(options.lipschitz, "--lipschitz", facts("cases")["deck"]["lipschitz"])
+    return {"lipschitz": limit, "may_stop": not options.no_stop}
 
 
 def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
@@ -309,11 +310,8 @@ def chosen_count(text: str | None, option: str, default: int, least: int, cost: 
         )
     seconds = count * cost.seconds
     if seconds > _WORTH_SAYING:
-        memory = max(1.0, count * cost.n_bytes / 1e6)
-        say(
-            f"pyharness: {count} {cost.what} take about {format_duration(seconds)} and "
-            f"{memory:.0f} MB of memory\n"
-        )
+        took, memory = format_duration(seconds), max(1.0, count * cost.n_bytes / 1e6)
+        say(f"pyharness: {count} {cost.what} take about {took} and {memory:.0f} MB of memory\n")
     return count
 
 

@@ -56,16 +56,11 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
         add("Returns", result.return_name, result.type_name, result.description)
     for error in told.raises:
         add("Raises", None, error.type_name, error.description)
-    return Entry(
-        name,
-        f"{of_class}.{name}" if of_class else name,
-        "class" if inspect.isclass(of) else "function",
-        _signature(of),
-        _line(told.short_description),
-        [_line(part) for part in (told.long_description or "").split("\n\n") if part],
-        list(groups.items()),
-        list(_methods(name, of)) if inspect.isclass(of) else [],
-    )
+    anchor = f"{of_class}.{name}" if of_class else name
+    summary, is_class = _line(told.short_description), inspect.isclass(of)
+    text = [_line(part) for part in (told.long_description or "").split("\n\n") if part]
+    kind, methods = ("class", list(_methods(name, of))) if is_class else ("function", [])
+    return Entry(name, anchor, kind, _signature(of), summary, text, [*groups.items()], methods)
 
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:

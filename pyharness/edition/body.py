@@ -54,16 +54,11 @@ def context() -> dict[str, Any]:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(PROGRAM, {})
-    return {
-        "data": data(),
-        "first": first,
-        "flip": float(flip_times(first.moments or (), first.omega)[0]),
-        "case_4_flip": float(flip_times(case_scene(4).moments or (), case_scene(4).omega)[0]),
-        "program": PROGRAM,
-        "output": printed.getvalue(),
-        "agreement": AGREEMENT,
-        "speeds": SPEEDS,
-    }
+    flips = [float(flip_times(x.moments or (), x.omega)[0]) for x in (first, case_scene(4))]
+    times = dict(zip(("flip", "case_4_flip"), flips, strict=True))
+    shown = {"program": PROGRAM, "output": printed.getvalue()}
+    limits = {"agreement": AGREEMENT, "speeds": SPEEDS}
+    return {"data": data(), "first": first} | times | shown | limits
 
 
 def data() -> dict[str, Any]:
@@ -72,18 +67,15 @@ def data() -> dict[str, Any]:
     Moments are in kg m2, omegas in rad/s; a body of the thesis has its case number.
     """
     known = facts("bodies")
-    cases = [
-        {"id": f"case-{number}", "title": f"Case {number}: {scene.name}", "case": number,
-         "moments": scene.moments, "omega": scene.omega}
-        for number in known["cases"]
-        for scene in [case_scene(number)]
-    ]  # fmt: skip
-    boxes = [
-        {"id": each["id"], "title": each["title"], "case": None,
-         "moments": moments_of_box(each["edges"], each["mass"]), "omega": each["omega"]}
-        for each in known["body"]
-    ]  # fmt: skip
-    return {"bodies": [*boxes, *cases], "first": known["first"], "longest": known["longest"]}
+    bodies: list[dict[str, Any]] = []
+    for each in known["body"]:
+        moments = moments_of_box(each["edges"], each["mass"])
+        named = {"id": each["id"], "title": each["title"], "case": None}
+        bodies.append(named | {"moments": moments, "omega": each["omega"]})
+    for number, scene in zip(known["cases"], map(case_scene, known["cases"]), strict=True):
+        named = {"id": f"case-{number}", "title": f"Case {number}: {scene.name}", "case": number}
+        bodies.append(named | {"moments": scene.moments, "omega": scene.omega})
+    return {"bodies": bodies, "first": known["first"], "longest": known["longest"]}
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
@@ -139,10 +131,8 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
     ellipsoid = [length * each for length, each in zip(size, ball, strict=True)]
     axes.plot_wireframe(*ellipsoid, color="0.8", linewidth=0.4)
     axes.plot(*found.omega.T, color="black", linewidth=1.5)
-    axes.set(
-        title="polhode",
-        **{f"{name}lim": (-length, length) for name, length in zip("xyz", size, strict=True)},
-    )
+    limits = {f"{name}lim": (-length, length) for name, length in zip("xyz", size, strict=True)}
+    axes.set(title="polhode", **limits)
     axes.set_box_aspect(size, zoom=1.2)
     axes.view_init(elev=24.0, azim=-30.0)
     axes.set_axis_off()

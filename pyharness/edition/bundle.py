@@ -65,16 +65,10 @@ def _add(
     if unknown is not None:
         shown = unknown[0].strip()
         raise _error(path, body, unknown.start(), f"a form that is not known: {shown}")
-    number = len(exports)
+    parts += [f"// {path.parent.name}/{path.name}", f"const module{len(exports)} = (() => {{"]
+    parts.append(_COMMENT.sub("", body).rstrip())
+    parts += [f"return {{ {', '.join(names)} }};", "})();", ""]
     exports[path] = names
-    parts += [
-        f"// {path.parent.name}/{path.name}",
-        f"const module{number} = (() => {{",
-        _COMMENT.sub("", body).rstrip(),
-        f"return {{ {', '.join(names)} }};",
-        "})();",
-        "",
-    ]
 
 
 def _error(path: Path, text: str, start: int, what: str) -> ValueError:

@@ -1,10 +1,13 @@
-"""The citation of edition and thesis, from `codemeta.json`."""
+"""The citation of edition and thesis, from `codemeta.json`, and the RO-Crate 1.1 of the data."""
 
 import json
+import tomllib
+from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from pyharness.history.identifiers import data_identifier, text_digest
+from pyharness.history.identifiers import content_identifier, data_identifier, text_digest
 from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 
@@ -64,22 +67,13 @@ def bibtex(place: str = "", path: str = "") -> str:
     version, thesis = described["version"], described["referencePublication"]
     year, _, month = thesis["datePublished"].partition("-")
     where = {"url" if address() else "howpublished": address() + path} if address() or path else {}
-    edition = {
-        "author": " and ".join(f"{{{each['name']}}}" for each in described["author"]),
-        "title": f"{{{_title(place)}}}",
-        "year": release_date()[:4],
-        "version": version,
-        **where,
-        "note": f"Version {version}; text {text_digest()}; data {data_identifier()}",
-    }
-    printed = {
-        "author": _authors(thesis),
-        "title": f"{{{thesis['name']}}}",
-        "institution": thesis["publisher"]["name"],
-        "year": year,
-        "month": str(int(month)),
-        "note": f"{thesis['description']}. {_NO_NUMBER}",
-    }
+    authors = " and ".join(f"{{{each['name']}}}" for each in described["author"])
+    about = {"title": f"{{{_title(place)}}}", "year": release_date()[:4], "version": version}
+    note = f"Version {version}; text {text_digest()}; data {data_identifier()}"
+    edition = {"author": authors, **about, **where, "note": note}
+    printed = {"author": _authors(thesis), "title": f"{{{thesis['name']}}}"}
+    printed |= {"institution": thesis["publisher"]["name"], "year": year, "month": str(int(month))}
+    printed["note"] = f"{thesis['description']}. {_NO_NUMBER}"
     entries = (("misc", f"pyharness-{version}", edition), ("techreport", "jacobs-1982", printed))
     return "\n".join(_entry(kind, key, fields) for kind, key, fields in entries)
 
@@ -88,30 +82,17 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
     """Return the records of `bibtex` in the Citation Style Language (CSL-JSON)."""
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
-    issued = [[int(part) for part in release_date().split("-")]]
-    printed = [[int(part) for part in thesis["datePublished"].split("-")]]
-    edition = {
-        "id": f"pyharness-{version}",
-        "type": "webpage",
-        "title": _title(place),
-        "author": [{"literal": each["name"]} for each in described["author"]],
-        "issued": {"date-parts": issued},
-        "version": version,
-        **({"URL": address() + path} if address() else {"section": path} if path else {}),
-        "note": f"text {text_digest()}; data {data_identifier()}",
-    }
-    names = [
-        {"family": each["familyName"], "given": each["givenName"]} for each in thesis["author"]
-    ]
-    report = {
-        "id": "jacobs-1982",
-        "type": "report",
-        "title": thesis["name"],
-        "author": names,
-        "publisher": thesis["publisher"]["name"],
-        "issued": {"date-parts": printed},
-        "note": f"{thesis['description']}. {_NO_NUMBER}",
-    }
+    dates = (release_date(), thesis["datePublished"])
+    issued, printed = ({"date-parts": [[int(part) for part in x.split("-")]]} for x in dates)
+    authors = [{"literal": each["name"]} for each in described["author"]]
+    where = {"URL": address() + path} if address() else {"section": path} if path else {}
+    edition: dict[str, Any] = {"id": f"pyharness-{version}", "type": "webpage"}
+    edition |= {"title": _title(place), "author": authors, "issued": issued, "version": version}
+    edition |= {**where, "note": f"text {text_digest()}; data {data_identifier()}"}
+    names = [{"family": x["familyName"], "given": x["givenName"]} for x in thesis["author"]]
+    report: dict[str, Any] = {"id": "jacobs-1982", "type": "report", "title": thesis["name"]}
+    report |= {"author": names, "publisher": thesis["publisher"]["name"], "issued": printed}
+    report["note"] = f"{thesis['description']}. {_NO_NUMBER}"
     return [edition, report]
 
 
@@ -138,26 +119,13 @@ def linked_data() -> dict[str, Any]:
     described = codemeta()
     software = {name: described[name] for name in _OF_SOURCE_CODE if name in described}
     names = {name: described[name] for name in ("version", "license", "copyrightYear")}
-    return {
-        "@context": "https://schema.org",
-        "@graph": [
-            {
-                "@type": "SoftwareSourceCode", "@id": "#software", **software,
-                "citation": thesis_record(),
-            },
-            {
-                "@type": "Dataset",
-                "@id": "#data",
-                "name": data_name(),
-                "description": data_description(),
-                "creator": described["author"],
-                **names,
-                "identifier": [data_identifier(), f"text {text_digest()}"],
-                "isBasedOn": thesis_record(),
-                "isPartOf": {"@id": "#software"},
-            },
-        ],
-    }  # fmt: skip
+    code = {"@type": "SoftwareSourceCode", "@id": "#software", **software}
+    data: dict[str, Any] = {"@type": "Dataset", "@id": "#data", "name": data_name()}
+    data |= {"description": data_description(), "creator": described["author"], **names}
+    data |= {"identifier": [data_identifier(), f"text {text_digest()}"]}
+    data |= {"isBasedOn": thesis_record(), "isPartOf": {"@id": "#software"}}
+    graph = [{**code, "citation": thesis_record()}, data]
+    return {"@context": "https://schema.org", "@graph": graph}
 
 
 def data_name() -> str:
@@ -182,3 +150,92 @@ def _authors(thesis: dict[str, Any]) -> str:
 def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
     lines = [f"  {name} = {{{value}}},\n" for name, value in fields.items()]
     return f"@{kind}{{{key},\n{''.join(lines)}}}\n"
+
+
+class Part(NamedTuple):
+    """A file of the data package.
+
+    `path` is relative to the package, `media_type` is as in ``text/csv``. `content` is empty for
+    files that describe the others.
+    """
+
+    path: str
+    title: str
+    description: str
+    media_type: str
+    content: bytes = b""
+
+
+def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
+    """Return the file that the table `name` of `package.toml` describes, with `values` in it."""
+    texts = (text.format(**values) for text in _descriptions()[name].values())
+    path, title, description, media_type = texts
+    return Part(path, title, description, media_type, content)
+
+
+@cache
+def _descriptions() -> dict[str, dict[str, str]]:
+    return tomllib.loads(Path(__file__).with_name("package.toml").read_text(encoding="utf-8"))
+
+
+KEPT = tuple(map(described, ("crate", "mark", "manifest")))
+"""The files of the package that describe its other files."""
+CRATE, PACKAGE_MARK, MANIFEST = (each.path for each in KEPT)
+"""Their paths. `PACKAGE_MARK` marks a folder as a data package, and lists its files."""
+_VERSION = "https://w3id.org/ro/crate/1.1"
+_LICENCE = "The licence of the edition; the file LICENSE has its text."
+_DATA = "Software Heritage identifier of the edition's data"
+
+
+def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
+    """Return the RO-Crate record of files other than `KEPT`.
+
+    Entities are items of one list, and refer to each other by identifier.
+    """
+    software, thesis = codemeta(), thesis_record()
+    files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
+    people = [
+        *({"@id": f"#author-{number}", **each}
+          for number, each in enumerate(software["author"], 1)),
+        *({"@id": f"#thesis-author-{number}", **each, "name": f"{each['givenName']} "
+           f"{each['familyName']}"}
+          for number, each in enumerate(thesis["author"], 1)),
+    ]  # fmt: skip
+    licence, authors = software["license"], _references(people, "#thesis-author-")
+    ours, source = _references(people, "#author-"), {"@id": "#thesis"}
+    root = _entity("./", "Dataset", name=data_name(), description=data_description())
+    root |= {"version": software["version"], "datePublished": release_date()}
+    root |= {"license": {"@id": licence}, "author": ours, "publisher": ours}
+    root |= {"keywords": software["keywords"], "citation": source, "isBasedOn": source}
+    root["identifier"] = [{"@id": "#text"}, {"@id": "#data"}]
+    root["hasPart"] = [{"@id": each["@id"]} for each in files]
+    graph: list[dict[str, Any]] = [
+        _entity(CRATE, "CreativeWork", about={"@id": "./"}, conformsTo={"@id": _VERSION}),
+        root,
+        *files,
+        *people,
+        {"@id": "#thesis-publisher", **thesis["publisher"]},
+        {"@id": "#thesis", **thesis, "author": authors, "publisher": {"@id": "#thesis-publisher"}},
+        _entity(licence, "CreativeWork", name="MIT License", description=_LICENCE),
+        _entity("#text", "PropertyValue", name="digest of the text", value=text_digest()),
+        _entity("#data", "PropertyValue", name=_DATA, value=data_identifier()),
+    ]
+    return {"@context": f"{_VERSION}/context", "@graph": graph}
+
+
+def _file(part: Part) -> dict[str, Any]:
+    form = {"encodingFormat": part.media_type}
+    if part not in KEPT:
+        size, identifier = str(len(part.content)), content_identifier(part.content)
+        form = {"description": part.description, **form, "contentSize": size}
+        form["identifier"] = identifier
+    return _entity(part.path, "File", name=part.title, **form)
+
+
+def _references(entities: Sequence[dict[str, Any]], prefix: str) -> Any:
+    found = [{"@id": each["@id"]} for each in entities if each["@id"].startswith(prefix)]
+    return found[0] if len(found) == 1 else found
+
+
+def _entity(identifier: str, kind: str, /, **fields: Any) -> dict[str, Any]:
+    return {"@id": identifier, "@type": kind, **fields}

@@ -5,26 +5,33 @@ runs write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 from hashlib import sha256
 from io import BytesIO
+from itertools import product
+from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from pyharness.edition.citation import bibtex, codemeta, data_description, data_name
-from pyharness.edition.crate import (
+import numpy as np
+
+from pyharness.edition.citation import (
     CRATE,
     KEPT,
     MANIFEST,
     PACKAGE_MARK,
     Part,
+    bibtex,
+    codemeta,
     crate_record,
+    data_description,
+    data_name,
     described,
 )
-from pyharness.edition.machine_bundle import machine_parts
 from pyharness.edition.made_pages import table
-from pyharness.edition.package_runs import run_parts
-from pyharness.history.ablation import apparatus_report, entries
-from pyharness.history.claims.ledger import judgements
-from pyharness.history.claims.report import claims_report
+from pyharness.history import printed_page
+from pyharness.history.ablation import apparatus_report, case_truth, entries
+from pyharness.history.claims.ledger import claims_report, judgements
 from pyharness.history.figures import curve_numbers, findings
 from pyharness.history.identifiers import (
     card_identifier,
@@ -33,13 +40,18 @@ from pyharness.history.identifiers import (
     source_files,
     text_digest,
 )
+from pyharness.history.listing_output import listings_of, our_page
 from pyharness.history.tei import tei_document
-from pyharness.model.facts import shipped
-from pyharness.model.listing import PROGRAMS
+from pyharness.model.facts import facts, facts_folder, shipped
+from pyharness.model.listing import PROGRAMS, Listing, names_of, subset
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.report import numbers
+from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.schema import SCHEMAS
+from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.cards import deck
+from pyharness.thesis.decks import SYSTEMS, card_steps, deck_text, job_text
+from pyharness.thesis.programs import WORD_NAMES, run_program
 from pyharness.views.render import csv_text, json_text, render
 
 _COLUMNS = "card kind text scan entries port twin swhid"
@@ -55,14 +67,10 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     content = {each.path: each.content for each in parts}
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
-    mark = {
-        "schema": SCHEMAS["data package"],
-        "version": codemeta()["version"],
-        "text": text_digest(),
-        "data": data_identifier(),
-        # The manifest has this file's checksum, so that its identifier is not known here.
-        "files": {**listed, MANIFEST: None},
-    }
+    mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
+    # The manifest has this file's checksum, so that its identifier is not known here.
+    files = {**listed, MANIFEST: None}
+    mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
     # The form that `sha256sum -c` reads.
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
@@ -106,16 +114,12 @@ def _list_files(progress: Progress) -> Iterator[Part]:
 
 def _cards(program: str) -> bytes:
     found = deck(program)
-    rows = [
-        [
-            card.number, found.statement_kind(card), card.text.rstrip(), card.scan,
-            " ".join(card.entries),
-            *(" ".join(f"{place.file}:{place.line}" for place in places.get(card.number, ()))
-              for places in (found.port, found.twin)),
-            card_identifier(card),
-        ]
-        for card in found.cards.values()
-    ]  # fmt: skip
+    rows = []
+    for n, card in found.cards.items():
+        both = (places.get(n, ()) for places in (found.port, found.twin))
+        where = (" ".join(f"{each.file}:{each.line}" for each in places) for places in both)
+        ours = (n, found.statement_kind(card), card.text.rstrip(), card.scan)
+        rows.append([*ours, " ".join(card.entries), *where, card_identifier(card)])
     return csv_text(numbers(_COLUMNS, rows)).encode()
 
 
@@ -130,3 +134,133 @@ def _readme(parts: list[Part]) -> Part:
         f"Check the files with: `sha256sum -c {MANIFEST}`", "",
     ]  # fmt: skip
     return described("readme", "\n".join(lines).encode())
+
+
+FAULTS_CASE = 5
+"""The case for the effects of single faults; its initial omega is on the cards."""
+
+_ENDS = "case program listing steps ended stop_step stop_variable"
+_ROWS = "program listing step time omega1 omega2 omega3 velocity1 velocity2 velocity3"
+
+
+def run_parts() -> Iterator[Part]:
+    """Yield the files on the runs: cases, ends and results."""
+    yield described("cases", (facts_folder() / "cases.toml").read_bytes())
+    yield described("ends", csv_text(numbers(_ENDS, [*_ends()])).encode())
+    for case in case_numbers():
+        content = csv_text(numbers(_ROWS, [*_rows(case)])).encode()
+        yield described("results", content, case=case, faults_case=FAULTS_CASE)
+
+
+@cache
+def _listings() -> dict[tuple[str, str], Listing]:
+    """Return the listings by program and name; those with one fault are in apparatus order."""
+    found = {}
+    for program in PROGRAMS:
+        found[program, "original"] = Listing.original(program)
+        found[program, "corrected"] = Listing.corrected(program)
+    for name in names_of("defect"):
+        for program in PROGRAMS:
+            if name in names_of("defect", program):
+                found[program, name] = subset(program, "corrected", keep=[name])
+    return found
+
+
+@cache
+def _run(case: int, listing: Listing) -> Trajectory:
+    return run_program(case_scene(case), listing)
+
+
+def _ends() -> Iterator[list[Any]]:
+    for case in case_numbers():
+        for (program, name), listing in _listings().items():
+            run = _run(case, listing)
+            stop = [None, None] if run.stop is None else [run.stop.step, run.stop.variable]
+            yield [case, program, name, run.steps, run.ended, *stop]
+
+
+def _rows(case: int) -> Iterator[list[Any]]:
+    curves: dict[tuple[str, str], Any] = {("reference", ""): case_truth(case)}
+    for (program, name), listing in _listings().items():
+        if case == FAULTS_CASE or name in ("original", "corrected"):
+            curves[program, name] = _run(case, listing)
+    for names, curve in curves.items():
+        states = np.column_stack([curve.time, curve.omega, curve.velocity]).tolist()
+        for step, state in enumerate(states, 1):
+            yield [*names, step, *state]
+
+
+# The machine's arithmetics, one for each option of its compiler.
+_MACHINE = ("cdc48", "cdc48-rounded")
+_PAGES = "program case listing word steps card_steps page"
+_SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
+
+
+def machine_parts() -> Iterator[Part]:
+    """Yield the files of the folder."""
+    texts: dict[str, str] = {}
+    rows: list[list[Any]] = []
+    # The machine's arithmetics are the first.
+    words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
+    for program, case in facts("cases")["published"].items():
+        steps = case_scene(case).steps, card_steps(program)
+        first_with: dict[str, str] = {}
+        for (title, listing), word in product(listings_of(program).items(), words):
+            text = our_page(listing, case, card_steps(program), word)
+            name = _name(program, case, title, word)
+            first = first_with.setdefault(text, name)
+            # Equal pages are stored once, but predictions for the machine under their own names.
+            if title != "original" or word not in _MACHINE:
+                name = first
+            texts[name] = text
+            rows.append([program, case, title, word, *steps, name])
+    for name, text in texts.items():
+        program, case, listing, word = next(row[:4] for row in rows if row[-1] == name)
+        ran = {"program": program, "case": case, "listing": listing, "word": word}
+        yield described("page", text.encode(), name=name, **ran)
+    content = csv_text(numbers(_PAGES, rows)).encode()
+    yield described("pages", content, name=printed_page.PAGES)
+    jobs = [*_jobs(texts)]
+    yield from jobs
+    yield described("judge", Path(printed_page.__file__).read_bytes())
+    titles = [[f"`{each.path.removeprefix('machine/')}`", each.title] for each in jobs]
+    tables = {"jobs": table("job | content", titles).rstrip(), "outcomes": outcomes_table()}
+    tables["pages"] = table("page | rows | printed by", [*_shared(texts, rows)]).rstrip()
+    yield described("guide", facts("machine")["readme"].format(**tables).encode())
+
+
+def outcomes_table() -> str:
+    """Return a Markdown table of the conclusions from each outcome of a job."""
+    rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
+    return table("outcome | what would be learned | what remains open", rows).rstrip()
+
+
+def _name(program: str, case: int, listing: str, word: str) -> str:
+    form = "" if listing == "original" else f"{listing.replace(' ', '-')}-"
+    return f"{program}-case-{case}-{form}{word}.txt"
+
+
+def _jobs(texts: dict[str, str]) -> Iterator[Part]:
+    """Yield the jobs, also with rounding if it changes the program's page."""
+    for program, case in facts("cases")["published"].items():
+        first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
+        for system in SYSTEMS:
+            for rounds in (False, True) if first != second else (False,):
+                text = deck_text(Listing.original(program), dialect="ftn")
+                suffix, option = ("-rounded", ", with the option ROUND") if rounds else ("", "")
+                yield described(
+                    "job", job_text(text, system, rounds).encode(), program=program, system=system,
+                    system_name=_SYSTEMS[system], suffix=suffix, option=option,
+                )  # fmt: skip
+
+
+def _shared(texts: dict[str, str], rows: list[list[Any]]) -> Iterator[list[str]]:
+    """Yield for each page its file, number of rows, and the runs that print it."""
+    for name, text in texts.items():
+        _, printed = printed_page.split_page(printed_page.printed_numbers(text))
+        words: dict[str, list[str]] = {}
+        for program, _, listing, word, *_, page in rows:
+            if texts[page] == text and name.startswith(f"{program}-case-"):
+                words.setdefault(listing, []).append(f"`{word}`")
+        by = "; ".join(f"{listing} in {', '.join(found)}" for listing, found in words.items())
+        yield [f"`{name}`", str(len(printed)), by]

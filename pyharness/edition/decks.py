@@ -8,9 +8,11 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import cache
+from itertools import chain
 from typing import Any, NamedTuple
 
 from pyharness.history.ablation import effects_of, entries
+from pyharness.history.tei import first_card
 from pyharness.model.facts import facts
 from pyharness.model.listing import names_of
 from pyharness.thesis.cards import Card, Place, deck, numbers, switch_at, tight
@@ -112,12 +114,8 @@ def sheets(program: str) -> list[Sheet]:
 
     A page begins with its lowest card in the scan.
     """
-    found = []
-    for page in facts("cards/scan")["page"]:
-        if page["program"] == program:
-            first = min(n for each in page["lines"] if isinstance(each, str) for n in numbers(each))
-            found.append((first, page.get("moved")))
-    found.sort()
+    pages = [page for page in facts("cards/scan")["page"] if page["program"] == program]
+    found = sorted((first_card(page["lines"]), page.get("moved")) for page in pages)
     ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]
     views = card_views(program)
     return [
@@ -129,13 +127,12 @@ def sheets(program: str) -> list[Sheet]:
 def notes(program: str) -> list[Note]:
     """Return a program's apparatus entries: defects by what they change, then by kind and card."""
     having = [each for each in entries() if each["cards"].get(program)]
-    having.sort(
-        key=lambda each: (
-            _ORDER.index(each["kind"]),
-            *(-change for change in _changes(each["id"], program)),
-            numbers(each["cards"][program])[0],
-        )
-    )
+
+    def place(entry: dict[str, Any]) -> tuple[float, ...]:
+        changes = (-change for change in _changes(entry["id"], program))
+        return (_ORDER.index(entry["kind"]), *changes, numbers(entry["cards"][program])[0])
+
+    having.sort(key=place)
     return [Note(n, each, each["cards"][program]) for n, each in enumerate(having, 1)]
 
 
@@ -166,43 +163,24 @@ def card_views(program: str) -> list[CardView]:
     corrected, changed = corrected_cards(program), corrections(program)
     phantoms = _phantoms(program)
     views = []
-    for card, after in zip(found.cards.values(), [*found.cards, math.inf][1:], strict=True):
-        about = [each for each in every if card.number in numbers(each.cards)]
+    for n, after in zip(found.cards, [*found.cards, math.inf][1:], strict=True):
+        card, text = found.cards[n], corrected.get(n)
+        about = [each for each in every if n in numbers(each.cards)]
         about.sort(key=lambda each: _ORDER.index(each.kind))
-        inserted = [pair for pair in corrected.items() if card.number < pair[0] < after]
-        text = corrected.get(card.number)
-        views.append(
-            CardView(
-                card.number,
-                _card(card),
-                _witness(card),
-                phantoms.get(card.number, []),
-                _scan(card),
-                Corrected(
-                    text,
-                    text != card.text.rstrip(),
-                    inserted,
-                    # Each name once, ordered by first occurrence.
-                    list(dict.fromkeys(
-                        name
-                        for number in (card.number, *(number for number, _ in inserted))
-                        for name in changed.get(number, ())
-                    )),
-                ),
-                [
-                    (place, *(switch_at(place) or (None, True)))
-                    for place in found.port.get(card.number, ())
-                ],
-                about,
-                [
-                    each._replace(cards=cards_range)
-                    for each in about
-                    for cards_range in each.cards.split(", ")
-                    if numbers(cards_range)[0] == card.number
-                ],
-                list(dict.fromkeys(each.kind for each in about)),
-            )
-        )  # fmt: skip
+        ranges = [each._replace(cards=part) for each in about for part in each.cards.split(", ")]
+        inserted = [pair for pair in corrected.items() if n < pair[0] < after]
+        defects = (changed.get(number, ()) for number in (n, *(number for number, _ in inserted)))
+        # Each name once, ordered by first occurrence.
+        names = list(dict.fromkeys(chain.from_iterable(defects)))
+        own = Corrected(text, text != card.text.rstrip(), inserted, names)
+        witness = "" if card.lost else card.text_with_scanned_names
+        shown = witness if card.lost or witness != card.text else None
+        port = [(place, *(switch_at(place) or (None, True))) for place in found.port.get(n, ())]
+        begins = [each for each in ranges if numbers(each.cards)[0] == n]
+        kinds = list(dict.fromkeys(each.kind for each in about))
+        scan, after_it = _scan(card), phantoms.get(n, [])
+        view = CardView(n, _card(card), shown, after_it, scan, own, port, about, begins, kinds)
+        views.append(view)
     return views
 
 
@@ -220,12 +198,6 @@ def _card(card: Card) -> list[Run]:
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]
-
-
-def _witness(card: Card) -> str | None:
-    """Return the card as the print has it, if this is not our text."""
-    text = "" if card.lost else card.text_with_scanned_names
-    return text if card.lost or text != card.text else None
 
 
 def _phantoms(program: str) -> dict[int, list[Run]]:

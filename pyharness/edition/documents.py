@@ -75,12 +75,12 @@ def page_of(name: str) -> str:
 
 def files(folder: Path) -> dict[str, bytes]:
     """Return the documents' pictures, tables and schemas, by path in the site."""
-    names = {file.relative_to(folder).as_posix(): file for file in sorted(folder.rglob("*"))}
-    return {
-        f"docs/{name}": file.read_bytes()
-        for name, file in names.items()
-        if name.endswith(_BESIDE) and not name.startswith(_OFF_SITE)
-    }
+    found = {}
+    for file in sorted(folder.rglob("*")):
+        name = file.relative_to(folder).as_posix()
+        if name.endswith(_BESIDE) and not name.startswith(_OFF_SITE):
+            found[f"docs/{name}"] = file.read_bytes()
+    return found
 
 
 def with_notebooks(folder: Path) -> list[Path]:
@@ -109,15 +109,9 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     cells: list[dict[str, Any]] = []
 
     def add(kind: str, source: str, **more: Any) -> None:
-        cells.append(
-            {
-                "cell_type": kind,
-                "id": hashlib.sha256(f"{len(cells)} {source}".encode()).hexdigest()[:8],
-                "metadata": {},
-                "source": source.splitlines(keepends=True),
-                **more,
-            }
-        )
+        identifier = hashlib.sha256(f"{len(cells)} {source}".encode()).hexdigest()[:8]
+        cell = {"cell_type": kind, "id": identifier, "metadata": {}}
+        cells.append(cell | {"source": source.splitlines(keepends=True)} | more)
 
     start = 0
     for found in (*_PART.finditer(text), None):
@@ -134,10 +128,8 @@ def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
             add("code", found["code"].rstrip("\n"), execution_count=None, outputs=outputs)
         elif cells and cells[-1]["cell_type"] == "code" and found["picture"] in pictures:
             cells[-1]["outputs"].append(_display(found["form"], pictures[found["picture"]]))
-    metadata = {
-        "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
-        "language_info": {"name": "python"},
-    }
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    metadata = {"kernelspec": kernel, "language_info": {"name": "python"}}
     record = {"cells": cells, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}
     return json_text(record).encode()
 

@@ -43,45 +43,28 @@ def context() -> dict[str, Any]:
     `switches` has defects, readings and conjectures by heading. `first` is the run of `DEFAULTS`.
     `titles` are the names of the cases.
     """
-    flags = data()["flags"]
-    return {
-        "titles": {number: case_scene(number).name for number in case_numbers()},
-        "programs": PROGRAMS,
-        "switches": [
-            (head, [flag for flag in flags if flag["kind"] == kind])
-            for kind, head in _KINDS.items()
-        ],
-        "first": _first(),
-        "experiments": facts("experiments")["experiment"],
-    }
+    titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
+    by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}
+    shown = [(head, by_kind[kind]) for kind, head in _KINDS.items()]
+    found = {"titles": titles, "programs": PROGRAMS, "switches": shown, "first": _first()}
+    return found | {"experiments": facts("experiments")["experiment"]}
 
 
 def data() -> dict[str, Any]:
     """Return the script's `window.laboratoryData`, to run any program on any case."""
+    cases = {number: case_scene(number) for number in case_numbers()}
     return {
-        "scenes": [requested_scene(case_scene(number)) for number in case_numbers()],
-        "assumed": {number: assumption(number) for number in case_numbers()},
+        "scenes": list(map(requested_scene, cases.values())),
+        "assumed": {number: assumption(number) for number in cases},
         "assumedInRuns": {
-            number: {
-                program: [
-                    {"entry": each["entry"], "active": each["active"], "what": each["what"]}
-                    for each in assumed(case_scene(number), [Listing.original(program)])
-                    if each["on"] == "listing"
-                ]
-                for program in PROGRAMS
-            }
-            for number in case_numbers()
+            number: {program: _assumed_in(scene, program) for program in PROGRAMS}
+            for number, scene in cases.items()
         },
-        "headings": {number: _described(case_scene(number)) for number in case_numbers()},
+        "headings": {number: _described(scene) for number, scene in cases.items()},
         "programs": list(PROGRAMS),
         "flags": [
-            {
-                "id": entry["id"],
-                "kind": entry["kind"],
-                "programs": entry["programs"],
-                "summary": entry["summary"],
-                "in_original": any(entry["id"] in switches(name) for name in entry["programs"]),
-            }
+            {name: entry[name] for name in ("id", "kind", "programs", "summary")}
+            | {"in_original": any(entry["id"] in switches(name) for name in entry["programs"])}
             for entry in flagged()
         ],
         "deck": _deck_data(),
@@ -93,6 +76,12 @@ def data() -> dict[str, Any]:
         },
         "defaults": DEFAULTS,
     }
+
+
+def _assumed_in(scene: Scene, program: str) -> list[dict[str, Any]]:
+    found = assumed(scene, [Listing.original(program)])
+    names = ("entry", "active", "what")
+    return [{name: each[name] for name in names} for each in found if each["on"] == "listing"]
 
 
 def _deck_data() -> dict[str, Any]:
@@ -110,11 +99,9 @@ def _deck_data() -> dict[str, Any]:
             passes.append({**each, "from": first, "to": last, "set": each.get("set", {})})
         cards = _statements(program, passes[0]["from"], passes[-1]["to"])
         found[program] = {"torque": order[program]["torque"], "passes": passes, "cards": cards}
-    found["alterations"] = [
-        {**each, "delete": numbers(each["delete"])} if "delete" in each else each
-        for each in facts("cards/alterations")["alteration"]
-        if "dialect" not in each
-    ]
+    altered = [x for x in facts("cards/alterations")["alteration"] if "dialect" not in x]
+    deleted = [{"delete": numbers(each["delete"])} if "delete" in each else {} for each in altered]
+    found["alterations"] = [x | more for x, more in zip(altered, deleted, strict=True)]
     return found
 
 
@@ -151,13 +138,9 @@ def _first() -> dict[str, Any]:
     assert run.velocity is not None
     values = np.column_stack([run.time, run.omega, run.velocity, run.recorded_time]).tolist()
     numbers = [*range(_SHOWN), *range(run.steps - _SHOWN, run.steps)]
-    return {
-        "state": DEFAULTS,
-        "fragment": "&".join(f"{word}={value}" for word, value in DEFAULTS.items()),
-        "command": f"pyharness run {options}",
-        "ending": told[0].upper() + told[1:],
-        "error": short(float(error.max())),
-        # The Runge-Kutta program has no IER.
-        "rows": [[str(n + 1), *map(repr, values[n]), "", short(float(error[n]))] for n in numbers],
-        "page": page(scene, program, run),
-    }
+    # The Runge-Kutta program has no IER.
+    rows = [[str(n + 1), *map(repr, values[n]), "", short(float(error[n]))] for n in numbers]
+    fragment = "&".join(f"{word}={value}" for word, value in DEFAULTS.items())
+    found = {"state": DEFAULTS, "fragment": fragment, "command": f"pyharness run {options}"}
+    found |= {"ending": told[0].upper() + told[1:], "error": short(float(error.max()))}
+    return found | {"rows": rows, "page": page(scene, program, run)}

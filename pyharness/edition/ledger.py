@@ -14,8 +14,7 @@ from markupsafe import Markup
 from pyharness.edition.markdown import inline
 from pyharness.history.ablation import FIELDS, effects_of, entries, entry_report
 from pyharness.history.claims.evidence import evidence, evidence_report
-from pyharness.history.claims.ledger import Judgement
-from pyharness.history.claims.report import KINDS
+from pyharness.history.claims.ledger import KINDS, Judgement
 from pyharness.history.claims.stories import Sentence, Story, sentences, story
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.history.figures import SETS, FigureFinding, figure_picture, together_picture
@@ -119,13 +118,9 @@ def claims_context(judged: Sequence[Judgement], told: Sequence[SentenceVerdicts]
         making = [other for other in told if each.claim["id"] in other.sentence.claims]
         told_of = Story(*map(inline, story(each)))
         groups[each.claim["kind"]].append((each, verdicts(each), told_of, making))
-    return {
-        "judged": judged,
-        "counted": counted(judged),
-        "about": KINDS,
-        "groups": groups,
-        "evidence": Markup(html.sections(evidence_report(list(evidence())).text)),
-    }
+    shown = Markup(html.sections(evidence_report(list(evidence())).text))
+    found = {"judged": judged, "counted": counted(judged), "about": KINDS}
+    return found | {"groups": groups, "evidence": shown}
 
 
 def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
@@ -169,10 +164,8 @@ def formulas() -> dict[str, list[Formula]]:
     found: dict[str, list[Formula]] = {}
     for row in facts("formulas")["formula"]:
         lines = [inline(f"${tex}$") for tex in row["tex"].strip().split("\n")]
-        formula = Formula(
-            row.get("number", ""), row["where"], lines, inline(row["what"]),
-            row.get("cards", {}), row.get("entry", ""),
-        )  # fmt: skip
+        head = (row.get("number", ""), row["where"], lines, inline(row["what"]))
+        formula = Formula(*head, row.get("cards", {}), row.get("entry", ""))
         found.setdefault(row["where"].partition(".")[0], []).append(formula)
     return found
 
@@ -204,13 +197,9 @@ def printed_figures(
             stem: figure for stem, figure in figures.items() if figure.plan.number == each["number"]
         }
         cases = {f"V.2, Case {figure.plan.case}" for figure in drawn.values()}
-        says = [
-            (inline(other.sentence.text), other.anchor)
-            for other in told
-            if other.sentence.where in cases
-        ]
-        if "says" in each:
-            says = [(inline(each["says"]), "")]
+        about = [(x.sentence.text, x.anchor) for x in told if x.sentence.where in cases]
+        quoted = [(each["says"], "")] if "says" in each else about
+        says = [(inline(text), anchor) for text, anchor in quoted]
         found.append({**each, "says": says, "ours": inline(each.get("ours", "")), "drawn": drawn})
     return found
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
+from pyharness.views.render import markdown_table
+
 
 def table(head: str, rows: Sequence[Sequence[str]]) -> str:
     """Return a Markdown table; bars separate the column heads in `head`."""
-    heads = head.split(" | ")
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+    return markdown_table([head.split(" | "), *rows])

@@ -71,12 +71,11 @@ def formula(tex: str, display: bool = False) -> Markup:
 @cache
 def _parser() -> MarkdownIt:
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    parser.use(
-        dollarmath_plugin,
-        allow_digits=False,
-        allow_space=False,
-        renderer=lambda tex, options: formula(tex, options["display_mode"]),
-    )
+
+    def write(tex: str, options: dict[str, Any]) -> Markup:
+        return formula(tex, options["display_mode"])
+
+    parser.use(dollarmath_plugin, allow_digits=False, allow_space=False, renderer=write)
     renderer: Any = parser.renderer
     rules = renderer.rules
     # Elements wider than the page scroll separately, also by keyboard.

@@ -138,13 +138,9 @@ def _compared(row: dict[str, Card]) -> AlignedRow:
 def _split_card(card: Card) -> list[_Part]:
     """Return a card's statement number and parts, without continuation marks."""
     labels = [] if card.continues else _PART.finditer(card.text[:5])
-    return [
-        *(_Part(each.start(), each[0], _LABEL) for each in labels),
-        *(
-            _Part(each.start(), each[0], str(each.lastgroup))
-            for each in _PART.finditer(card.text, 6)
-        ),
-    ]
+    found = [_Part(each.start(), each[0], _LABEL) for each in labels]
+    parts = _PART.finditer(card.text, 6)
+    return [*found, *(_Part(each.start(), each[0], str(each.lastgroup)) for each in parts)]
 
 
 def _runs(text: str, parts: Sequence[_Part], marks: dict[int, str]) -> list[Run]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-from pyharness.edition.crate import MANIFEST
+from pyharness.edition.citation import MANIFEST
 from pyharness.history.identifiers import data_identifier, directory_identifier, text_digest
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.records import build_record
@@ -43,21 +43,13 @@ def edition_report(folder: str, content: Mapping[str, bytes]) -> Report:
 
 def package_report(folder: str, content: Mapping[str, bytes]) -> Report:
     """Return the report on the package's files and identifiers."""
-    identifiers = {
-        "package": directory_identifier(content), "data": data_identifier(), "text": text_digest(),
-    }  # fmt: skip
-    text: list[Section] = [
-        [_sizes(content)],
-        [
-            Line(f"Identifier of the package:  {identifiers['package']}"),
-            Line(f"Identifier of its sources:  {identifiers['data']}"),
-            Line(f"Digest of the text:         {identifiers['text']}"),
-        ],
-        [Line(f"Check it with: cd {shlex.quote(folder)} && sha256sum -c {MANIFEST}")],
-    ]
-    return Report(
-        "edition", text, lambda: {"folder": folder, "identifiers": identifiers, **listed(content)}
-    )
+    package, data, digest = directory_identifier(content), data_identifier(), text_digest()
+    names = (("Identifier of the package:", package), ("Identifier of its sources:", data))
+    named = [Line(f"{name:28s}{each}") for name, each in (*names, ("Digest of the text:", digest))]
+    check = Line(f"Check it with: cd {shlex.quote(folder)} && sha256sum -c {MANIFEST}")
+    identifiers = {"package": package, "data": data, "text": digest}
+    record = {"folder": folder, "identifiers": identifiers, **listed(content)}
+    return Report("edition", [[_sizes(content)], named, [check]], lambda: record)
 
 
 def _sizes(content: Mapping[str, bytes]) -> Table:

@@ -9,6 +9,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,8 +30,7 @@ from pyharness.edition.data_package import archive, data_package
 from pyharness.edition.markdown import inline, slug
 from pyharness.edition.report import MARK, listed
 from pyharness.history.ablation import entries
-from pyharness.history.claims.ledger import judgements
-from pyharness.history.claims.report import written
+from pyharness.history.claims.ledger import judgements, written
 from pyharness.history.claims.stories import prose
 from pyharness.history.figures import FigureFinding, findings
 from pyharness.history.identifiers import DATA, data_identifier, text_digest
@@ -113,7 +113,7 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
     yield Page("laboratory.html", "Laboratory", "laboratory.html", laboratory.context())
     yield Page("body.html", "A body that tumbles", "body.html", body.context())
     told = ledger.thesis(judged)
-    found = []
+    found: list[Found] = []
     for each in told:
         claimed = " ".join(judgement.claim["statement"] for judgement in each.judged)
         text = f"{each.sentence.text}: {each.sentence.why or claimed}"
@@ -127,32 +127,25 @@ def _pages(drawn: Mapping[str, FigureFinding], docs: Path, progress: Progress) -
     ]
     context = {"figures": ledger.printed_figures(drawn, told)}
     yield Page("figures.html", "Figures", "figures.html", context, found)
-    yield Page(
-        "claims.html", "Claims", "claims.html", ledger.claims_context(judged, told),
-        [
-            Found(f"claims.html#{each.claim['id']}", each.claim["id"], "claim",
-                  f"{each.claim['quote']}: {each.claim['statement']}")
-            for each in judged
-        ],
-    )  # fmt: skip
+    found = []
+    for claim in (judgement.claim for judgement in judged):
+        text = f"{claim['quote']}: {claim['statement']}"
+        found.append(Found(f"claims.html#{claim['id']}", claim["id"], "claim", text))
+    context = ledger.claims_context(judged, told)
+    yield Page("claims.html", "Claims", "claims.html", context, found)
     progress(3, 5, "apparatus")
     groups = ledger.apparatus()
-    yield Page(
-        "apparatus.html", "Apparatus", "apparatus.html",
-        {"groups": groups, "programs": decks.TITLES, "disagreements": disagreements()},
-        [
-            Found(f"apparatus.html#{each['id']}", each["id"], each["kind"],
-                  ". ".join(each[name] for name in ("summary", "evidence", "why") if name in each))
-            for entries in groups.values() for each, _ in entries
-        ],
-    )  # fmt: skip
+    found = []
+    for entry, _ in chain.from_iterable(groups.values()):
+        text = ". ".join(entry[name] for name in ("summary", "evidence", "why") if name in entry)
+        found.append(Found(f"apparatus.html#{entry['id']}", entry["id"], entry["kind"], text))
+    context = {"groups": groups, "programs": decks.TITLES, "disagreements": disagreements()}
+    yield Page("apparatus.html", "Apparatus", "apparatus.html", context, found)
     progress(4, 5, "documents")
     yield from _documents(docs)
     offered = api.entries()
-    yield Page(
-        "api.html", "API", "api.html", {"entries": offered},
-        [Found(f"api.html#{each.name}", each.name, "API", each.summary) for each in offered],
-    )  # fmt: skip
+    found = [Found(f"api.html#{each.name}", each.name, "API", each.summary) for each in offered]
+    yield Page("api.html", "API", "api.html", {"entries": offered}, found)
     yield Page("search.html", "Search", "search.html")
 
 
@@ -168,11 +161,10 @@ def _listing() -> Iterator[Page]:
             "kinds": decks.kinds_of(views), "notes": decks.notes(program), "deck": deck(program),
             "parallels": parallels, "entry_kinds": {x["id"]: x["kind"] for x in entries()},
         }  # fmt: skip
-        found = [
-            Found(f"{path}#{each.number}", f"{program} {each.number}", "card",
-                  "".join(run.text for run in each.card).strip())
-            for each in views
-        ]  # fmt: skip
+        found = []
+        for each in views:
+            text = "".join(run.text for run in each.card).strip()
+            found.append(Found(f"{path}#{each.number}", f"{program} {each.number}", "card", text))
         yield Page(path, f"{title}: the program as printed", "deck.html", context, found)
     yield Page("listing/collation.html", "The three decks compared", "collation.html",
                {"programs": decks.TITLES, "operations": parallel_decks.operations(),
@@ -220,22 +212,15 @@ def _rendered(page: Page) -> bytes:
 
 def _assets(places: Sequence[Found]) -> dict[str, bytes]:
     web = shipped("web")
-    content = {
-        f"assets/{file.name}": file.read_bytes()
-        for package in vendor()
-        for file in sorted((web / "vendor" / package["name"]).iterdir())
-        if file.suffix in (".js", ".css")
-    }
-    for package in vendor():
-        licence = (web / "vendor" / package["name"] / "LICENSE").read_bytes()
-        content[f"assets/{package['name']}-LICENSE.txt"] = licence
+    folders = [web / "vendor" / package["name"] for package in vendor()]
+    files = [file for each in folders for file in sorted(each.iterdir())]
+    files = [file for file in files if file.suffix in (".js", ".css")]
+    content = {f"assets/{file.name}": file.read_bytes() for file in files}
+    content |= {f"assets/{x.name}-LICENSE.txt": (x / "LICENSE").read_bytes() for x in folders}
     for file in sorted((web / "site").iterdir()):
         content[f"assets/{file.name}"] = file.read_bytes()
-    scripts = {
-        "story": story.data(), "laboratory": laboratory.data(), "about": None,
-        "cite": cite_data(),
-    }  # fmt: skip
-    for name, data in (*scripts.items(), ("body", body.data())):
+    scripts = {"story": story.data(), "laboratory": laboratory.data(), "about": None}
+    for name, data in (scripts | {"cite": cite_data(), "body": body.data()}).items():
         content[f"assets/{name}.js"] = bundle(web / name / f"{name}.js").encode()
         if data is not None:
             content[f"assets/{name}-data.js"] = script(f"{name}Data", data)
@@ -259,19 +244,12 @@ def vendor() -> list[dict[str, Any]]:
 
 @cache
 def _templates() -> Environment:
-    templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    templates.filters["number"] = written
-    templates.filters["prose"] = prose
-    templates.filters["slug"] = slug
-    templates.globals["inline"] = inline
-    templates.globals["verdicts"] = ledger.verdicts
-    templates.globals["assumption"] = ledger.assumption
-    templates.globals["ASSUMED"] = ASSUMED
-    templates.globals["supplied"] = ledger.account()["supplied"]
+    loader = FileSystemLoader(Path(__file__).parent / "templates")
+    blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True}
+    templates = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
+    templates.filters |= {"number": written, "prose": prose, "slug": slug}
+    templates.globals |= {
+        "inline": inline, "verdicts": ledger.verdicts, "assumption": ledger.assumption,
+        "ASSUMED": ASSUMED, "supplied": ledger.account()["supplied"],
+    }  # fmt: skip
     return templates

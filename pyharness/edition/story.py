@@ -68,13 +68,11 @@ class Chart(NamedTuple):
 def data() -> dict[str, Any]:
     """Return the values that the script needs to run the programs."""
     cases = sorted({*BLIND_CASES, *RACE_CASES})
-    return {
-        "scenes": {number: requested_scene(case_scene(number)) for number in cases},
-        "original": {name: list(switches(name)) for name in PROGRAMS},
-        "letters": LETTERS,
-        "fractions": {name: _fractions(name) for name in TERMS},
-        "lipschitz": facts("cases")["deck"]["lipschitz"],
-    }
+    scenes = {number: requested_scene(case_scene(number)) for number in cases}
+    original = {name: list(switches(name)) for name in PROGRAMS}
+    fractions = {name: _fractions(name) for name in TERMS}
+    told = {"scenes": scenes, "original": original, "letters": LETTERS, "fractions": fractions}
+    return told | {"lipschitz": facts("cases")["deck"]["lipschitz"]}
 
 
 @cache
@@ -110,15 +108,17 @@ def context() -> dict[str, Any]:
     ratios = {case: _ratios(case) for case in RACE_CASES}
     others = [ratio for case in RACE_CASES if case != 7 for ratio in ratios[case].values()]
     corrected = {name: _run(2, name, "corrected") for name in PROGRAMS}
-    return {
-        "charts": {each.name: each for each in charts},
+    fixed: dict[str, Any] = {
         "box": BOX,
         "titles": TITLES,
         "letters": LETTERS,
         "step_sizes": STEP_SIZES,
-        "stopped": stopped,
-        "peak": velocity[-2],
-        "after": velocity[-1],
+    }
+    fixed |= {"stopped": stopped, "peak": velocity[-2], "after": velocity[-1]}
+    fixed["points_step"] = POINTS_STEP
+    return {
+        "charts": {each.name: each for each in charts},
+        **fixed,
         "collocation_error": _first_error(2, "two-term"),
         "stop_error": _first_error(2, "runge-kutta"),
         "corrected_error": _first_error(2, "runge-kutta", "corrected"),
@@ -132,7 +132,6 @@ def context() -> dict[str, Any]:
             for start in starts()
             if start != case_scene(1).omega
         ],
-        "points_step": POINTS_STEP,
         "points_at": [each * point_at for each in _fractions("two-term")],
         "points_run": (_run(6, "two-term"), _first_error(6, "two-term")),
         "blind": {n: (_run(n, "runge-kutta"), _first_error(n, "runge-kutta")) for n in BLIND_CASES},

@@ -135,13 +135,10 @@ def lattice(
     n = min(each.steps for each in runs)
     assert truth.velocity is not None
     begin = replace(truth, time=truth.time[:n], omega=truth.omega[:n], velocity=truth.velocity[:n])
-    found = [
-        Effect(
-            listing, *_errors(scene, run, truth), run.steps, run.ended, run.stop,
-            _errors(scene, run, begin),
-        )
-        for listing, run in zip(listings, runs, strict=True)
-    ]  # fmt: skip
+    found = []
+    for listing, run in zip(listings, runs, strict=True):
+        errors, common = (_errors(scene, run, each) for each in (truth, begin))
+        found.append(Effect(listing, *errors, run.steps, run.ended, run.stop, common))
     return sorted(found, key=_size, reverse=True)
 
 
@@ -194,30 +191,22 @@ def entry_report(
     fields = [Field(f"{name:10s} ", values[name]) for name in names if values.get(name)]
     text: list[Section] = [[f"{entry['id']}: {entry['summary']}"], fields]
     if "original" in entry:
-        left, right = (
-            [head, "-" * HALF, *textwrap.wrap(entry[head], HALF)]
-            for head in ("original", "corrected")
-        )
+        heads = ("original", "corrected")
+        left, right = ([x, "-" * HALF, *textwrap.wrap(entry[x], HALF)] for x in heads)
         text.append(beside(left, right))
     if effects:
         text += _effects(effects, entry["kind"] != "defect")
 
-    return Report(
-        "defects",
-        text,
-        record=lambda: {
-            "entry": entry,
-            "effects": [
-                {"program": each.program, "case": each.case}
-                | {name: _effect_record(getattr(each, name)) for name in _LISTINGS}
-                for each in effects
-            ],
-            "assumptions": assumption_records(
-                (case_scene(each.case), [getattr(each, name).listing for name in _LISTINGS])
-                for each in effects
-            ),
-        },
-    )
+    def record() -> dict[str, Any]:
+        records, runs = [], []
+        for each in effects:
+            found = {name: getattr(each, name) for name in _LISTINGS}
+            runs.append((case_scene(each.case), [effect.listing for effect in found.values()]))
+            told = {name: _effect_record(effect) for name, effect in found.items()}
+            records.append({"program": each.program, "case": each.case} | told)
+        return {"entry": entry, "effects": records, "assumptions": assumption_records(runs)}
+
+    return Report("defects", text, record)
 
 
 def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
@@ -272,37 +261,24 @@ def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Repor
             columns += [Column(f"w {end}", short, unit="rad/s")]
             columns += [Column(f"V {end}", short, unit="m/s")]
         columns += [Column("steps"), Column("stop")]
-        text += [
-            [*heading(scene, [Listing.original(program)]), title, *key],
-            [Table(columns, subsets)],
-        ]
-    return Report(
-        "compare",
-        text,
-        record=lambda: {
-            "scene": scene_record(scene),
-            "lattice": {name: list(map(_subset_record, each)) for name, each in found.items()},
-            "assumptions": assumption_records(
-                [(scene, [effect.listing for each in found.values() for effect in each])]
-            ),
-        },
-        data=numbers(
-            "program active error_w error_v steps ended stop_variable common_error_w "
-            "common_error_v",
-            rows,
-        ),
-    )
+        told = heading(scene, [Listing.original(program)])
+        text += [[*told, title, *key], [Table(columns, subsets)]]
+
+    def record() -> dict[str, Any]:
+        listings = [effect.listing for each in found.values() for effect in each]
+        lattice = {name: list(map(_subset_record, each)) for name, each in found.items()}
+        assumptions = assumption_records([(scene, listings)])
+        return {"scene": scene_record(scene), "lattice": lattice, "assumptions": assumptions}
+
+    heads = "error_w error_v steps ended stop_variable common_error_w common_error_v"
+    return Report("compare", text, record, numbers(f"program active {heads}", rows))
 
 
 def _effect_record(effect: Effect) -> dict[str, Any]:
-    return {
-        "listing": listing_record(effect.listing),
-        "error": effect.omega,
-        "velocity_error": effect.velocity,
-        "steps": effect.steps,
-        "ended": effect.ended,
-        "stop": None if effect.stop is None else asdict(effect.stop),
-    }
+    errors = {"error": effect.omega, "velocity_error": effect.velocity}
+    stop = effect.stop and asdict(effect.stop)
+    end = {"steps": effect.steps, "ended": effect.ended, "stop": stop}
+    return {"listing": listing_record(effect.listing), **errors, **end}
 
 
 def _subset_record(effect: Effect) -> dict[str, Any]:

@@ -37,16 +37,10 @@ def cards_report(
 
     With `only_contents` the text has a table of contents instead.
     """
-    rows = [
-        [each.program, each.number, each.statement, each.scan, " ".join(each.entries)]
-        for each in cards
-    ]
-    return Report(
-        title,
-        _contents(cards) if only_contents else [_block(each) for each in cards],
-        record=lambda: {"cards": [card_record(each) for each in cards]},
-        data=columns("program card statement scan entries", rows),
-    )
+    rows = [[x.program, x.number, x.statement, x.scan, " ".join(x.entries)] for x in cards]
+    data = columns("program card statement scan entries", rows)
+    text = _contents(cards) if only_contents else list(map(_block, cards))
+    return Report(title, text, lambda: {"cards": list(map(card_record, cards))}, data)
 
 
 def _contents(cards: Sequence[Card]) -> list[Section]:
@@ -82,18 +76,12 @@ def card_record(card: Card) -> dict[str, Any]:
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
-    return {
-        "program": card.program,
-        "card": card.number,
-        "statement": card.statement,
-        "scan": scan,
-        "differences": [each._asdict() for each in card.differences],
-        "entries": list(card.entries),
-        "fortran": [each._asdict() for each in found.port.get(card.number, [])],
-        "twin": [each._asdict() for each in found.twin.get(card.number, [])],
-        "absent": found.absent.get(card.number),
-        "parallels": [each.name for each in parallels(card)],
-    }
+    differences = [each._asdict() for each in card.differences]
+    port, twin = ([x._asdict() for x in of.get(card.number, [])] for of in (found.port, found.twin))
+    about = {"program": card.program, "card": card.number, "statement": card.statement}
+    text = {"scan": scan, "differences": differences, "entries": list(card.entries)}
+    versions = {"fortran": port, "twin": twin, "absent": found.absent.get(card.number)}
+    return about | text | versions | {"parallels": [each.name for each in parallels(card)]}
 
 
 def scan_report(
@@ -114,23 +102,20 @@ def scan_report(
         f"in {pairs} places, {sum(each.printed is not None for each in cards)} in their number; "
         f"the scan has {counted(lines, 'line')}; it is {which} (SHA-256)"
     )
-    end = "nothing is unexplained" if not (faults or undeclared) else (
-        f"{len(faults) + len(undeclared)} unexplained"
-    )  # fmt: skip
-    return Report(
-        "cards",
-        [[told], [*faults, *undeclared], [end]],
-        record=lambda: {
-            "lines": lines, "cards": len(cards), "lost": lost, "deviating": deviating,
-            "differences": pairs, "sha256": digest, "unexplained": [*faults, *undeclared],
-        },
-        data=columns("unexplained", [[each] for each in (*faults, *undeclared)]),
-    )  # fmt: skip
+    unexplained = [*faults, *undeclared]
+    end = f"{len(unexplained)} unexplained" if unexplained else "nothing is unexplained"
+    told_of: dict[str, Any] = {"lines": lines, "cards": len(cards), "lost": lost}
+    told_of |= {"deviating": deviating, "differences": pairs, "sha256": digest}
+    record = told_of | {"unexplained": unexplained}
+    data = columns("unexplained", [[each] for each in unexplained])
+    return Report("cards", [[told], unexplained, [end]], lambda: record, data)
 
 
 def classes_report() -> Report:
     """Return the report of the numbers of apparatus entries and of their cards, by kind."""
     entries = facts("apparatus")["entry"]
+    cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
+    entries_of = Counter(each.entry for card in cards for each in card.differences)
     rows = []
     for kind in dict.fromkeys(each["kind"] for each in entries):
         of_kind = [each for each in entries if each["kind"] == kind]
@@ -138,12 +123,7 @@ def classes_report() -> Report:
             len({n for each in of_kind for n in cards_named(each["cards"].get(program, ""))})
             for program in PROGRAMS
         ]
-        places = sum(
-            each.entry in {entry["id"] for entry in of_kind}
-            for program in PROGRAMS
-            for card in deck(program).cards.values()
-            for each in card.differences
-        )
+        places = sum(entries_of[each["id"]] for each in of_kind)
         rows.append([kind, len(of_kind), sum("flag" in each for each in of_kind), *named, places])
     sure = Counter(each["certainty"] for each in entries)
     table = Table(_CLASSES, rows)
@@ -152,20 +132,12 @@ def classes_report() -> Report:
     grounds = [Field(f"{each['siglum']}  ", each["what"]) for each in edition["ground"]]
     principles = [Field(f"{name:12s}", f"{text}") for name, text in edition["principles"].items()]
     told = ", ".join(f"{number} {certainty}" for certainty, number in sure.items())
-    return Report(
-        "cards",
-        [
-            ["witness:", *head], ["grounds of the entries:", *grounds], principles, [table],
-            [f"{len(entries)} entries: {told}; text {text_digest()}"],
-        ],
-        record=lambda: {
-            "classes": [dict(zip(table.in_full()[0], row, strict=True)) for row in rows],
-            "certainty": dict(sure), "witnesses": edition["witness"],
-            "grounds": edition["ground"],
-            "principles": edition["principles"], "text": text_digest(),
-        },
-        data=table,
-    )  # fmt: skip
+    text: list[Section] = [["witness:", *head], ["grounds of the entries:", *grounds], principles]
+    text += [[table], [f"{len(entries)} entries: {told}; text {text_digest()}"]]
+    classes = [dict(zip(table.in_full()[0], row, strict=True)) for row in rows]
+    record = {"classes": classes, "certainty": dict(sure), "witnesses": edition["witness"]}
+    record |= {"grounds": edition["ground"], "principles": edition["principles"]}
+    return Report("cards", text, lambda: record | {"text": text_digest()}, table)
 
 
 def _block(card: Card) -> Section:
@@ -207,69 +179,52 @@ def _named(name: str, texts: Iterable[str]) -> list[str]:
 def collation_report(found: Sequence[Row]) -> Report:
     """Return the report of the agreement of decks and thesis, operation by operation."""
     told = faults([*found])
-    rows = []
+    rows, full = [], []
     for row in found:
         having = "".join(_SHORT[program] for program in row.cards) or "-"
         why = "; ".join(filter(None, (", ".join(row.entries), row.reason))) or "-"
         rows.append([row.what, having, row.decks, row.thesis, why])
+        cards, entries = (row.cards.get(each, "") for each in PROGRAMS), " ".join(row.entries)
+        verdicts = (row.decks, row.text, row.says, row.thesis)
+        full.append([row.what, *cards, *verdicts, entries, row.reason])
     legend = (
         "in: the decks that have the step, 2 two-term, 4 four-term, R runge-kutta. decks: whether "
         "their statements agree, differ in names or in order alone, or differ. thesis: whether "
         "sections II to V agree with the decks, differ, or are silent. why: entries of the "
         "apparatus (`defects NAME`), and what else explains it."
     )
-    full = [
-        [row.what, *(row.cards.get(program, "") for program in PROGRAMS), row.decks, row.text,
-         row.says, row.thesis, " ".join(row.entries), row.reason]
-        for row in found
-    ]  # fmt: skip
     end = "nothing is unexplained" if not told else f"{len(told)} unexplained"
     names = "step two-term four-term runge-kutta decks text says thesis entries reason"
-    return Report(
-        "cards",
-        [[legend], [Table(_STEPS, rows)], told, [f"{counted(len(found), 'step')}: {end}"]],
-        record=lambda: {"steps": [row._asdict() for row in found], "unexplained": told},
-        data=columns(names, full),
-    )
+    text: list[Section] = [[legend], [Table(_STEPS, rows)], told]
+    text.append([f"{counted(len(found), 'step')}: {end}"])
+    record = {"steps": [row._asdict() for row in found], "unexplained": told}
+    return Report("cards", text, lambda: record, columns(names, full))
 
 
 def origins_report(found: Sequence[Disagreement], mistakes: Sequence[str]) -> Report:
     """Return the report of disagreements, their origins, and mistakes in the table."""
-    rows = [
-        [
-            each.id, "".join(_SHORT[program] for program in each.cards) or "-",
-            ", ".join(each.equations) or "-", each.origin, each.certainty,
-            ", ".join(each.entries) or "-",
-        ]
-        for each in found
-    ]  # fmt: skip
+    rows, full = [], []
+    for each in found:
+        having = "".join(_SHORT[program] for program in each.cards) or "-"
+        lists = [", ".join(names) or "-" for names in (each.equations, each.entries)]
+        rows.append([each.id, having, lists[0], each.origin, each.certainty, lists[1]])
+        head = [each.id, each.title, " ".join(each.equations), each.where, each.says]
+        cards = (" ".join(map(str, each.cards.get(program, ()))) for program in PROGRAMS)
+        ours = (each.differs, each.known, each.suggests, each.origin, each.certainty)
+        full.append([*head, *cards, *ours, " ".join(each.entries), each.unnoticed])
     legend = (
         "in: the decks whose cards are quoted, 2 two-term, 4 four-term, R runge-kutta. equation: "
         "numbers of the formulas of the thesis. origin: kind of origin that we infer, as listed "
         "below. certainty: of this inference. entries: of the apparatus (`defects NAME`)."
     )
-    full = [
-        [each.id, each.title, " ".join(each.equations), each.where, each.says,
-         *(" ".join(map(str, each.cards.get(program, ()))) for program in PROGRAMS),
-         each.differs, each.known, each.suggests, each.origin, each.certainty,
-         " ".join(each.entries), each.unnoticed]
-        for each in found
-    ]  # fmt: skip
     names = (
         "disagreement title equations where says two-term four-term runge-kutta differs known "
         "suggests origin certainty entries unnoticed"
     )
     kinds = [Field(f"{name:16s}", text) for name, text in origins().items()]
     left = [f"not explained: {name}" for name in unexplained_defects()]
-    return Report(
-        "cards",
-        [
-            [legend], [Table(_DISAGREEMENTS, rows)], kinds,
-            [*left, *mistakes, counted(len(found), "disagreement")],
-        ],
-        record=lambda: {
-            "disagreements": [each._asdict() for each in found],
-            "unexplained": [*unexplained_defects(), *mistakes],
-        },
-        data=columns(names, full),
-    )  # fmt: skip
+    end = [*left, *mistakes, counted(len(found), "disagreement")]
+    text: list[Section] = [[legend], [Table(_DISAGREEMENTS, rows)], kinds, end]
+    told = [each._asdict() for each in found]
+    record = {"disagreements": told, "unexplained": [*unexplained_defects(), *mistakes]}
+    return Report("cards", text, lambda: record, columns(names, full))

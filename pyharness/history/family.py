@@ -11,6 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -144,15 +145,9 @@ def run(scene: Scene, member: Member) -> Trajectory:
     time = np.array(scene.times()[:rows])
     scheme = tableau(member.weighting, member.terms, member.points)
     overflow = rows < scene.steps
-    return Trajectory(
-        time=time,
-        recorded_time=time,
-        omega=omega[:rows],
-        velocity=None,
-        steps=rows,
-        evaluations=(rows + overflow) * (1 + member.corrections * len(scheme.nodes)),
-        ended="overflow" if overflow else "complete",
-    )
+    evaluations = (rows + overflow) * (1 + member.corrections * len(scheme.nodes))
+    ended = "overflow" if overflow else "complete"
+    return Trajectory(time, time, omega[:rows], None, rows, evaluations, ended)
 
 
 def integrate(scene: Scene, members: Sequence[Member]) -> Array:
@@ -337,36 +332,25 @@ def _slopes(errors: Array) -> list[float]:
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
     """Return the report of orders and errors in a scene, by n terms and k corrections."""
     names = ("predicted", "measured", "settled", "error")
+    members = [each.member for each in found]
     measures = [{name: getattr(each, name) for name in names} for each in found]
-    data = [
-        [member.weighting, member.points_label, member.terms, member.corrections, *measure.values()]
-        for member, measure in zip((each.member for each in found), measures, strict=True)
-    ]
+    methods = [[x.weighting, x.points_label, x.terms, x.corrections] for x in members]
+    data = [[*method, *own.values()] for method, own in zip(methods, measures, strict=True)]
     page = [heading(scene), [*_finding(found), *verdict(found)], *_tables(found)]
-    return Report(
-        "family",
-        text=page,
-        record=lambda: {
-            "scene": scene_record(scene),
-            "members": [
-                asdict(each.member) | measure for each, measure in zip(found, measures, strict=True)
-            ],
-            "unexpected": _unexpected(found),
-            "build": build_record(),
-            "assumptions": assumption_records([(scene, [])]),
-        },
-        data=numbers("weighting points terms corrections predicted measured settled error", data),
-        page=page,
-    )
+    whole = [asdict(member) | own for member, own in zip(members, measures, strict=True)]
+
+    def record() -> dict[str, Any]:
+        told = {"scene": scene_record(scene), "members": whole, "unexpected": _unexpected(found)}
+        return told | {"build": build_record(), "assumptions": assumption_records([(scene, [])])}
+
+    heads = "weighting points terms corrections predicted measured settled error"
+    return Report("family", page, record, numbers(heads, data), page)
 
 
 def _finding(found: Sequence[OrderFinding]) -> list[str]:
     """Return a sentence on the order with one correction, if several methods have one."""
-    orders = Counter(
-        round(each.measured)
-        for each in found
-        if each.member.corrections == 1 and each.measured is not None
-    )
+    alike = (each.measured for each in found if each.member.corrections == 1)
+    orders = Counter(round(order) for order in alike if order is not None)
     if orders.total() < 2:
         return []
     (order, number), *_ = orders.most_common(1)

@@ -4,8 +4,9 @@ One set has the curves of the original programs, another those of the corrected 
 """
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,15 +122,13 @@ class FigureFinding:
 
 def plans() -> list[FigurePlan]:
     """Return the plans of all figures, first those of the original programs."""
-    return [
-        FigurePlan(
-            entry["number"], entry.get("part", ""), each, entry["case"], tuple(entry[each]),
-            entry["caption" if each == "original" else "corrected_caption"], entry["source"],
-            entry.get("limit_of", "") if each == "original" else "",
-        )
-        for each in SETS
-        for entry in facts("figures")["figure"]
-    ]  # fmt: skip
+    found = []
+    for each, entry in product(SETS, facts("figures")["figure"]):
+        number, part, programs = entry["number"], entry.get("part", ""), tuple(entry[each])
+        limit_of = entry.get("limit_of", "") if each == "original" else ""
+        texts = entry["caption" if each == "original" else "corrected_caption"], entry["source"]
+        found.append(FigurePlan(number, part, each, entry["case"], programs, *texts, limit_of))
+    return found
 
 
 def findings() -> Iterator[FigureFinding]:
@@ -154,36 +153,23 @@ def figures_report(findings: Sequence[FigureFinding]) -> Report:
         on_cards = (mark(each.scene, curve.listing) for curve in each.curves)
         case = f"{each.plan.case}{max(case_mark(each.plan.case), *on_cards)}"
         rows.append([f"{each.plan.stem}.{{{','.join(ENDINGS)}}}", case, curves])
-    return Report(
-        "figures",
-        text=[[Table(words("files case curves"), rows)], legend(list(map(_runs, findings)))],
-        record=lambda: {
-            "figures": list(map(_record, findings)),
-            "build": build_record(),
-            "assumptions": assumption_records(map(_runs, findings)),
-        },
-    )
+    runs = [(each.scene, [curve.listing for curve in each.curves]) for each in findings]
 
+    def record() -> dict[str, Any]:
+        told = {"figures": list(map(_record, findings)), "build": build_record()}
+        return told | {"assumptions": assumption_records(runs)}
 
-def _runs(finding: FigureFinding) -> tuple[Scene, list[Listing]]:
-    return finding.scene, [curve.listing for curve in finding.curves]
+    return Report("figures", [[Table(words("files case curves"), rows)], legend(runs)], record)
 
 
 def _record(finding: FigureFinding) -> dict[str, Any]:
-    plan = finding.plan
-    return {
-        "figure": plan.title,
-        **{name: getattr(plan, name) for name in ("case", "set", "caption", "source", "files")},
-        "curves": [
-            {
-                "program": each.listing.program,
-                "listing": each.listing.label,
-                "steps": each.trajectory.steps,
-                "ended": each.trajectory.ended,
-            }
-            for each in finding.curves
-        ],
-    }
+    plan, curves = finding.plan, []
+    for each in finding.curves:
+        listing, run = each.listing, each.trajectory
+        names = {"program": listing.program, "listing": listing.label}
+        curves.append(names | {"steps": run.steps, "ended": run.ended})
+    told = {name: getattr(plan, name) for name in ("case", "set", "caption", "source", "files")}
+    return {"figure": plan.title, **told, "curves": curves}
 
 
 def curve_numbers(finding: FigureFinding) -> Table:
@@ -213,15 +199,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
     axes = figure.subplots(3, 1, sharex=True)
-    start = np.array(finding.scene.omega)
     for row in range(3):
-        _draw_known(axes[row], finding, row)
-        bottom, top = _frame(finding, row)
-        axes[row].set_ylim(bottom, top)
-        for curve in finding.curves:
-            _draw(axes[row], curve, start, row, bottom, top)
-        axes[row].set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
-        axes[row].grid(visible=True, linewidth=0.3)
+        _draw_panel(axes[row], finding, row, [(curve, {}) for curve in finding.curves])
         axes[row].ticklabel_format(useOffset=False)
     axes[2].set_xlabel("time (s)")
     axes[2].set_xlim(0.0, finding.scene.steps * finding.scene.step_size)
@@ -250,16 +229,13 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     second = replace(second, curves=second.curves[-1:])
     figure = Figure(figsize=(7.2, 4.2), dpi=110, layout="constrained")
     axes = figure.subplots()
-    _draw_known(axes, first, 0)
-    bottom, top = _frame(first, 0)
-    for finding, other in ((first, {}), (second, _CORRECTED)):
-        for curve in finding.curves:
-            _draw(axes, curve, np.array(first.scene.omega), 0, bottom, top, **other)
-            line = axes.lines[-2 if curve.ending else -1]
-            line.set_label(f"{curve.label}, {finding.plan.set}")
-    axes.set(ylim=(bottom, top), xlim=(0.0, first.reference.time[-1]), xlabel="time (s)")
-    axes.set_ylabel("$\\omega_1$ (rad/s)")
-    axes.grid(visible=True, linewidth=0.3)
+    curves = [
+        (curve, other | {"label": f"{curve.label}, {finding.plan.set}"})
+        for finding, other in ((first, {}), (second, _CORRECTED))
+        for curve in finding.curves
+    ]
+    _draw_panel(axes, first, 0, curves)
+    axes.set(xlim=(0.0, first.reference.time[-1]), xlabel="time (s)")
     figure.legend(loc="outside lower center", ncols=2, handlelength=5.0, frameon=False)
     own = [row for row in curve_numbers(second).rows if row[1]]
     return Picture(figure, numbers(_NUMBERS, [*curve_numbers(first).rows, *own]))
@@ -295,24 +271,28 @@ def points_picture() -> Picture:
     return Picture(figure, numbers("program step point time", rows))
 
 
-def _draw_known(axes: "Axes", finding: FigureFinding, row: int) -> None:
+def _draw_panel(
+    axes: "Axes", finding: FigureFinding, row: int, curves: Iterable[tuple[Curve, dict[str, Any]]]
+) -> None:
+    """Draw one omega component of the known solutions and of curves, each with its own style."""
     time, start = _from_zero(finding.reference.time), np.array(finding.scene.omega)
     for (label, omega), style in zip(finding.known, (_REFERENCE, _LIMIT), strict=False):
         axes.plot(time, _from_zero(omega, start)[:, row], label=label, **style)
-
-
-def _draw(
-    axes: "Axes", curve: Curve, start: Array, row: int, bottom: float, top: float, **other: Any
-) -> None:
-    run = curve.trajectory
-    time, omega = _from_zero(run.time), _from_zero(run.omega, start)
-    style: dict[str, Any] = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
+    bottom, top = _frame(finding, row)
     height = top - bottom
-    # Renderers fail on very large coordinates.
-    shown = np.clip(omega[:, row], bottom - 50.0 * height, top + 50.0 * height)
-    axes.plot(time, shown, label=curve.label, zorder=3, **style | _MARKERS | other)
-    if curve.ending and len(run.time):
-        axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
+    for curve, other in curves:
+        run = curve.trajectory
+        style = dict(zip(_STYLE, _STYLES[curve.listing.program], strict=True))
+        omega = _from_zero(run.omega, start)[:, row]
+        # Renderers fail on very large coordinates.
+        shown = np.clip(omega, bottom - 50.0 * height, top + 50.0 * height)
+        style |= {"label": curve.label, "zorder": 3} | _MARKERS | other
+        axes.plot(_from_zero(run.time), shown, **style)
+        if curve.ending and len(run.time):
+            axes.plot(run.time[-1:], np.clip(shown[-1:], bottom, top), **_END)
+    axes.set_ylim(bottom, top)
+    axes.set_ylabel(f"$\\omega_{row + 1}$ (rad/s)")
+    axes.grid(visible=True, linewidth=0.3)
 
 
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:

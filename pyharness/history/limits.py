@@ -9,6 +9,7 @@ seconds.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -239,8 +240,9 @@ def limits_report(
         [each.program, each.order, each.halvings[-1].from_truth, each.tends_to] for each in found
     ]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
+    listings = [Listing.original(each.program) for each in found]
     text: list[Section] = [
-        heading(scene, [Listing.original(each.program) for each in found]),
+        heading(scene, listings),
         [
             "Limits of the original programs as the step shrinks, with the order of convergence, "
             "and the distance from the true solution at the smallest step (rad/s):",
@@ -253,16 +255,10 @@ def limits_report(
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]
         data += [[each.program, *row] for row in rows]
         text.append([f"original {each.program}:", Table(_COLUMNS, rows), each.approach])
-    return Report(
-        "limits",
-        text,
-        record=lambda: {
-            "scene": scene_record(scene),
-            "limits": [asdict(each) for each in found],
-            "invisible": {name: list(each) for name, each in invisible.items()},
-            "assumptions": assumption_records(
-                [(scene, [Listing.original(each.program) for each in found])]
-            ),
-        },
-        data=Table((Column("program"), *_COLUMNS), data),
-    )
+
+    def record() -> dict[str, Any]:
+        hidden = {name: list(each) for name, each in invisible.items()}
+        told = {"scene": scene_record(scene), "limits": list(map(asdict, found))}
+        return told | {"invisible": hidden, "assumptions": assumption_records([(scene, listings)])}
+
+    return Report("limits", text, record, Table((Column("program"), *_COLUMNS), data))

@@ -96,20 +96,13 @@ def _lines(listing: Listing, case: int, steps: int, word: str = BINARY64) -> lis
 def listing_output_report(path: str, found: Sequence[Fit]) -> Report:
     """Return the report on the program, listing and arithmetic of the page in file `path`."""
     best = found[0]
-    rows = [
-        [each.program, each.case, each.listing, each.word, each.fields, len(each.differences)]
-        for each in found
-    ]
+    rows = [[x.program, x.case, x.listing, x.word, x.fields, len(x.differences)] for x in found]
     text: list[Section] = [printed_page.verdict(path, found), [Table(_TABLE, rows)]]
     if not best.is_whole:
         first = [list(asdict(each).values()) for each in best.differences[: printed_page.SHOWN]]
         text.append(["the first numbers that differ:", Table(_APART, first)])
-    return Report(
-        "verify",
-        text,
-        record=lambda: {"page": path, "passed": best.is_whole, "fits": [asdict(f) for f in found]},
-        data=Table(_TABLE, rows),
-    )
+    record = {"page": path, "passed": best.is_whole, "fits": list(map(asdict, found))}
+    return Report("verify", text, lambda: record, Table(_TABLE, rows))
 
 
 _TABLE = (*words("program case listing word"), Column("numbers"), Column("differ"))

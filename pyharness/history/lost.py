@@ -198,14 +198,10 @@ _TABLE = (
 
 def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
     """Return the report on the mistakes, with errors and failures, in the arithmetic `word`."""
-    rows = [
-        [
-            each.mistake,
-            *(share for attempt in each.attempts for share in attempt.shares.values()),
-            each.in_both, each.in_either, each.summary,
-        ]
-        for each in found
-    ]  # fmt: skip
+    rows = []
+    for each in found:
+        shares = [share for attempt in each.attempts for share in attempt.shares.values()]
+        rows.append([each.mistake, *shares, each.in_both, each.in_either, each.summary])
     most = max(each.in_both for each in found)
     best = " and ".join(each.mistake for each in found if each.in_both == most)
     text: list[Section] = [
@@ -224,12 +220,9 @@ def lost_report(found: Sequence[Ranked], word: str = BINARY64) -> Report:
             "products alone can't fail Case 1, where A = B = C = 0 and the products count nothing."
         ],
     ]
-    return Report(
-        "family",
-        text,
-        record=lambda: {
-            "lost": [asdict(each) for each in found],
-            "assumptions": assumption_records((case_scene(case), []) for case in CASES),
-        },
-        data=Table(_TABLE, rows),
-    )
+
+    def record() -> dict[str, Any]:
+        assumptions = assumption_records((case_scene(case), []) for case in CASES)
+        return {"lost": list(map(asdict, found)), "assumptions": assumptions}
+
+    return Report("family", text, record, Table(_TABLE, rows))

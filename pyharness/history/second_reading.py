@@ -128,22 +128,12 @@ def second_reading_report() -> Report:
         "sample. lower, upper: limits of its 95 % interval. uncorrected: upper, without those that "
         "our text corrects."
     )
-    told = [
-        f"{each.card.name}: scan {each.scan}; first {each.first}; second {each.second}"
-        for each in differing
-    ]
-    return Report(
-        "cards",
-        [
-            [f"Sample: {len(cards)} of the {frame} cards in the scan, drawn with seed {seed}."],
-            [legend],
-            [table],
-            [f"{counted(len(differing), 'card')} read differently:", *told],
-        ],
-        record=lambda: {
-            "sample": {"seed": seed, "size": len(cards), "cards": frame},
-            "recaptures": [dict(zip(table.in_full()[0], row, strict=True)) for row in table.rows],
-            "disagreeing": [each._asdict() | {"card": each.card.name} for each in differing],
-        },
-        data=table,
-    )  # fmt: skip
+    told = [f"{x.card.name}: scan {x.scan}; first {x.first}; second {x.second}" for x in differing]
+    sample = f"Sample: {len(cards)} of the {frame} cards in the scan, drawn with seed {seed}."
+    end = [f"{counted(len(differing), 'card')} read differently:", *told]
+    record = {
+        "sample": {"seed": seed, "size": len(cards), "cards": frame},
+        "recaptures": [dict(zip(table.in_full()[0], row, strict=True)) for row in table.rows],
+        "disagreeing": [each._asdict() | {"card": each.card.name} for each in differing],
+    }
+    return Report("cards", [[sample], [legend], [table], end], lambda: record, table)

@@ -142,12 +142,9 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
     _add(div, "head", f"The {program} program")
     cards = deck(program).cards
     lost = [n for n, card in cards.items() if card.lost]
-    pages = [
-        (place, page)
-        for place, page in enumerate(facts("cards/scan")["page"], 1)
-        if page["program"] == program
-    ]
-    for place, page in sorted(pages, key=lambda each: _first_card(each[1]["lines"])):
+    scan = enumerate(facts("cards/scan")["page"], 1)
+    pages = [(place, page) for place, page in scan if page["program"] == program]
+    for place, page in sorted(pages, key=lambda each: first_card(each[1]["lines"])):
         begin = _add(div, "pb", n=str(place), edRef="#S")
         if "moved" in page:  # the entry that explains an unexpected place
             begin.set("corresp", f"#{page['moved']}")
@@ -166,7 +163,8 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
                 _add(line, "surplus", item["phantom"])
 
 
-def _first_card(lines: Iterable[Any]) -> int:
+def first_card(lines: Iterable[Any]) -> int:
+    """Return the lowest card of a page in the scan."""
     return min(n for each in lines if isinstance(each, str) for n in numbers(each))
 
 

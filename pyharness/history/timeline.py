@@ -46,14 +46,12 @@ class Event(NamedTuple):
 
 def timeline() -> tuple[Event, ...]:
     """Return the events in the history of the thesis, in the order of the data."""
-    return tuple(
-        Event(
-            first=row.get("from", ""),
-            last=row.get("to", row.get("from", "")),
-            **{name: text for name, text in row.items() if name not in ("from", "to")},
-        )
-        for row in facts("timeline")["entry"]
-    )
+    names = {"from": "first", "to": "last"}
+    found = []
+    for row in facts("timeline")["entry"]:
+        fields = {names.get(name, name): text for name, text in row.items()}
+        found.append(Event(**{"last": row.get("from", "")} | fields))
+    return tuple(found)
 
 
 def _in_words(month: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pyharness.checks.compare.agreement import accuracy
 from pyharness.model.assumptions import assumption_records, case_mark, legend, mark
-from pyharness.model.listing import PROGRAMS, Listing
+from pyharness.model.listing import PROGRAMS, Listing, subset
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.records import build_record
 from pyharness.model.report import (
@@ -136,12 +136,8 @@ def _runs(
             pairs = list(zip_longest(pages[0], pages[-1]))
             different, error = sum(x != y for x, y in pairs), max(accuracy(scene, run, truth).omega)
             singular = 0 if run.ier is None else int((run.ier == SINGULAR).sum())
-            found.append(
-                WordRun(
-                    case, listing.program, listing.label, word.p, word.rule, _stop(run),
-                    len(pairs), different, error, singular,
-                )
-            )  # fmt: skip
+            head = (case, listing.program, listing.label, word.p, word.rule, _stop(run))
+            found.append(WordRun(*head, len(pairs), different, error, singular))
         done += len(words)
         progress(done, every, f"case {case}, {listing.program}")
         yield found
@@ -181,15 +177,8 @@ def words_report(cells: Sequence[WordCell]) -> Report:
         tables.insert(0, [heads, _machine(cells)])
         notes += _changes(cells)
     tables.append(notes)
-
-    return Report(
-        "words",
-        text=tables,
-        record=lambda: _record(runs, cells),
-        data=data,
-        page=tables,
-        pictures={"words": partial(_picture, cells, data)},
-    )
+    record, pictures = partial(_record, runs, cells), {"words": partial(_picture, cells, data)}
+    return Report("words", tables, record, data, tables, pictures=pictures)
 
 
 def machine_report(cells: Sequence[WordCell]) -> Report:
@@ -220,18 +209,14 @@ def _record(runs: Sequence[WordRun], cells: Sequence[WordCell]) -> dict[str, Any
 
 
 def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
-    return [(case_scene(cell.double.case), [_listing(cell)]) for cell in cells]
-
-
-def _listing(cell: WordCell) -> Listing:
-    is_original = cell.double.listing == "original"
-    return (Listing.original if is_original else Listing.corrected)(cell.double.program)
+    runs = (cell.double for cell in cells)
+    return [(case_scene(x.case), [subset(x.program, x.listing)]) for x in runs]
 
 
 def _head(cell: WordCell) -> list[Any]:
     """Return case, program and listing, with marks on what is assumed."""
     case, program, listing, *_ = cell.double
-    on_cards = mark(case_scene(case), _listing(cell))
+    on_cards = mark(case_scene(case), subset(program, listing))
     return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]
 
 

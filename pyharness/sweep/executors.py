@@ -61,7 +61,9 @@ def engine(
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
         return
-    count = workers or _processors()
+    # A process may be restricted to some processors; not every system reports this.
+    is_known = hasattr(os, "sched_getaffinity")
+    count = workers or (len(os.sched_getaffinity(0)) if is_known else os.cpu_count() or 1)
     if executor == "processes":
         yield Engine(count, partial(_by_processes, count))
         return
@@ -70,13 +72,6 @@ def engine(
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with _local_cluster(dask, count) if address is None else _connected(dask, address) as client:
         yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
-
-
-def _processors() -> int:
-    # A process may be restricted to some processors; not every system reports this.
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _solve_here(sweep: Sweep, chunks: list[int]) -> Results:

@@ -185,15 +185,16 @@ def _is_own(batch: Batch, given: Mapping[str, Any], n: int) -> NDArray[np.bool_]
 
 
 _SAMPLES = {"samples": 100}
+_SAMPLED: dict[str, Any] = {"parameters": _SAMPLES}
 _OF_AXES: dict[str, Any] = {"only": "method", "needs": ("moments", "attitude")}
+_OF_AXIS: dict[str, Any] = {**_OF_AXES, "parameters": {**_SAMPLES, "of": "middle"}}
+_COMPONENTS: dict[str, Any] = {"labels": ("1", "2", "3"), "dimension": "component"}
+_VARIABLES = {0: "none", **dict(enumerate(STOP_VARIABLES, 1))}
+_STOPS: dict[str, Any] = {"dtype": "i1", "only": "program", "flags": _VARIABLES}
 _STATUSES = {code: name for code, name in enumerate(ENDS) if name != "interrupted"}
 REDUCTIONS = {
     "end": Reduction(
-        "angular velocity at the end",
-        lambda batch, _: batch.omega,
-        "rad/s",
-        labels=("1", "2", "3"),
-        dimension="component",
+        "angular velocity at the end", lambda batch, _: batch.omega, "rad/s", **_COMPONENTS
     ),
     "status": Reduction("how it ended", lambda batch, _: batch.status, dtype="i1", flags=_STATUSES),
     "error": Reduction(
@@ -208,11 +209,7 @@ REDUCTIONS = {
         only="program",
     ),
     "stop-variable": Reduction(
-        "variable that ended it",
-        lambda batch, _: batch.stop_variable,
-        dtype="i1",
-        only="program",
-        flags={0: "none", **dict(enumerate(STOP_VARIABLES, 1))},
+        "variable that ended it", lambda batch, _: batch.stop_variable, **_STOPS
     ),
     "overflow-time": Reduction(
         "time of the first step without a finite result", _overflow_time, "s", only="program"
@@ -233,10 +230,7 @@ REDUCTIONS = {
         flags={0: "fails", 1: "holds", 2: "silent", 3: "in part"},
     ),
     "largest-tilt": Reduction(
-        "largest angle of the angular velocity from where it was",
-        _largest_tilt,
-        "rad",
-        parameters=_SAMPLES,
+        "largest angle of the angular velocity from where it was", _largest_tilt, "rad", **_SAMPLED
     ),
     "attitude": Reduction(
         "attitude at the end, a quaternion from the body to space, scalar first",
@@ -247,11 +241,7 @@ REDUCTIONS = {
         needs=("attitude",),
     ),
     "axis-tilt": Reduction(
-        "largest angle in space of a body's axis from where it was",
-        _axis_tilt,
-        "rad",
-        parameters={**_SAMPLES, "of": "middle"},
-        **_OF_AXES,
+        "largest angle in space of a body's axis from where it was", _axis_tilt, "rad", **_OF_AXIS
     ),
     "tilted-time": Reduction(
         "time during which the angle in space of a body's axis from where it was exceeds a limit",
@@ -264,8 +254,7 @@ REDUCTIONS = {
         "times that the angle in space of a body's axis from where it was passes a right angle",
         _axis_flips,
         dtype="i4",
-        parameters={**_SAMPLES, "of": "middle"},
-        **_OF_AXES,
+        **_OF_AXIS,
     ),
     "pointing-error": Reduction(
         "angle of a body's axis from a direction in space at the end",

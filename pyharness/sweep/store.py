@@ -16,24 +16,22 @@ from typing import Any
 from pyharness.model.distribution import check_package, install_command
 from pyharness.model.errors import InputError
 from pyharness.model.schema import check_schema
-from pyharness.sweep.checksums import (
-    DamageError,
-    Label,
-    check_files,
-    clear,
-    exists,
-    place_checksums,
-)
 from pyharness.sweep.reductions import REDUCTIONS
 from pyharness.sweep.store_layout import (
     CHECKSUMS,
     LARGEST_METADATA,
     METADATA,
+    DamageError,
+    Label,
+    check_files,
+    clear,
+    exists,
     filled,
     label,
     labels,
     largest_chunk,
     metadata_files,
+    place_checksums,
 )
 from pyharness.sweep.sweep import Arrays, Sweep
 

@@ -28,9 +28,8 @@ from pyharness.model.scene_file import (
 )
 from pyharness.model.values import boolean, finite, integer, number, three
 from pyharness.sweep.axes import ATTITUDE, CHOICES, RIVALS, Axis, axis_of, check_name
-from pyharness.sweep.batches import listing_of
+from pyharness.sweep.batches import check_state_axis, check_state_solver, listing_of
 from pyharness.sweep.reductions import RANKS, REDUCTIONS, needs_attitudes
-from pyharness.sweep.state_torques import check_state_axis, check_state_solver
 from pyharness.sweep.sweep import ReductionSpec, Sweep
 
 Claim = Callable[[Batch], NDArray[Any]]
@@ -102,6 +101,7 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         raise InputError("[scene]: allowed: case, or file, or the tables of a scene file")
     if given == ["case"]:
         return case_scene(table["case"]), b""
+    more = b""
     if given == ["file"]:
         if not isinstance(table["file"], str):
             raise InputError(f"[scene] file is {kind_of(table['file'])}; it must be text")
@@ -109,12 +109,12 @@ def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
         named = f"scene file '{beside}'"
         content = read_file(beside, named)
         # The zero byte separates the files in the SHA-256.
-        return checked_scene(
-            scene_of_file(content, beside.stem, named), any_axes=True, any_state=True
-        ), b"\0" + content
-    if not table:
+        scene, more = scene_of_file(content, beside.stem, named), b"\0" + content
+    elif table:
+        scene = scene_of(table, path.stem)
+    else:
         raise InputError("scene is missing; give [scene] with case, file, or a scene's own tables")
-    return checked_scene(scene_of(table, path.stem), any_axes=True, any_state=True), b""
+    return checked_scene(scene, any_axes=True, any_state=True), more
 
 
 def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
@@ -142,17 +142,13 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
     lipschitz = number("[solve] lipschitz", given.get("lipschitz", 500.0))
     if not lipschitz >= 0.0:
         raise InputError(f"[solve] lipschitz is {lipschitz:g}; allowed: a number from 0")
+    method = given.get("method", "auto") if program is None else None
     tolerance, t_end = given.get("tolerance"), given.get("t_end")
-    return Solver(
-        method=given.get("method", "auto") if program is None else None,
-        program=program,
-        tolerance=None if tolerance is None else number("[solve] tolerance", tolerance),
-        t_end=None if t_end is None else finite("[solve] t_end", t_end),
-        listing=given.get("listing", "original"),
-        reading=given.get("reading", "adopted"),
-        lipschitz=lipschitz,
-        may_stop=boolean("[solve] may_stop", given.get("may_stop", True)),
-    )
+    tolerance = None if tolerance is None else number("[solve] tolerance", tolerance)
+    t_end = None if t_end is None else finite("[solve] t_end", t_end)
+    listing, reading = given.get("listing", "original"), given.get("reading", "adopted")
+    may_stop = boolean("[solve] may_stop", given.get("may_stop", True))
+    return Solver(method, program, tolerance, t_end, listing, reading, lipschitz, may_stop)
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
@@ -319,11 +315,8 @@ def _check_solvers(sweep: Sweep) -> None:
     programs = list(_choices(sweep, "program", solver.program))
     own = [] if programs else _choices(sweep, "method", solver.method)
     against = [dict(each.parameters).get("against") for each in sweep.reductions]
-    check_state_solver(
-        sweep.scene,
-        [name for name in (*own, *filter(None, against)) if name in REGISTRY],
-        bool(programs),
-    )
+    named = [name for name in (*own, *filter(None, against)) if name in REGISTRY]
+    check_state_solver(sweep.scene, named, bool(programs))
     if any(programs):
         checked_scene(sweep.scene, any_state=True)
     for program in programs:

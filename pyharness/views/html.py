@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from itertools import groupby
+from typing import Any
 
 from pyharness.model.report import Field, Line, Section, Table
 
@@ -17,20 +19,14 @@ def table(given: Table, label: str = "table", links: Mapping[str, str] | None = 
     `label` is for screen readers; `links` maps the text of a cell to an address.
     """
     (head, *rows), columns = given.written(), given.columns
-    lines = [
-        f'<div class="wide" role="group" tabindex="0" aria-label="{escape(label)}">',
-        '<table class="numbers">',
-        "<thead><tr>",
-        *(_cell("th", text, each.left) for text, each in zip(head, columns, strict=True)),
-        "</tr></thead>",
-        "<tbody>",
-    ]
+    lines = [f'<div class="wide" role="group" tabindex="0" aria-label="{escape(label)}">']
+    lines += ['<table class="numbers">', "<thead><tr>"]
+    lines += [_cell("th", text, each.left) for text, each in zip(head, columns, strict=True)]
+    lines += ["</tr></thead>", "<tbody>"]
     for row in rows:
-        cells = (
-            _cell("td", text, each.left, (links or {}).get(text))
-            for text, each in zip(row, columns, strict=True)
-        )
-        lines.append(f"<tr>{''.join(cells)}</tr>")
+        cells = zip(row, columns, strict=True)
+        shown = (_cell("td", text, each.left, (links or {}).get(text)) for text, each in cells)
+        lines.append(f"<tr>{''.join(shown)}</tr>")
     return "\n".join([*lines, "</tbody></table></div>"])
 
 
@@ -45,20 +41,14 @@ def _write_section(section: Section) -> Iterator[str]:
 
     Successive lines form one `pre`, successive labelled paragraphs (Field) one `dl`.
     """
-    lines: list[str] = []
-    fields: list[str] = []
-    for each in [*section, ""]:
-        if lines and not isinstance(each, Line):
-            yield "<pre>" + "\n".join(map(escape, lines)) + "</pre>"
-            lines = []
-        if fields and not isinstance(each, Field):
-            yield f"<dl>{''.join(fields)}</dl>"
-            fields = []
-        if isinstance(each, Line):
-            lines.append(each)
-        elif isinstance(each, Field):
-            fields.append(f"<dt>{escape(each.label.strip())}</dt><dd>{escape(each.text)}</dd>")
-        elif isinstance(each, Table):
-            yield table(each)
-        elif each:
-            yield f"<p>{escape(each)}</p>"
+    grouped: Any = groupby(section, type)
+    for kind, parts in grouped:
+        if kind is Line:
+            yield "<pre>" + "\n".join(map(escape, parts)) + "</pre>"
+        elif kind is Field:
+            pairs = ((escape(each.label.strip()), escape(each.text)) for each in parts)
+            yield f"<dl>{''.join(f'<dt>{label}</dt><dd>{text}</dd>' for label, text in pairs)}</dl>"
+        else:
+            yield from (
+                table(each) if kind is Table else f"<p>{escape(each)}</p>" for each in parts if each
+            )

@@ -55,13 +55,9 @@ def _set_title(picture: Picture) -> None:
     if not picture.title:
         return
     room = int(_LETTERS_PER_INCH * picture.figure.get_figwidth())
-    lines = [
-        line
-        for each in picture.title
-        for line in textwrap.wrap(
-            each, room, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False
-        )
-    ]
+    wrapper = textwrap.TextWrapper(room, max_lines=_MOST_LINES, placeholder=" ...")
+    wrapper.break_on_hyphens = False
+    lines = [line for each in picture.title for line in wrapper.wrap(each)]
     picture.figure.suptitle("\n".join(lines), fontsize=10, parse_math=False)
 
 

@@ -6,6 +6,7 @@ Text has paragraphs wrapped at 100 columns, and aligned tables.
 import io
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 from pyharness.model.report import Field, Line, Report, Section, Table
@@ -37,19 +38,18 @@ def render(report: Report, form: str) -> str:
 
 
 def _text(report: Report) -> str:
-    sections = []
-    for section in filter(None, report.text):
-        lines = []
-        for each in section:
-            lines += _aligned(each) if isinstance(each, Table) else _paragraph(each)
-        sections.append("\n".join(lines))
-    return "\n\n".join(sections) + "\n"
+    sections = (
+        [line for each in section for line in _lines(each)] for section in filter(None, report.text)
+    )
+    return "\n\n".join(map("\n".join, sections)) + "\n"
 
 
-def _paragraph(told: str | Field) -> list[str]:
-    """Return the lines of a paragraph; a Line is not wrapped, a Field has a label."""
+def _lines(told: str | Field | Table) -> list[str]:
+    """Return a part's lines; a Line is not wrapped, a Field has a label."""
     if isinstance(told, Line):
         return [told]
+    if isinstance(told, Table):
+        return _aligned(told)
     if isinstance(told, Field):
         indent = " " * len(told.label)
         return textwrap.wrap(told.text, _WIDTH, initial_indent=told.label, subsequent_indent=indent)
@@ -100,7 +100,7 @@ def _markdown(report: Report) -> str:
     if report.page is not None:
         return "\n".join(map(_markdown_section, report.page))
     assert report.data is not None
-    return _markdown_table(report.data.in_full())
+    return markdown_table(report.data.in_full())
 
 
 def _markdown_section(section: Section) -> str:
@@ -109,13 +109,14 @@ def _markdown_section(section: Section) -> str:
         if isinstance(each, Table):
             # Markdown recognises a table only after a blank line.
             parts += ["\n"] if parts else []
-            parts.append(_markdown_table(each.written()))
+            parts.append(markdown_table(each.written()))
         else:
-            parts += [f"{line}\n" for line in _paragraph(each)]
+            parts += [f"{line}\n" for line in _lines(each)]
     return "".join(parts)
 
 
-def _markdown_table(cells: list[list[str]]) -> str:
+def markdown_table(cells: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table, whose heads are the first row."""
     head, *rows = cells
     lines = [head, ["---"] * len(head), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
@@ -151,14 +152,10 @@ def _junit(report: Report) -> str:
     """
     from xml.etree import ElementTree as xml
 
-    suite = xml.Element(
-        "testsuite",
-        name=report.title,
-        tests=str(len(report.cases)),
-        failures=str(sum(bool(why) for _, _, why, _ in report.cases)),
-        errors="0",
-        skipped="0",
-    )
+    failures = sum(bool(why) for _, _, why, _ in report.cases)
+    counts = {"tests": len(report.cases), "failures": failures, "errors": 0, "skipped": 0}
+    texts = {name: str(count) for name, count in counts.items()}
+    suite = xml.Element("testsuite", {"name": report.title} | texts)
     for kind, id, why, replay in report.cases:
         named = {"classname": f"{report.title}.{kind}", "name": id}
         case = xml.SubElement(suite, "testcase", named)

@@ -17,14 +17,13 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from pyharness.cli.main import main
-from pyharness.edition.crate import CRATE, KEPT, MANIFEST, PACKAGE_MARK
-from pyharness.edition.data_package import data_package
+from pyharness.edition.citation import CRATE, KEPT, MANIFEST, PACKAGE_MARK
+from pyharness.edition.data_package import data_package, outcomes_table
 from pyharness.edition.decks import TITLES
-from pyharness.edition.machine_bundle import outcomes_table
 from pyharness.edition.report import package_report
 from pyharness.history import identifiers
 from pyharness.history.ablation import entries
-from pyharness.history.claims.report import KINDS
+from pyharness.history.claims.ledger import KINDS
 from pyharness.history.figures import plans
 from pyharness.history.identifiers import content_identifier, directory_identifier, text_digest
 from pyharness.history.listing_output import fits, read_page

@@ -15,8 +15,7 @@ from pyharness.edition.data_package import archive, data_package
 from pyharness.edition.ledger import counts
 from pyharness.edition.markdown import document, slug
 from pyharness.history.ablation import entries
-from pyharness.history.claims.ledger import claims, judgements
-from pyharness.history.claims.report import kinds_table
+from pyharness.history.claims.ledger import claims, judgements, kinds_table
 from pyharness.history.claims.stories import sentences
 from pyharness.history.origins import disagreements
 from pyharness.history.timeline import timeline

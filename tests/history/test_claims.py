@@ -12,8 +12,17 @@ import pytest
 
 from pyharness.history.claims import ledger, methods, rules, theory, verdicts
 from pyharness.history.claims.laboratory import LITERALS, Assumptions, Laboratory, by_literals
-from pyharness.history.claims.ledger import Judgement, claim, claims, judgement, outcome
-from pyharness.history.claims.report import KINDS, claims_report, explanation, kinds_table
+from pyharness.history.claims.ledger import (
+    KINDS,
+    Judgement,
+    claim,
+    claims,
+    claims_report,
+    explanation,
+    judgement,
+    kinds_table,
+    outcome,
+)
 from pyharness.history.claims.stories import prose
 from pyharness.history.claims.verdicts import FALSE, IN_PART, NOT_TESTABLE, REPRODUCED
 from pyharness.history.family import Member

@@ -18,7 +18,7 @@ from pyharness.checks.integrators import protocol
 from pyharness.checks.port_protocol import request
 from pyharness.checks.scenes.random_scenes import draw_moderate
 from pyharness.cli.output import check_tree
-from pyharness.edition.crate import PACKAGE_MARK
+from pyharness.edition.citation import PACKAGE_MARK
 from pyharness.edition.report import MARK
 from pyharness.engine.scene_reader import read_scene
 from pyharness.model.errors import InputError

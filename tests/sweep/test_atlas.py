@@ -16,7 +16,7 @@ from pyharness.model.codes import Statuses
 from pyharness.model.errors import InputError
 from pyharness.model.trajectory import Array
 from pyharness.sweep.batches import solve_chunk
-from pyharness.sweep.forecast import places_of_a_chunk
+from pyharness.sweep.run import places_of_a_chunk
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.sweeps import run_sweep, written

@@ -14,8 +14,7 @@ from pyharness import InputError, Scene, read_scene, solve, torques
 from pyharness.model.codes import Statuses
 from pyharness.sweep.batches import batches, solve_points
 from pyharness.sweep.executors import EXECUTORS
-from pyharness.sweep.forecast import places_of_a_chunk
-from pyharness.sweep.run import swept
+from pyharness.sweep.run import places_of_a_chunk, swept
 from pyharness.sweep.store import opened
 from pyharness.sweep.sweep import Sweep, spread
 from pyharness.sweep.sweep_file import read_sweep

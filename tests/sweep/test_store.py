@@ -22,8 +22,7 @@ from pyharness.sweep import run, store, store_layout
 from pyharness.sweep.axes import MOST_VALUES
 from pyharness.sweep.batches import solve_chunk
 from pyharness.sweep.executors import engine
-from pyharness.sweep.forecast import forecast
-from pyharness.sweep.run import check_size
+from pyharness.sweep.run import check_size, forecast
 from pyharness.sweep.store import opened
 from pyharness.sweep.sweep_file import read_sweep
 from tests.sweep.killed import ATTITUDE, OMEGA, kill_and_resume

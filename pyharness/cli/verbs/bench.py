@@ -2,13 +2,13 @@
 
 import argparse
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from time import process_time
 from typing import TypeVar
 
 from pyharness.bench import report as reports
 from pyharness.bench.contenders import Contender, SceneContender, list_own_contenders
-from pyharness.bench.measure import Refusal, measure, workloads
+from pyharness.bench.measure import Refusal, Workload, measure, workloads
 from pyharness.bench.peers import peers
 from pyharness.bench.random_loads import random_load
 from pyharness.checks.scenes.random_scenes import weekly_seed
@@ -88,9 +88,7 @@ def run(options: argparse.Namespace) -> int:
     if not found.rows:
         told = "; ".join(reports.not_measured(found))
         raise InputError(f"bench: nothing could be measured: {told}")
-    found.refused.extend(
-        Refusal(load, each.name, None, _absent()) for each in missing for load in loads
-    )
+    found.refused.extend(_not_measured(missing, loads))
     packages = sorted({each.package for each in peers()} - {"", "scipy"})
     return shared.show(reports.bench_report(found, packages, _again(options)), options)
 
@@ -114,6 +112,10 @@ def _present(
             "--method or --peers"
         )
     return contenders, missing
+
+
+def _not_measured(missing: Sequence[Contender], loads: Sequence[Workload]) -> Iterator[Refusal]:
+    return (Refusal(load, each.name, None, _absent()) for each in missing for load in loads)
 
 
 def _absent() -> str:
@@ -220,17 +222,11 @@ def _terms(options: argparse.Namespace) -> int:
     # All solvers run on one core, because other load hardly affects processor time.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}
-    many = measure_ensembles(
-        term_loads.term_bodies(scenes, options.seed, n),
-        [each for each in term_loads.body_contenders() if each.package in packages],
-        options.seed,
-        shared.progress,
-        least=n,
-    )
+    bodies = term_loads.term_bodies(scenes, options.seed, n)
+    both = [each for each in term_loads.body_contenders() if each.package in packages]
+    many = measure_ensembles(bodies, both, options.seed, shared.progress, least=n)
     shared.end_progress()
-    single.refused.extend(
-        Refusal(load, each.name, None, _absent()) for each in missing for load in loads
-    )
+    single.refused.extend(_not_measured(missing, loads))
     found = term_report.Terms(single, many)
     return shared.show(term_report.term_report(found, ["heyoka"], _again(options)), options)
 

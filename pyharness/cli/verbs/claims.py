@@ -3,8 +3,15 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history.claims.ledger import assignments, claim, claims, judgement
-from pyharness.history.claims.report import assignments_report, claims_report, explanation
+from pyharness.history.claims.ledger import (
+    assignments,
+    assignments_report,
+    claim,
+    claims,
+    claims_report,
+    explanation,
+    judgement,
+)
 from pyharness.model.errors import InputError
 from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
@@ -86,10 +93,7 @@ def _atlas(options: argparse.Namespace) -> int:
             raise InputError(
                 f"--atlas '{options.atlas}': is not finished; 'pyharness sweep' continues it"
             )
-        codes = {
-            dict(asked.parameters)["id"]: store.array(asked.name)[...]
-            for asked in sweep.reductions
-            if asked.reduction == "claim"
-        }
-    shared.show(atlas_report(atlas_of(codes, {d: axes[d] for d in sweep.dimensions})), options)
-    return 0
+        judged = (asked for asked in sweep.reductions if asked.reduction == "claim")
+        codes = {dict(x.parameters)["id"]: store.array(x.name)[...] for x in judged}
+    atlas = atlas_of(codes, {each: axes[each] for each in sweep.dimensions})
+    return shared.show(atlas_report(atlas), options)

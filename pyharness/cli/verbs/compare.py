@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Sequence
+from typing import Any
 
 from pyharness.checks.compare.comparison import compare_methods, compare_programs, listings_for
+from pyharness.checks.compare.findings import Comparison
 from pyharness.checks.compare.report import comparison_report
 from pyharness.cli import options as shared
 from pyharness.engine.registry import METHODS, SCIPY_METHODS
@@ -59,47 +61,31 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--tolerance: {tolerance:g}; allowed: {finest:.2g} to 1")
     if options.ablate:
         return _ablate(options, scene, programs)
-    lipschitz = shared.chosen_lipschitz(options)
-    listings = listings_for(
-        programs,
-        options.listing,
-        shared.names(options.fix),
-        shared.names(options.keep),
-        shared.names(options.reading),
-        None if options.conjecture is None else shared.names(options.conjecture),
-    )
+    stops = shared.chosen_stops(options)
+    listings = listings_for(programs, options.listing, **shared.changes_of(options))
     shared.tell_inactive(options, listings)
     shared.check_outputs(options)
     effort = shared.chosen_effort(options)
     forms = {options.format or shared.FORMATS[0], *shared.also_files(options).values()}
-    found = compare_programs(
-        scene,
-        listings,
-        lipschitz=lipschitz,
-        may_stop=not options.no_stop,
-        tolerance=tolerance,
-        effort=effort,
-        attitude=options.attitude,
-        word=options.word or BINARY64,
-        methods=options.numerics or not forms <= _WITHOUT_METHODS,
-    )
-    shared.show(comparison_report(found, options.numerics), options)
-    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
+    more: dict[str, Any] = {"attitude": options.attitude, "word": options.word or BINARY64}
+    more["methods"] = options.numerics or not forms <= _WITHOUT_METHODS
+    found = compare_programs(scene, listings, **stops, tolerance=tolerance, effort=effort, **more)
+    return _show(options, found)
+
+
+def _show(options: argparse.Namespace, found: Comparison) -> int:
+    failed = found.unexpected or (options.strict and found.is_sensitive)
+    return shared.show(comparison_report(found, options.numerics), options, failed=failed)
 
 
 def _methods(options: argparse.Namespace) -> int:
     shared.refuse(options, "--method", ("program", *shared.LISTING, "word", "ablate", "numerics"))
     scene = shared.chosen_scene(options, any_state=True)
     shared.check_outputs(options)
-    found = compare_methods(
-        scene,
-        shared.names(options.method),
-        tolerance=shared.chosen_tolerance(options),
-        effort=shared.chosen_effort(options),
-        attitude=options.attitude,
-    )
-    shared.show(comparison_report(found), options)
-    return 1 if found.unexpected or (options.strict and found.is_sensitive) else 0
+    tolerance, effort = shared.chosen_tolerance(options), shared.chosen_effort(options)
+    more: dict[str, Any] = {"tolerance": tolerance, "effort": effort, "attitude": options.attitude}
+    found = compare_methods(scene, shared.names(options.method), **more)
+    return _show(options, found)
 
 
 def _ablate(options: argparse.Namespace, scene: Scene, programs: Sequence[str]) -> int:

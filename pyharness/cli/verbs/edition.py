@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> int:
     from pyharness.edition.report import MARK, check_libraries, edition_report, package_report
 
     if options.data is not None:
-        from pyharness.edition.crate import PACKAGE_MARK
+        from pyharness.edition.citation import PACKAGE_MARK
         from pyharness.edition.data_package import data_package
 
         shared.refuse(options, "--data", ("out", "docs"))

@@ -1,6 +1,7 @@
 """The verb `family`: derive and measure the orders of the weighted residual methods."""
 
 import argparse
+from typing import Any
 
 from pyharness.cli import options as shared
 from pyharness.history.family import POINTS, WEIGHTINGS, Member, family_report, order_table
@@ -43,24 +44,21 @@ def run(options: argparse.Namespace) -> int:
     members = [_member(options)] if one else None
     shared.check_outputs(options)
     found = order_table(scene, members, shared.progress)
-    shared.show(family_report(scene, found), options)
-    return 1 if any(each.misses for each in found) else 0
+    failed = any(each.misses for each in found)
+    return shared.show(family_report(scene, found), options, failed=failed)
 
 
 def _member(options: argparse.Namespace) -> Member:
-    points: str | tuple[float, ...] | None = options.points
+    points: Any = options.points
     if points is not None and points not in POINTS:
         letters = all(character.isalpha() or character == "-" for character in str(points))
         if not (points and letters):
             points = tuple(shared.numbers(options.points, "--points"))
-    return Member(
-        weighting="collocation" if options.weighting is None else options.weighting,
-        terms=2 if options.terms is None else shared.whole(options.terms, "--terms"),
-        points=points,
-        corrections=1
-        if options.corrections is None
-        else shared.whole(options.corrections, "--corrections"),
-    )
+    fields = {"weighting": options.weighting, "points": points}
+    for name in ("terms", "corrections"):
+        text = getattr(options, name)
+        fields[name] = None if text is None else shared.whole(text, f"--{name}")
+    return Member(**{name: value for name, value in fields.items() if value is not None})
 
 
 def _lost(options: argparse.Namespace) -> int:

@@ -39,22 +39,14 @@ def run(options: argparse.Namespace) -> int:
     scene = shared.chosen_scene(
         options, any_axes=True, any_torque=True, any_state=True, changing=True
     )
-    times = [scene.times()[-1]]
-    if options.times is not None:
-        times = shared.numbers(options.times, "--times")
+    end = [scene.times()[-1]]
+    times = end if options.times is None else shared.numbers(options.times, "--times")
     digits = shared.whole_up_to(MOST_DIGITS, options.digits, "--digits", _DIGITS)
     effort = shared.chosen_effort(options)
     shared.check_outputs(options)
     if options.certificate is None:
-        found = enclose(
-            scene,
-            times,
-            digits,
-            velocity=options.velocity,
-            transition=options.transition,
-            effort=effort,
-            progress=shared.progress,
-        )
+        more = {"velocity": options.velocity, "transition": options.transition}
+        found = enclose(scene, times, digits, **more, effort=effort, progress=shared.progress)
     else:
         shared.refuse(options, "--certificate", ("velocity", "transition"))
         check_writable(options.certificate, "--certificate")
@@ -73,5 +65,5 @@ def _check(options: argparse.Namespace) -> int:
     for number, name in enumerate(names):
         shared.progress(number, len(names), name)
         found.append((name, *check_file(name)))
-    shared.show(certificates_report(found), options)
-    return int(any(proved is None for _, proved, _ in found))
+    failed = any(proved is None for _, proved, _ in found)
+    return shared.show(certificates_report(found), options, failed=failed)

@@ -3,6 +3,8 @@
 import argparse
 import sys
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from pyharness.cli import options as shared
 from pyharness.engine.report import trajectory_report
@@ -68,14 +70,8 @@ def run(options: argparse.Namespace) -> int:
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"
     by_method = options.method is not None
-    scene = shared.chosen_scene(
-        options,
-        any_axes=by_method,
-        any_torque=by_method,
-        any_state=by_method,
-        changing=by_method,
-        states=by_method,
-    )
+    kinds = ("any_axes", "any_torque", "any_state", "changing", "states")
+    scene = shared.chosen_scene(options, **dict.fromkeys(kinds, by_method))
     if (options.program is None) == (options.method is None):
         from pyharness.engine.registry import METHODS
 
@@ -99,21 +95,17 @@ def run(options: argparse.Namespace) -> int:
 
             bound = trajectory_bound(scene, trajectory, shared.chosen_effort(options))
 
-    def page() -> str:
-        from pyharness.thesis.printer import page
+    def write(form: str) -> str | bytes:
+        from pyharness.thesis.printer import page, tape5
 
-        return page(scene, name, trajectory)
-
-    def tape() -> bytes:
-        from pyharness.thesis.printer import tape5
-
-        return tape5(trajectory)
+        return tape5(trajectory) if form == "tape5" else page(scene, name, trajectory)
 
     form = options.attitude or FORMS[0]
     word = None if options.word == BINARY64 else options.word
     report = trajectory_report(scene, name, listing, title, trajectory, form, word, bound)
-    shared.show(report, options, {"printer": page, "tape5": tape})
-    return 1 if options.strict and trajectory.ended in ("sensitive", "unchecked") else 0
+    failed = options.strict and trajectory.ended in ("sensitive", "unchecked")
+    own = {each: partial(write, each) for each in PROGRAM_FORMATS}
+    return shared.show(report, options, own, failed)
 
 
 def _check_program_format(options: argparse.Namespace, scene: Scene, form: str) -> None:
@@ -144,21 +136,14 @@ def _program(options: argparse.Namespace, scene: Scene) -> tuple[str, Listing, s
     shared.refuse(options, "--program", ("times", "tolerance", "strict", "animate"))
     listing = shared.chosen_listing(options)
     name = listing.program
-    lipschitz = shared.chosen_lipschitz(options)
+    stops = shared.chosen_stops(options)
     word = options.word or BINARY64
     implementation = options.implementation or ("fortran" if word == BINARY64 else "python")
     shared.check_known("implementation", implementation, IMPLEMENTATIONS)
     checked_word(word, implementation)
     shared.check_outputs(options)
-    trajectory = run_program(
-        scene,
-        listing,
-        implementation,
-        lipschitz=lipschitz,
-        may_stop=not options.no_stop,
-        effort=shared.chosen_effort(options),
-        word=word,
-    )
+    effort = shared.chosen_effort(options)
+    trajectory = run_program(scene, listing, implementation, **stops, effort=effort, word=word)
     if options.attitude is not None:
         from pyharness.engine.from_rows import attitude_from_rows
 
@@ -178,9 +163,7 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
     name = options.method
     shared.check_known("method", name, tuple(METHODS))
     tolerance = shared.chosen_tolerance(options)
-    times = scene.times()
-    if options.times is not None:
-        times = shared.numbers(options.times, "--times")
+    times = scene.times() if options.times is None else shared.numbers(options.times, "--times")
     shared.check_outputs(options)
     attitude = None if options.attitude is None else True
     if options.animate is not None:
@@ -193,15 +176,8 @@ def _method(options: argparse.Namespace, scene: Scene) -> tuple[str, str, Trajec
             )
         check_animation(options.animate, scene.changing or principal(scene)[0].moments)
         attitude = True
-    trajectory = solve(
-        scene,
-        times,
-        name,
-        tolerance,
-        effort=shared.chosen_effort(options),
-        attitude=attitude,
-        dense_output=options.animate is not None,
-    )
+    more: dict[str, Any] = {"attitude": attitude, "dense_output": options.animate is not None}
+    trajectory = solve(scene, times, name, tolerance, effort=shared.chosen_effort(options), **more)
     if options.animate is not None:
         trajectory.animate(options.animate)
     title = f"method {name}: {METHODS[name].title}"

@@ -11,7 +11,6 @@ from pyharness.cli import say
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 from pyharness.sweep.executors import EXECUTORS, check_dask
-from pyharness.sweep.forecast import format_estimate
 from pyharness.sweep.run import swept
 from pyharness.sweep.store import check_zarr
 from pyharness.sweep.sweep_file import read_sweep
@@ -58,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     quantity = None
     shown = shared.without_out(options)
     if options.plot is not None:
-        from pyharness.sweep.picture import chosen_quantity
+        from pyharness.sweep.report import chosen_quantity
 
         quantity = chosen_quantity(sweep, options.quantity)
     elif options.quantity is not None:
@@ -72,14 +71,14 @@ def run(options: argparse.Namespace) -> int:
         executor,
         workers,
         options.scheduler,
-        before=lambda estimate: say(f"pyharness: {format_estimate(estimate)}\n"),
+        before=lambda estimate: say(f"pyharness: {estimate.text}\n"),
         progress=shared.progress,
         repair=options.repair,
     ) as (store, outcome):
         shared.end_progress()
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:
-            from pyharness.sweep.picture import sweep_picture
+            from pyharness.sweep.report import sweep_picture
 
             report = report._replace(pictures={"sweep": partial(sweep_picture, store, quantity)})
         return shared.show(report, shown)

@@ -102,8 +102,8 @@ def run(options: argparse.Namespace) -> int:
     drawn = samples(checks, ROUNDING) if options.draws is not None else []
     more = [*drawn, *references(checks)]
     text = summary([*_title(chosen), *_unjudged(chosen, checks)], checks, more=more)
-    shared.show(checks_report("verify", checks, text, seed=chosen.seed), options)
-    return 0 if all(check.passed for check in checks) else 1
+    report = checks_report("verify", checks, text, seed=chosen.seed)
+    return shared.show(report, options, failed=not all(check.passed for check in checks))
 
 
 def _listing_output(options: argparse.Namespace) -> int:
@@ -115,8 +115,8 @@ def _listing_output(options: argparse.Namespace) -> int:
     shared.check_outputs(options)
     lines = read_page(options.listing_output)
     found = fits(lines, programs, cases, shared.progress)
-    shared.show(listing_output_report(options.listing_output, found), options)
-    return 0 if found[0].is_whole else 1
+    report = listing_output_report(options.listing_output, found)
+    return shared.show(report, options, failed=not found[0].is_whole)
 
 
 def _programs_and_cases(options: argparse.Namespace) -> tuple[tuple[str, ...], list[int]]:

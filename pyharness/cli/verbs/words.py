@@ -55,20 +55,12 @@ def _vectors(options: argparse.Namespace) -> int:
     first = next((each for each in found if not each.agrees), None)
     if first is not None:
         vector = first.vector
-        told += [
-            f"the first that differs: {vector.name} ({vector.op})",
-            f"x      {vector.x}",
-            f"y      {vector.y}",
-            f"result {vector.result}",
-            f"ours   {first.found}",
-        ]
+        told.append(f"the first that differs: {vector.name} ({vector.op})")
+        told += [f"{name:6s} {getattr(vector, name)}" for name in ("x", "y", "result")]
+        told.append(f"ours   {first.found}")
     rows = [[*each.vector, each.found, each.agrees] for each in found]
     heads = [*columns("name op x y result found"), Column("agrees")]
     record = [{**each.vector._asdict(), "found": each.found} for each in found]
-    report = Report(
-        "words",
-        text=[told],
-        record=lambda: {"vectors": record, "passed": first is None},
-        data=Table(heads, rows),
-    )
+    whole = {"vectors": record, "passed": first is None}
+    report = Report("words", [told], lambda: whole, Table(heads, rows))
     return shared.show(report, options, failed=first is not None)

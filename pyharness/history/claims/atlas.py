@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
+from itertools import product, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,7 @@ _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
 _MAPS = 6
+_KEYS = ("id", "whole", "in part", "not", "bits")
 _PERCENT = digits(".2f", 100.0)
 _VERDICTS = (Column("whole %", _PERCENT), Column("in part %", _PERCENT), Column("not %", _PERCENT))
 _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 3))
@@ -84,12 +85,8 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
         raise InputError(
             "--atlas: chunks of the store are missing; 'pyharness sweep' computes them"
         )
-    return Atlas(
-        codes,
-        [str(each) for each in axes["reading"]],
-        [int(each) for each in axes["steps"]],
-        *(axes[name] for name in WHERE),
-    )
+    readings, steps = [*map(str, axes["reading"])], [*map(int, axes["steps"])]
+    return Atlas(codes, readings, steps, *(axes[name] for name in WHERE))
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
@@ -125,10 +122,7 @@ def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}
-    return {
-        start: {name: int(codes[k]) for name, codes in found.items()}
-        for k, start in enumerate(given)
-    }
+    return {start: {name: int(x[k]) for name, x in found.items()} for k, start in enumerate(given)}
 
 
 def atlas_report(atlas: Atlas) -> Report:
@@ -162,20 +156,13 @@ def atlas_report(atlas: Atlas) -> Report:
                 _percentage_turned(atlas),
             ],
         ]
-    return Report(
-        "claims",
-        sections,
-        record=lambda: {
-            "claims": [
-                dict(zip(("id", "whole", "in part", "not", "bits"), row, strict=True))
-                for row in claims.rows
-            ],
-            "best": best,
-            "starts": [list(atlas.start(at)) for at in places],
-        },
-        data=claims,
-        pictures={"atlas": partial(atlas_picture, atlas)},
-    )
+
+    def record() -> dict[str, Any]:
+        found = [dict(zip(_KEYS, row, strict=True)) for row in claims.rows]
+        return {"claims": found, "best": best, "starts": [list(atlas.start(at)) for at in places]}
+
+    pictures = {"atlas": partial(atlas_picture, atlas)}
+    return Report("claims", sections, record, claims, pictures=pictures)
 
 
 def _claims(atlas: Atlas) -> Table:
@@ -222,11 +209,9 @@ def _by_case(atlas: Atlas) -> Table:
             row += [float(held.mean()), *ends]
         rows.append(row)
     size = digits(".3g")
-    columns = [
-        Column("case"), Column("claims"),
-        Column("hold %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
-        Column("whole %", _PERCENT), Column("from rad/s", size), Column("to rad/s", size),
-    ]  # fmt: skip
+    columns = [Column("case"), Column("claims")]
+    for head in ("hold %", "whole %"):
+        columns += [Column(head, _PERCENT), Column("from rad/s", size), Column("to rad/s", size)]
     return Table(columns, rows)
 
 
@@ -284,16 +269,10 @@ def atlas_picture(atlas: Atlas) -> Picture:
         [[sum_of_points([each]).mean() for each in atlas.codes[name][0, 0]] for name in names]
     )
     _draw_claims(claims, atlas, names, means)
-    rows = [
-        (
-            name,
-            float(magnitude),
-            float(means[k, m]),
-            float((atlas.codes[name][0, 0, m] != FAILS).mean()),
-        )
-        for k, name in enumerate(names)
-        for m, magnitude in enumerate(atlas.magnitudes)
-    ]
+    rows: list[tuple[Any, ...]] = []
+    for name, points in zip(names, means.tolist(), strict=True):
+        shares = [float((each != FAILS).mean()) for each in atlas.codes[name][0, 0]]
+        rows += zip(repeat(name), atlas.magnitudes.tolist(), points, shares, strict=False)
     title = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
     return Picture(
         figure,

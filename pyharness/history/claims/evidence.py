@@ -70,15 +70,11 @@ class Combination:
         """Return the value of each choice as text, by the name of the choice."""
         given = self.assumptions
         active = given.readings | (given.conjectures or frozenset())
-        return {
-            "omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted",
-            **{
-                f"{kind} {name}": "yes" if name in active else "no"
-                for kind in ("reading", "conjecture")
-                for name in names_of(kind)
-            },
-            "steps": str(given.steps),
-        }
+        found = {"omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted"}
+        for kind in ("reading", "conjecture"):
+            for name in names_of(kind):
+                found[f"{kind} {name}"] = "yes" if name in active else "no"
+        return found | {"steps": str(given.steps)}
 
     def verdict_on(self, name: str) -> str:
         """Return the verdict on a claim by its identifier."""
@@ -125,12 +121,9 @@ def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)
     named = [each for each in hangs_on if each.startswith("conjecture ")]
-    return Assumptions(
-        chosen.start if "omega0" in hangs_on else None,
-        readings,
-        chosen.steps if "steps" in hangs_on else 100,
-        chosen.conjectures if named else None,
-    )
+    start = chosen.start if "omega0" in hangs_on else None
+    steps = chosen.steps if "steps" in hangs_on else 100
+    return Assumptions(start, readings, steps, chosen.conjectures if named else None)
 
 
 @cache
@@ -159,30 +152,24 @@ def evidence_report(found: Sequence[Combination]) -> Report:
     many = len(rows) > 2 * _SHOWN
     shown = [*rows[:_SHOWN], gap, *rows[-_SHOWN:]] if many else rows
     keys = "; ".join(f"{short}: {axis}" for axis, short in _SHORT.items() if short != axis)
-    return Report(
-        "claims",
-        [
-            [_RULE],
-            [f"Each row is one combination; reproduced: number of claims. {keys}"],
-            [Table(columns, shown)],
-            [f"{counted(len(telling), 'claim')} of {len(ordered[0].verdicts)} discriminate:"],
-            [Table([*words("claim"), Column("verdicts", left=True, fit="wrap")], spread)],
-            [f"what remains among those of the highest score, {best:g}:"],
-            [Field(f"  {axis}: ", " or ".join(values)) for axis, values in open_axes.items()],
-        ],
-        record=lambda: {
-            "rule": _RULE,
-            "combinations": [
-                {**each.choices(), "score": each.score, "holding": each.holding,
-                 "verdicts": each.verdicts}
-                for each in ordered
-            ],
-            "discriminating": telling,
-            "undecided": open_axes,
-        },
-        data=Table(columns, rows),
-        pictures={"evidence": partial(_picture, ordered, telling)},
-    )  # fmt: skip
+    text: list[list[Any]] = [
+        [_RULE],
+        [f"Each row is one combination; reproduced: number of claims. {keys}"],
+        [Table(columns, shown)],
+        [f"{counted(len(telling), 'claim')} of {len(ordered[0].verdicts)} discriminate:"],
+        [Table([*words("claim"), Column("verdicts", left=True, fit="wrap")], spread)],
+        [f"what remains among those of the highest score, {best:g}:"],
+        [Field(f"  {axis}: ", " or ".join(values)) for axis, values in open_axes.items()],
+    ]
+
+    def record() -> dict[str, Any]:
+        names = ("score", "holding", "verdicts")
+        found = [x.choices() | {name: getattr(x, name) for name in names} for x in ordered]
+        told = {"rule": _RULE, "combinations": found, "discriminating": telling}
+        return told | {"undecided": open_axes}
+
+    pictures = {"evidence": partial(_picture, ordered, telling)}
+    return Report("claims", text, record, Table(columns, rows), pictures=pictures)
 
 
 def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:

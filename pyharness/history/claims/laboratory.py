@@ -122,9 +122,8 @@ class Laboratory:
 
 def starts() -> list[Triple]:
     """Return all initial omegas (rad/s) in the thesis, and one that we add."""
-    return [
-        (float(a), float(b), float(c)) for a, b, c in (s["omega"] for s in facts("claims")["start"])
-    ]
+    given = (each["omega"] for each in facts("claims")["start"])
+    return [(float(a), float(b), float(c)) for a, b, c in given]
 
 
 def start_text(start: Triple) -> str:

@@ -58,10 +58,8 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
         a, b, c = lab.scene(case).euler_coefficients
         run = lab.run("runge-kutta", case)
         points = np.vstack([lab.truth(case).omega, run.omega])
-        norm = max(
-            float(np.linalg.norm([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]], 2))
-            for x, y, z in points
-        )
+        matrices = ([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]] for x, y, z in points)
+        norm = max(float(np.linalg.norm(matrix, 2)) for matrix in matrices)
         if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
             # The equations of V are bilinear in V and omega; their derivatives have these norms.
             assert run.velocity is not None
@@ -205,11 +203,8 @@ def seconds(lab: Laboratory) -> Judged:
 
     Present run times are no evidence on the original machine.
     """
-    counts = {program: operations_per_step(lab.listing(program)) for program in PROGRAMS}
-    numbers = {
-        f"{program}: operations in 100 steps": 100.0 * each.written
-        for program, each in counts.items()
-    }
+    counts = {program: operations_per_step(lab.listing(program)).written for program in PROGRAMS}
+    numbers = {f"{program}: operations in 100 steps": 100.0 * n for program, n in counts.items()}
     return Judged(NOT_TESTABLE, numbers)
 
 

@@ -63,21 +63,12 @@ class Starts:
         return array if case in open_starts() else array[0]
 
     def _run(self, program: str, case: int, may_stop: bool, parts: int) -> Runs:
-        scene = self.scene(case, parts)
-        found = run_many(
-            scene,
-            self._one.listing(program),
-            omega=self._starts(case),
-            may_stop=may_stop,
-            at=range(parts, scene.steps + 1, parts),
-            effort=_EFFORT,
-        )
-        return Runs(
-            self._shaped(case, found.omega),
-            self._shaped(case, found.n_rows // parts),
-            self._shaped(case, found.status == Statuses.COMPLETE),
-            self._shaped(case, found.status == Statuses.OVERFLOW),
-        )
+        scene, omega0 = self.scene(case, parts), self._starts(case)
+        listing, at = self._one.listing(program), range(parts, scene.steps + 1, parts)
+        found = run_many(scene, listing, omega=omega0, may_stop=may_stop, at=at, effort=_EFFORT)
+        ends = (found.status == each for each in (Statuses.COMPLETE, Statuses.OVERFLOW))
+        arrays = (found.omega, found.n_rows // parts, *ends)
+        return Runs(*(self._shaped(case, each) for each in arrays))
 
     def _integrated(self, case: int) -> Array:
         scene, state = self.scene(case), self._starts(case)

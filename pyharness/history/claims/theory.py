@@ -19,6 +19,7 @@ from pyharness.engine.solve import solve
 from pyharness.history.claims.laboratory import Laboratory, distance, largest
 from pyharness.history.claims.verdicts import FALSE, REPRODUCED, Judged, graded
 from pyharness.history.family import Member, run
+from pyharness.model.listing import PROGRAMS
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import Array
 from pyharness.thesis.cards import deck
@@ -70,13 +71,10 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
 
 def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
     _, theta, psi = angles
-    return np.array(
-        [
-            [math.sin(theta) * math.sin(psi), math.cos(psi), 0.0],
-            [math.sin(theta) * math.cos(psi), -math.sin(psi), 0.0],
-            [math.cos(theta), 0.0, 1.0],
-        ]
-    )
+    sin, cos = math.sin, math.cos
+    first = [sin(theta) * sin(psi), cos(psi), 0.0]
+    second = [sin(theta) * cos(psi), -sin(psi), 0.0]
+    return np.array([first, second, [cos(theta), 0.0, 1.0]])
 
 
 def _omega(moments: Triple, state: Array) -> Array:
@@ -282,22 +280,17 @@ def one_term_suffices(lab: Laboratory, case: int, limit: float) -> Judged:
 
 def symmetric_uncoupled(lab: Laboratory, cases: list[int]) -> Judged:
     """Judge the claim that Euler's equations of a symmetric body have no products of omegas."""
-    left = {
-        f"case {case}: largest coefficient": max(map(abs, lab.scene(case).euler_coefficients))
-        for case in cases
-    }
+    bodies = {case: lab.scene(case).euler_coefficients for case in cases}
+    left = {f"case {n}: largest coefficient": max(map(abs, x)) for n, x in bodies.items()}
     none = [each == 0.0 for each in left.values()]
     return graded(left, all(none), any(none))
 
 
 def step_on_cards(lab: Laboratory, step: float) -> Judged:
     """Judge the claim that each of the three decks sets DT to `step` (s) before its loop."""
-    numbers = {
-        f"{program}: DT (s)": float(card.statement.partition("=")[2])
-        for program in ("two-term", "four-term", "runge-kutta")
-        for card in deck(program).cards.values()
-        if card.statement.startswith("DT=.")
-    }
+    cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
+    setting = (card for card in cards if card.statement.startswith("DT=."))
+    numbers = {f"{x.program}: DT (s)": float(x.statement.partition("=")[2]) for x in setting}
     same = len(numbers) == 3 and set(numbers.values()) == {step}
     return graded(numbers, same)
 

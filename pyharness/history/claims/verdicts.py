@@ -132,10 +132,8 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     The numbers name the subsets of defects with which the run stops at that step.
     """
     stop = lab.run("runge-kutta", case).stop
-    every = [
-        Listing("runge-kutta", defects, lab.listing("runge-kutta").readings)
-        for defects in subsets(names_of("defect", "runge-kutta"))
-    ]
+    name, readings = "runge-kutta", lab.listing("runge-kutta").readings
+    every = [Listing(name, each, readings) for each in subsets(names_of("defect", name))]
     there = []
     for each in every:
         other = lab.run_on(lab.scene(case), each).stop
@@ -143,10 +141,8 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
             mended = sorted(Listing.original(each.program).defects - each.defects)
             there.append(f"original but for {', '.join(mended)}" if mended else "original")
     numbers = {} if stop is None else {"stopped at step": float(stop.step)}
-    numbers |= {
-        f"of {len(every)} subsets of the defects, stop there": float(len(there)),
-        **{f"stops there: {each}": float(step) for each in there},
-    }
+    numbers[f"of {len(every)} subsets of the defects, stop there"] = float(len(there))
+    numbers |= {f"stops there: {each}": float(step) for each in there}
     if stop is None:
         numbers["steps that it ran"] = float(lab.run("runge-kutta", case).steps)
     return graded(numbers, stop is not None and stop.step == step, stop is not None)

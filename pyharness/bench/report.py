@@ -166,17 +166,13 @@ def _record(finding: Finding) -> dict[str, Any]:
     for row in finding.rows:
         own = {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
         rows.append(_settings_of(row) | own | {"note": row.note or None})
-    found: dict[str, Any] = {
-        "rows": rows,
-        "refused": [_settings_of(each) | {"reason": each.reason} for each in finding.refused],
-        "compile_seconds": [
-            {what: place, "method": method, "seconds": seconds}
-            for (place, method), seconds in finding.preparation.items()
-        ],
-        "reference_error": finding.doubt,
-        "reference_bound": {label: each.record() for label, each in finding.bounds.items()},
-        "attitude": finding.attitude,
-    }
+    refused = [_settings_of(each) | {"reason": each.reason} for each in finding.refused]
+    compiling, bounds = [], {label: each.record() for label, each in finding.bounds.items()}
+    for (place, method), seconds in finding.preparation.items():
+        compiling.append({what: place, "method": method, "seconds": seconds})
+    found: dict[str, Any] = {"rows": rows, "refused": refused, "compile_seconds": compiling}
+    found |= {"reference_error": finding.doubt, "reference_bound": bounds}
+    found["attitude"] = finding.attitude
     if drawn:
         found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
         scenes = attrgetter("scene.name", "kinds", "growth", "turns")

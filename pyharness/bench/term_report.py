@@ -123,11 +123,10 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 def _over_dop853(finding: Finding, load: Workload) -> float | None:
     """Return DOP853's run time divided by our run time at the same tolerance, or None."""
-    by, own = (
-        next((row.seconds for row in _rows(finding, load, name)
-              if row.setting == DOP853_TOLERANCE), None)
-        for name in (DOP853, OURS)
-    )  # fmt: skip
+    times = []
+    for rows in (_rows(finding, load, name) for name in (DOP853, OURS)):
+        times.append(next((x.seconds for x in rows if x.setting == DOP853_TOLERANCE), None))
+    by, own = times
     return by / own if by and own else None
 
 

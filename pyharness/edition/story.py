@@ -262,9 +262,7 @@ def _up(chart: Chart, y: float) -> float:
 
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
     """Return a curve as SVG points, as chart.js does."""
-    points = (
-        f"{_across(chart, a):.1f},{_up(chart, b):.1f}"
-        for a, b in zip(x, y, strict=True)
-        if not chart.is_logarithmic or b > 0.0
-    )
+    pairs = zip(x, y, strict=True)
+    shown = ((a, b) for a, b in pairs if not chart.is_logarithmic or b > 0.0)
+    points = (f"{_across(chart, a):.1f},{_up(chart, b):.1f}" for a, b in shown)
     return Curve(name, " ".join(points))

@@ -158,9 +158,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
 
 
 def _inertia(base: Array, own: Columns, n: int) -> Array | None:
-    varied = {
-        place: own[f"{INERTIA}{x}"] for x, place in ELEMENTS.items() if f"{INERTIA}{x}" in own
-    }
+    names = {place: f"{INERTIA}{x}" for x, place in ELEMENTS.items()}
+    varied = {place: own[name] for place, name in names.items() if name in own}
     if not varied:
         return None
     found = np.tile(base, (n, 1, 1))

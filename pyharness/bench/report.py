@@ -119,11 +119,8 @@ def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
 
 def _data(finding: Finding) -> Table:
     heads = "method kind setting seconds error evaluations note"
-    values = attrgetter(*heads.split())
-    rows = [
-        [row.workload.scene.case or None, row.workload.horizon, *values(row)]
-        for row in finding.rows
-    ]
+    values = attrgetter("workload.horizon", *heads.split())
+    rows = [[row.workload.scene.case or None, *values(row)] for row in finding.rows]
     return numbers("case horizon " + heads, rows)
 
 

@@ -248,10 +248,8 @@ def _batches(rates: Rates) -> str:
 
 def _data(found: Terms) -> Table:
     values = attrgetter("method", "setting", "seconds", "error", "preparing", "note")
-    rows = [
-        [row.workload.kinds[0], row.workload.label, row.workload.horizon, 1, *values(row)]
-        for row in found.single.rows
-    ]
+    where = attrgetter("workload.label", "workload.horizon")
+    rows = [[x.workload.kinds[0], *where(x), 1, *values(x)] for x in found.single.rows]
     kinds = {load.label: load.kinds[0] for load in found.single.workloads}
     rows += [
         [kinds[each.load], each.load, HORIZONS[0], each.bodies, each.method, each.setting,

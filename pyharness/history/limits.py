@@ -238,15 +238,12 @@ def limits_report(
     ends = [[x.program, x.order, x.halvings[-1].from_truth, x.tends_to] for x in found]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     listings = [Listing.original(each.program) for each in found]
-    text: list[Section] = [
-        heading(scene, listings),
-        [
-            "Limits of the original programs as the step shrinks, with the order of convergence, "
-            "and the distance from the true solution at the smallest step (rad/s):",
-            Table(_ENDS, ends),
-        ],
-        ["defects that change no omega here, corrected alone:", "; ".join(hidden)],
-    ]
+    head = (
+        "Limits of the original programs as the step shrinks, with the order of convergence, "
+        "and the distance from the true solution at the smallest step (rad/s):"
+    )
+    text: list[Section] = [heading(scene, listings), [head, Table(_ENDS, ends)]]
+    text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])
     data = []
     for each in found:
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]

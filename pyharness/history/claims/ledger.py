@@ -230,13 +230,12 @@ def explanation(judgement: Judgement) -> Report:
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Return the report on the initial omegas with which the claims about each case hold."""
-    text: list[Section] = [
-        [
-            "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
-            "shows, and (1, 1, 1), which is ours, the claims about that case alone, for the "
-            "original programs; those with the same failing verdict for every start do not count:"
-        ]
-    ]
+    head = (
+        "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows, "
+        "and (1, 1, 1), which is ours, the claims about that case alone, for the original "
+        "programs; those with the same failing verdict for every start do not count:"
+    )
+    text: list[Section] = [[head]]
     holding = []
     for case in dict.fromkeys(each.case for each in assignments):
         starts = [each for each in assignments if each.case == case]

@@ -57,16 +57,14 @@ def list_own_contenders() -> list[SceneContender]:
         both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
         both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
     ]
-    in_steps = [
-        (prepared_candidate(name, 1.0), METHODS[name].order) for name in (*FIXED_STEP, *GAUSS)
-    ]
+    names = (*FIXED_STEP, *GAUSS)
+    in_steps = [(prepared_candidate(name, 1.0), METHODS[name].order) for name in names]
     for listing in LISTINGS:
         candidate = program_candidate(listing, velocity=False)
         in_steps.append((candidate, PROGRAM_REGISTRY[listing.program].order))
-    return found + [
-        SceneContender(candidate.name, "steps", partial(_in_steps, candidate), order=order)
-        for candidate, order in in_steps
-    ]
+    for each, order in in_steps:
+        found.append(SceneContender(each.name, "steps", partial(_in_steps, each), order=order))
+    return found
 
 
 def refuse_rounding(solver: str, setting: float) -> None:

@@ -270,17 +270,13 @@ def _numba_kernels() -> tuple[Any, Any]:
         w, m = np.zeros((3, LANES)), np.zeros((3, LANES))
         for first in range(0, n, LANES):
             there = min(LANES, n - first)
-            for i in range(there):
-                for k in range(3):
-                    w[k, i] = starts[first + i, k]
-                    m[k, i] = torques[first + i, k]
+            w[:, :there] = starts[first : first + there].T
+            m[:, :there] = torques[first : first + there].T
             for _ in range(steps):
                 for i in range(LANES):
                     x, y, z = step(w[0, i], w[1, i], w[2, i], m[0, i], m[1, i], m[2, i], a, b, c, h)
                     w[0, i], w[1, i], w[2, i] = x, y, z
-            for i in range(there):
-                for k in range(3):
-                    ends[first + i, k] = w[k, i]
+            ends[first : first + there] = w[:, :there].T
 
     def bodies(
         starts: Array, torques: Array, rates: Array, h: float, steps: int, ends: Array

@@ -119,11 +119,8 @@ def _spread_parts(finding: Finding) -> list[tuple[str, Table]]:
 
 def _data(finding: Finding) -> Table:
     heads = "method kind setting seconds error evaluations note"
-    values = attrgetter(*heads.split())
-    rows = [
-        [row.workload.scene.case or None, row.workload.horizon, *values(row)]
-        for row in finding.rows
-    ]
+    values = attrgetter("workload.horizon", *heads.split())
+    rows = [[row.workload.scene.case or None, *values(row)] for row in finding.rows]
     return numbers("case horizon " + heads, rows)
 
 
@@ -166,17 +163,13 @@ def _record(finding: Finding) -> dict[str, Any]:
     for row in finding.rows:
         own = {name: getattr(row, name) for name in ("seconds", "error", "evaluations", "kind")}
         rows.append(_settings_of(row) | own | {"note": row.note or None})
-    found: dict[str, Any] = {
-        "rows": rows,
-        "refused": [_settings_of(each) | {"reason": each.reason} for each in finding.refused],
-        "compile_seconds": [
-            {what: place, "method": method, "seconds": seconds}
-            for (place, method), seconds in finding.preparation.items()
-        ],
-        "reference_error": finding.doubt,
-        "reference_bound": {label: each.record() for label, each in finding.bounds.items()},
-        "attitude": finding.attitude,
-    }
+    refused = [_settings_of(each) | {"reason": each.reason} for each in finding.refused]
+    compiling, bounds = [], {label: each.record() for label, each in finding.bounds.items()}
+    for (place, method), seconds in finding.preparation.items():
+        compiling.append({what: place, "method": method, "seconds": seconds})
+    found: dict[str, Any] = {"rows": rows, "refused": refused, "compile_seconds": compiling}
+    found |= {"reference_error": finding.doubt, "reference_bound": bounds}
+    found["attitude"] = finding.attitude
     if drawn:
         found["spreads"] = [asdict(each) for each in spreads(finding, KINDS)]
         scenes = attrgetter("scene.name", "kinds", "growth", "turns")

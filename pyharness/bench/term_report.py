@@ -123,11 +123,10 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
 
 def _over_dop853(finding: Finding, load: Workload) -> float | None:
     """Return DOP853's run time divided by our run time at the same tolerance, or None."""
-    by, own = (
-        next((row.seconds for row in _rows(finding, load, name)
-              if row.setting == DOP853_TOLERANCE), None)
-        for name in (DOP853, OURS)
-    )  # fmt: skip
+    times = []
+    for rows in (_rows(finding, load, name) for name in (DOP853, OURS)):
+        times.append(next((x.seconds for x in rows if x.setting == DOP853_TOLERANCE), None))
+    by, own = times
     return by / own if by and own else None
 
 
@@ -249,10 +248,8 @@ def _batches(rates: Rates) -> str:
 
 def _data(found: Terms) -> Table:
     values = attrgetter("method", "setting", "seconds", "error", "preparing", "note")
-    rows = [
-        [row.workload.kinds[0], row.workload.label, row.workload.horizon, 1, *values(row)]
-        for row in found.single.rows
-    ]
+    where = attrgetter("workload.label", "workload.horizon")
+    rows = [[x.workload.kinds[0], *where(x), 1, *values(x)] for x in found.single.rows]
     kinds = {load.label: load.kinds[0] for load in found.single.workloads}
     rows += [
         [kinds[each.load], each.load, HORIZONS[0], each.bodies, each.method, each.setting,

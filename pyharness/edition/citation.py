@@ -194,13 +194,10 @@ def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
     """
     software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]
-    people = [
-        *({"@id": f"#author-{number}", **each}
-          for number, each in enumerate(software["author"], 1)),
-        *({"@id": f"#thesis-author-{number}", **each, "name": f"{each['givenName']} "
-           f"{each['familyName']}"}
-          for number, each in enumerate(thesis["author"], 1)),
-    ]  # fmt: skip
+    people = [{"@id": f"#author-{n}", **each} for n, each in enumerate(software["author"], 1)]
+    for n, each in enumerate(thesis["author"], 1):
+        name = f"{each['givenName']} {each['familyName']}"
+        people.append({"@id": f"#thesis-author-{n}", **each, "name": name})
     licence, authors = software["license"], _references(people, "#thesis-author-")
     ours, source = _references(people, "#author-"), {"@id": "#thesis"}
     root = _entity("./", "Dataset", name=data_name(), description=data_description())

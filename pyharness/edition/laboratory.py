@@ -56,10 +56,7 @@ def data() -> dict[str, Any]:
     return {
         "scenes": list(map(requested_scene, cases.values())),
         "assumed": {number: assumption(number) for number in cases},
-        "assumedInRuns": {
-            number: {program: _assumed_in(scene, program) for program in PROGRAMS}
-            for number, scene in cases.items()
-        },
+        "assumedInRuns": {number: _assumed_in(scene) for number, scene in cases.items()},
         "headings": {number: _described(scene) for number, scene in cases.items()},
         "programs": list(PROGRAMS),
         "flags": [
@@ -70,18 +67,22 @@ def data() -> dict[str, Any]:
         "deck": _deck_data(),
         "lipschitz": facts("cases")["deck"]["lipschitz"],
         "most_steps": MOST_STEPS,
-        "printer": {
-            name: {part: formats_of(name)[part] for part in ("header", "heads", "rows")}
-            for name in PROGRAMS
-        },
+        "printer": {name: _printed_parts(name) for name in PROGRAMS},
         "defaults": DEFAULTS,
     }
 
 
-def _assumed_in(scene: Scene, program: str) -> list[dict[str, Any]]:
-    found = assumed(scene, [Listing.original(program)])
-    names = ("entry", "active", "what")
-    return [{name: each[name] for name in names} for each in found if each["on"] == "listing"]
+def _assumed_in(scene: Scene) -> dict[str, list[dict[str, Any]]]:
+    found, names = {}, ("entry", "active", "what")
+    for program in PROGRAMS:
+        each_on = assumed(scene, [Listing.original(program)])
+        on_cards = (each for each in each_on if each["on"] == "listing")
+        found[program] = [{name: each[name] for name in names} for each in on_cards]
+    return found
+
+
+def _printed_parts(program: str) -> dict[str, Any]:
+    return {part: formats_of(program)[part] for part in ("header", "heads", "rows")}
 
 
 def _deck_data() -> dict[str, Any]:

@@ -87,9 +87,7 @@ def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict
     """
     # best[i][j]: the largest sum for the rows from i on and the cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
-    pairs = [
-        [max(_likeness(each, card) for each in row.values()) for card in cards] for row in rows
-    ]
+    pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]
     for i in reversed(range(len(rows))):
         for j in reversed(range(len(cards))):
             both = pairs[i][j] + best[i + 1][j + 1] if pairs[i][j] >= _ALIKE else 0.0

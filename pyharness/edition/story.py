@@ -36,6 +36,7 @@ POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten from one label to the next
 Range = tuple[float, float]
+Names = tuple[str, ...]
 
 
 class Curve(NamedTuple):
@@ -108,17 +109,13 @@ def context() -> dict[str, Any]:
     ratios = {case: _ratios(case) for case in RACE_CASES}
     others = [ratio for case in RACE_CASES if case != 7 for ratio in ratios[case].values()]
     corrected = {name: _run(2, name, "corrected") for name in PROGRAMS}
-    fixed: dict[str, Any] = {
-        "box": BOX,
-        "titles": TITLES,
-        "letters": LETTERS,
-        "step_sizes": STEP_SIZES,
-    }
-    fixed |= {"stopped": stopped, "peak": velocity[-2], "after": velocity[-1]}
-    fixed["points_step"] = POINTS_STEP
-    return {
+    first, original = case_scene(1), Listing.original("runge-kutta")
+    others_of_case_1 = [replace(first, omega=x) for x in starts() if x != first.omega]
+    told: dict[str, Any] = {"box": BOX, "titles": TITLES, "letters": LETTERS, "data": data()}
+    told |= {"step_sizes": STEP_SIZES, "points_step": POINTS_STEP, "stopped": stopped}
+    told |= {"peak": velocity[-2], "after": velocity[-1], "case_7": ratios[7]}
+    return told | {
         "charts": {each.name: each for each in charts},
-        **fixed,
         "collocation_error": _first_error(2, "two-term"),
         "stop_error": _first_error(2, "runge-kutta"),
         "corrected_error": _first_error(2, "runge-kutta", "corrected"),
@@ -126,30 +123,20 @@ def context() -> dict[str, Any]:
         "from_limit": _distance(endless, limit),
         "alone": _run(2, "runge-kutta", without=("lipschitz-tests-velocity",)),
         "right": _run(2, "runge-kutta", without=tuple(facts("account")["mechanism"]["alone"])),
-        "in_48_bits": run_program(scene, Listing.original("runge-kutta"), "python", word="cdc48"),
-        "shown_starts": [
-            run_program(replace(case_scene(1), omega=start), Listing.original("runge-kutta")).steps
-            for start in starts()
-            if start != case_scene(1).omega
-        ],
+        "in_48_bits": run_program(scene, original, "python", word="cdc48"),
+        "shown_starts": [run_program(each, original).steps for each in others_of_case_1],
         "points_at": [each * point_at for each in _fractions("two-term")],
         "points_run": (_run(6, "two-term"), _first_error(6, "two-term")),
         "blind": {n: (_run(n, "runge-kutta"), _first_error(n, "runge-kutta")) for n in BLIND_CASES},
         "evaluations": {name: run.evaluations // run.steps for name, run in corrected.items()},
         "ratio": min(ratios[2].values()),
         "ratios": (min(others), max(others)),
-        "case_7": ratios[7],
-        "data": data(),
     }
 
 
 @cache
 def _run(
-    case: int,
-    program: str,
-    listing: str = "original",
-    without: tuple[str, ...] = (),
-    may_stop: bool = True,
+    case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
     """Return a twin's run, corrected or as printed without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
@@ -275,9 +262,7 @@ def _up(chart: Chart, y: float) -> float:
 
 def _curve(chart: Chart, name: str, x: Iterable[float], y: Iterable[float]) -> Curve:
     """Return a curve as SVG points, as chart.js does."""
-    points = (
-        f"{_across(chart, a):.1f},{_up(chart, b):.1f}"
-        for a, b in zip(x, y, strict=True)
-        if not chart.is_logarithmic or b > 0.0
-    )
+    pairs = zip(x, y, strict=True)
+    shown = ((a, b) for a, b in pairs if not chart.is_logarithmic or b > 0.0)
+    points = (f"{_across(chart, a):.1f},{_up(chart, b):.1f}" for a, b in shown)
     return Curve(name, " ".join(points))

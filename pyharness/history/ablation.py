@@ -214,14 +214,13 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
     columns = ("original", "this alone corrected", "this alone kept", "all corrected")
     if is_reading:
         columns = ("original, with it", "original", "corrected, with it", "corrected")
-    told: list[Section] = [
-        [
-            "Effect, measured now over 100 steps. w: largest error of the angular velocity "
-            "(rad/s) up to the end of the run; V: of the velocity (m/s); stop: variable and step "
-            f"that ended the run; {ASSUMED}: omega(0) of the case.",
-            ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True)),
-        ]
-    ]
+    legend = (
+        "Effect, measured now over 100 steps. w: largest error of the angular velocity (rad/s) up "
+        "to the end of the run; V: of the velocity (m/s); stop: variable and step that ended the "
+        f"run; {ASSUMED}: omega(0) of the case."
+    )
+    names = ", ".join(f"{a}: {text}" for a, text in zip("abcd", columns, strict=True))
+    told: list[Section] = [[legend, names]]
     for program in dict.fromkeys(each.program for each in effects):
         rows = []
         for each in (each for each in effects if each.program == program):

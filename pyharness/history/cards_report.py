@@ -151,18 +151,11 @@ def _block(card: Card) -> Section:
     for name, places in (("port", found.port), ("twin", found.twin)):
         texts = [f"{file}:{line} {text}" for file, line, text in places.get(card.number, ())]
         right += _named(name, texts or [missing])
-    entries = card.entries
-    told = [
-        Field(f"  {each['id']}: ", f"{each['kind']}, {each['certainty']}: {each['why']}")
-        for each in facts("apparatus")["entry"]
-        if each["id"] in entries
-    ]
+    about = [each for each in facts("apparatus")["entry"] if each["id"] in card.entries]
+    told = [Field(f"  {x['id']}: ", f"{x['kind']}, {x['certainty']}: {x['why']}") for x in about]
     alike = ", ".join(each.name for each in parallels(card))
-    return [
-        Line(f"{card.program} {card.number}" + (f"   (parallel: {alike})" if alike else "")),
-        *beside(left, right),
-        *told,
-    ]
+    head = f"{card.program} {card.number}" + (f"   (parallel: {alike})" if alike else "")
+    return [Line(head), *beside(left, right), *told]
 
 
 def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:

@@ -406,14 +406,12 @@ def _tables(found: Sequence[OrderFinding]) -> list[Section]:
     def table(write: Callable[[OrderFinding | None], str]) -> Table:
         return Table([*names, *(Column(f"k={k}", write) for k in corrections)], rows)
 
-    return [
-        [
-            "Each cell: order derived / order measured, with n terms and k corrections. ?: the "
-            "measured order did not converge before rounding errors dominated.",
-            table(_order),
-        ],
-        ["Largest error of any component of omega (rad/s):", table(_error)],
-    ]
+    legend = (
+        "Each cell: order derived / order measured, with n terms and k corrections. ?: the "
+        "measured order did not converge before rounding errors dominated."
+    )
+    errors: Section = ["Largest error of any component of omega (rad/s):", table(_error)]
+    return [[legend, table(_order)], errors]
 
 
 def _order(each: OrderFinding | None) -> str:

@@ -52,11 +52,9 @@ def source_files() -> dict[str, bytes]:
 
 def data_identifier() -> str:
     """Return the SWHID of the folder `DATA` in the source repository."""
-    files = source_files().items()
-    within = f"{DATA}/"
-    return directory_identifier(
-        {name.removeprefix(within): each for name, each in files if name.startswith(within)}
-    )
+    found, within = source_files(), f"{DATA}/"
+    names = [name for name in found if name.startswith(within)]
+    return directory_identifier({name.removeprefix(within): found[name] for name in names})
 
 
 def card_identifier(card: Card) -> str:

@@ -112,9 +112,8 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
     # Bound on the rounding errors of all steps, for numbers of the size of omega.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise
-    return Limit(
-        program, tends_to, tuple(found), math.log2(before / last) if finite else None, blow_up
-    )
+    order = math.log2(before / last) if finite else None
+    return Limit(program, tends_to, tuple(found), order, blow_up)
 
 
 def limit_solution(
@@ -236,20 +235,15 @@ def limits_report(
     scene: Scene, found: Sequence[Limit], invisible: Mapping[str, Sequence[str]]
 ) -> Report:
     """Return the report of `limits`: the programs' distances from their limits."""
-    ends = [
-        [each.program, each.order, each.halvings[-1].from_truth, each.tends_to] for each in found
-    ]
+    ends = [[x.program, x.order, x.halvings[-1].from_truth, x.tends_to] for x in found]
     hidden = [f"{each.program}: {', '.join(invisible[each.program]) or 'none'}" for each in found]
     listings = [Listing.original(each.program) for each in found]
-    text: list[Section] = [
-        heading(scene, listings),
-        [
-            "Limits of the original programs as the step shrinks, with the order of convergence, "
-            "and the distance from the true solution at the smallest step (rad/s):",
-            Table(_ENDS, ends),
-        ],
-        ["defects that change no omega here, corrected alone:", "; ".join(hidden)],
-    ]
+    head = (
+        "Limits of the original programs as the step shrinks, with the order of convergence, "
+        "and the distance from the true solution at the smallest step (rad/s):"
+    )
+    text: list[Section] = [heading(scene, listings), [head, Table(_ENDS, ends)]]
+    text.append(["defects that change no omega here, corrected alone:", "; ".join(hidden)])
     data = []
     for each in found:
         rows = [[h.step_size, h.from_limit, h.from_truth] for h in each.halvings]

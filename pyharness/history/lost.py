@@ -74,9 +74,7 @@ def ranked(word: str = BINARY64) -> list[Ranked]:
     for entry in facts("lost")["mistake"]:
         attempts = []
         for weighting in WEIGHTINGS:
-            shares = {
-                case: _share(case_scene(case), weighting, entry["id"], word) for case in CASES
-            }
+            shares = {n: _share(case_scene(n), weighting, entry["id"], word) for n in CASES}
             failed = tuple(case for case, share in shares.items() if not share <= limit)
             attempts.append(Attempt(entry["id"], weighting, shares, failed))
         found.append(Ranked(entry["id"], entry["summary"], tuple(attempts)))

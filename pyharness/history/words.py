@@ -201,11 +201,8 @@ def machine_report(cells: Sequence[WordCell]) -> Report:
 
 
 def _record(runs: Sequence[WordRun], cells: Sequence[WordCell]) -> dict[str, Any]:
-    return {
-        "runs": [run._asdict() for run in runs],
-        "build": build_record(),
-        "assumptions": assumption_records(_scenes(cells)),
-    }
+    found = {"runs": [run._asdict() for run in runs], "build": build_record()}
+    return found | {"assumptions": assumption_records(_scenes(cells))}
 
 
 def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
@@ -224,11 +221,8 @@ def _machine(cells: Sequence[WordCell]) -> Table:
     columns = [Column("case"), *words("program listing"), Column("fields"), Column("stop")]
     columns += [Column("error", short, unit="rad/s")]
     for name, _, _ in _MACHINE:
-        columns += [
-            Column(name, name=f"{name}_different"),
-            Column("stop", name=f"{name}_stop"),
-            Column("error", short, unit="rad/s", name=f"{name}_error"),
-        ]
+        columns += [Column(name, name=f"{name}_different"), Column("stop", name=f"{name}_stop")]
+        columns.append(Column("error", short, unit="rad/s", name=f"{name}_error"))
     rows = []
     for cell in cells:
         row = [*_head(cell), cell.double.fields, cell.double.stop or "-", cell.double.error]

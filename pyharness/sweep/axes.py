@@ -93,13 +93,11 @@ NUMBERS = {
     "steps": Field("1", "steps", "1 and above", lambda v: v >= 1.0, looped=True, whole=True),
     "lipschitz": Field("1/s", "constant of the stop test", *_FROM_ZERO, looped=True),
 }
+_POLAR = ("omega.magnitude", "tilt", "azimuth", "height", "longitude")
 # Pairs of groups of fields, by the beginnings of their names, that exclude each other, mostly
 # because they describe the same quantity.
 RIVALS = (
-    (
-        ("omega.1", "omega.2", "omega.3"),
-        ("omega.magnitude", "tilt", "azimuth", "height", "longitude"),
-    ),
+    (("omega.1", "omega.2", "omega.3"), _POLAR),
     (("tilt", "azimuth"), ("height", "longitude")),
     (("body.moments",), ("body.coefficients", "body.ratio", "body.square")),
     (("body.coefficients",), ("body.ratio", "body.square")),

@@ -112,12 +112,10 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
     sizes = own.get("step_size", np.full(n, scene.step_size))
     t_end = sizes * scene.steps if solver.t_end is None else np.full(n, solver.t_end)
     t_end = own.get("t_end", t_end)
-    found = {
-        "omega": _omega(scene, own, values if body == "moments" else None, n),
-        "attitude": _components("attitude", scene.attitude or IDENTITY, own, n, first=0),
-        **{name: own.get(name) for name in OF_PROGRAMS},
-        body: values,
-    }
+    omega = _omega(scene, own, values if body == "moments" else None, n)
+    attitude = _components("attitude", scene.attitude or IDENTITY, own, n, first=0)
+    found = {"omega": omega, "attitude": attitude}
+    found |= {name: own.get(name) for name in OF_PROGRAMS} | {body: values}
     if not isinstance(scene.torque, StateTorque):
         found["torque_constant"] = _components("torque.constant", scene.law.constant, own, n)
         found["torque_rate"] = _components("torque.rate", scene.law.rate, own, n)
@@ -160,9 +158,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
 
 
 def _inertia(base: Array, own: Columns, n: int) -> Array | None:
-    varied = {
-        place: own[f"{INERTIA}{x}"] for x, place in ELEMENTS.items() if f"{INERTIA}{x}" in own
-    }
+    names = {place: f"{INERTIA}{x}" for x, place in ELEMENTS.items()}
+    varied = {place: own[name] for place, name in names.items() if name in own}
     if not varied:
         return None
     found = np.tile(base, (n, 1, 1))

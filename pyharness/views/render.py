@@ -20,18 +20,13 @@ _END_ROWS = 10
 
 def render(report: Report, form: str) -> str:
     """Return a report as ``table``, ``csv``, ``markdown``, ``json``, ``junit`` or ``html``."""
-    match form:
-        case "table":
-            return _text(report)
-        case "csv":
-            assert report.data is not None
-            return csv_text(report.data)
-        case "markdown":
-            return _markdown(report)
-        case "json":
-            return json_text({"schema": SCHEMA, **report.record()})
-        case "junit":
-            return _junit(report)
+    if form in (writers := {"table": _text, "markdown": _markdown, "junit": _junit}):
+        return writers[form](report)
+    if form == "json":
+        return json_text({"schema": SCHEMA, **report.record()})
+    if form == "csv":
+        assert report.data is not None
+        return csv_text(report.data)
     from pyharness.views.html import sections
 
     return sections(report.text)

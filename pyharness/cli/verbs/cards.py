@@ -50,10 +50,8 @@ def run(options: argparse.Namespace) -> int:
     Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or
     --origins a mistake in its table.
     """
-    given = [
-        *(options.format == "tei", options.classes, options.collate, options.origins),
-        *(options.second_reading, options.scan is not None),
-    ]
+    given = [options.format == "tei", options.classes, options.collate, options.origins]
+    given += [options.second_reading, options.scan is not None]
     if not any(given):
         cards = chosen(shared.names(options.cards))
         shared.check_outputs(options)

@@ -23,9 +23,8 @@ EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 def run(options: argparse.Namespace) -> int:
     """Print which computations a scene needs, and why."""
-    scene = shared.chosen_scene(
-        options, any_torque=True, any_state=True, changing=True, states=True
-    )
+    kinds = ("any_torque", "any_state", "changing", "states")
+    scene = shared.chosen_scene(options, **dict.fromkeys(kinds, True))
     method = options.method or "auto"
     shared.check_known("method", method, tuple(PREPARED))
     tolerance = shared.chosen_tolerance(options)

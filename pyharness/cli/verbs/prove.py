@@ -36,9 +36,8 @@ def run(options: argparse.Namespace) -> int:
     """Print an enclosure of the solution, or check certificates; return 1 if one is invalid."""
     if options.check is not None:
         return _check(options)
-    scene = shared.chosen_scene(
-        options, any_axes=True, any_torque=True, any_state=True, changing=True
-    )
+    kinds = ("any_axes", "any_torque", "any_state", "changing")
+    scene = shared.chosen_scene(options, **dict.fromkeys(kinds, True))
     end = [scene.times()[-1]]
     times = end if options.times is None else shared.numbers(options.times, "--times")
     digits = shared.whole_up_to(MOST_DIGITS, options.digits, "--digits", _DIGITS)

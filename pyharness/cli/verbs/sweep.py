@@ -11,7 +11,7 @@ from pyharness.cli import say
 from pyharness.history.claims import over_starts
 from pyharness.model.errors import InputError
 from pyharness.sweep.executors import EXECUTORS, check_dask
-from pyharness.sweep.run import swept
+from pyharness.sweep.run import Estimate, swept
 from pyharness.sweep.store import check_zarr
 from pyharness.sweep.sweep_file import read_sweep
 
@@ -65,16 +65,11 @@ def run(options: argparse.Namespace) -> int:
     shared.check_outputs(shown)
     from pyharness.sweep.report import sweep_report
 
-    with swept(
-        sweep,
-        options.out,
-        executor,
-        workers,
-        options.scheduler,
-        before=lambda estimate: say(f"pyharness: {estimate.text}\n"),
-        progress=shared.progress,
-        repair=options.repair,
-    ) as (store, outcome):
+    def tell(estimate: Estimate) -> None:
+        say(f"pyharness: {estimate.text}\n")
+
+    where = (options.out, executor, workers, options.scheduler)
+    with swept(sweep, *where, tell, shared.progress, options.repair) as (store, outcome):
         shared.end_progress()
         report = sweep_report(store, outcome, options.out)
         if quantity is not None:

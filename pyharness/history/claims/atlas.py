@@ -149,13 +149,9 @@ def atlas_report(atlas: Atlas) -> Report:
         ["Starts that the thesis shows, and (1, 1, 1), which is ours:", _shown(atlas, score)],
     ]
     if n_choices > 1:
-        sections += [
-            ["Readings and steps:", _by_choice(atlas)],
-            [
-                "Starts whose verdict another reading turns, or other steps:",
-                _percentage_turned(atlas),
-            ],
-        ]
+        sections.append(["Readings and steps:", _by_choice(atlas)])
+        turned = "Starts whose verdict another reading turns, or other steps:"
+        sections.append([turned, _percentage_turned(atlas)])
 
     def record() -> dict[str, Any]:
         found = [dict(zip(_KEYS, row, strict=True)) for row in claims.rows]
@@ -274,11 +270,8 @@ def atlas_picture(atlas: Atlas) -> Picture:
         shares = [float((each != FAILS).mean()) for each in atlas.codes[name][0, 0]]
         rows += zip(repeat(name), atlas.magnitudes.tolist(), points, shares, strict=False)
     title = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
-    return Picture(
-        figure,
-        numbers("claim omega.magnitude mean_points share_not_failing", rows),
-        [f"claims of section V over starts omega(0) ({title})"],
-    )
+    data = numbers("claim omega.magnitude mean_points share_not_failing", rows)
+    return Picture(figure, data, [f"claims of section V over starts omega(0) ({title})"])
 
 
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:

@@ -195,6 +195,5 @@ def _picture(ordered: Sequence[Combination], telling: Sequence[str]) -> Picture:
         for k, each in enumerate(ordered, 1)
     ]
     names = ["place", *(axis.replace(" ", "_") for axis in axes), "score", *telling]
-    return Picture(
-        figure, numbers(" ".join(names), rows), ["claims that discriminate, by combination"]
-    )
+    title = ["claims that discriminate, by combination"]
+    return Picture(figure, numbers(" ".join(names), rows), title)

@@ -181,20 +181,17 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
         needed = ", ".join(_hangs_on(each)) or "-"
         rows.append([*place, each.original.verdict, each.corrected.verdict, needed])
     legend = "; ".join(name for _, name in _VERDICTS.values())
-    text: list[Section] = [
-        [
-            "original, corrected: our verdict for the programs as printed and as corrected: "
-            f"{legend}. depends on: assumptions without which a verdict changes."
-        ]
-    ]
+    head = (
+        "original, corrected: our verdict for the programs as printed and as corrected: "
+        f"{legend}. depends on: assumptions without which a verdict changes."
+    )
+    text: list[Section] = [[head]]
     for kind, about in KINDS.items():
         if of_kind := [[name, *rest] for name, its, *rest in rows if its == kind]:
             text.append([f"{kind}: {about}", Table(_LEDGER, of_kind)])
-    note = "`claims --explain ID` explains a verdict with its numbers."
     text.append(["Number of verdicts by kind, original / corrected:", kinds_table(judgements)])
-    text.append([note])
-    data = Table(_DATA, rows)
-    return Report("claims", text, record=lambda: _record(judgements), data=data)
+    text.append(["`claims --explain ID` explains a verdict with its numbers."])
+    return Report("claims", text, lambda: _record(judgements), Table(_DATA, rows))
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
@@ -214,15 +211,9 @@ def kinds_table(judgements: Sequence[Judgement]) -> Table:
 def explanation(judgement: Judgement) -> Report:
     """Return the report of one claim: quotation, rule, verdicts and their numbers."""
     entry = judgement.claim
-    text: list[Section] = [
-        [f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'],
-        [
-            Field("kind  ", entry["kind"]),
-            Field("says  ", entry["statement"]),
-            Field("rule  ", entry["rule"]),
-            *([Field("by    ", entry["source"])] if "source" in entry else []),
-        ],
-    ]
+    labels = {"kind": "kind", "statement": "says", "rule": "rule", "source": "by"}
+    fields = [Field(f"{x:6s}", entry[name]) for name, x in labels.items() if name in entry]
+    text: list[Section] = [[f'{entry["id"]} ({entry["where"]}): "{entry["quote"]}"'], fields]
     for title, outcome in (("original", judgement.original), ("corrected", judgement.corrected)):
         width = max(map(len, outcome.numbers), default=0)
         numbers = outcome.numbers.items()
@@ -239,13 +230,12 @@ def explanation(judgement: Judgement) -> Report:
 
 def assignments_report(assignments: Sequence[Assignment]) -> Report:
     """Return the report on the initial omegas with which the claims about each case hold."""
-    text: list[Section] = [
-        [
-            "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis "
-            "shows, and (1, 1, 1), which is ours, the claims about that case alone, for the "
-            "original programs; those with the same failing verdict for every start do not count:"
-        ]
-    ]
+    head = (
+        "omega(0) of Cases 1, 3, 4, 6 and 7 is not given. With each start that the thesis shows, "
+        "and (1, 1, 1), which is ours, the claims about that case alone, for the original "
+        "programs; those with the same failing verdict for every start do not count:"
+    )
+    text: list[Section] = [[head]]
     holding = []
     for case in dict.fromkeys(each.case for each in assignments):
         starts = [each for each in assignments if each.case == case]
@@ -257,12 +247,10 @@ def assignments_report(assignments: Sequence[Assignment]) -> Report:
         text.append(list(map(Line, lines)))
         holding.append(sum(each.holds for each in starts))
     every = (len(assignments) // len(holding)) ** len(holding)
-    end = (
-        f"all hold at once for {math.prod(holding)} of {every} assignments, "
-        "but for claims that fail with every start"
-    )
+    number = f"all hold at once for {math.prod(holding)} of {every} assignments"
+    text.append([Line(f"{number}, but for claims that fail with every start")])
     record = {"assignments": list(map(asdict, assignments))}
-    return Report("claims", [*text, [Line(end)]], lambda: record)
+    return Report("claims", text, lambda: record)
 
 
 def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:

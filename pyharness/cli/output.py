@@ -118,7 +118,7 @@ def _listed(mark: Path, kind: str) -> Iterable[str]:
 
 
 def _beside(folder: Path) -> tuple[Path, Path]:
-    new, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{what}") for what in ("new", "old"))
+    new, old = (folder.parent / f".{folder.name}.{os.getpid()}.{what}" for what in ("new", "old"))
     return new, old
 
 

@@ -751,7 +751,10 @@ contains
         return
       end if
       solution%rows(:, row) = z(:3)
-      if (associated(solution%attitudes)) solution%attitudes(:, row) = z(4:7)/norm2(z(4:7))
+      if (associated(solution%attitudes)) then
+        solution%attitudes(:, row) = z(4:7)/norm2(z(4:7))
+        if (request%times(row) == 0.0_dp) solution%attitudes(:, row) = attitude
+      end if
       if (first_own <= n) solution%own(:n - first_own + 1, row) = z(first_own:)
       solution%n_rows = row
     end subroutine add_row

@@ -24,6 +24,8 @@ module tape_solve
   real(dp), parameter :: PLANNED_GROWTH = 2e3_dp
   real(dp), parameter :: SAFETY = 10.0_dp
   real(dp), parameter :: ROUNDING = 2.0_dp**(-53)
+  ! The pair of poles that is fitted to the last terms may be that of a part of the motion.
+  real(dp), parameter :: FITTED = 2.5_dp
   real(dp), parameter :: UNSURE = 0.3_dp ! rounding times amplification, in tolerances
   real(dp), parameter :: FINEST = 1e-14_dp ! errors below it are not told from rounding errors
   real(dp), parameter :: NO_DIGIT = 1e100_dp ! a relative error that leaves no digit
@@ -105,7 +107,7 @@ contains
     solution%steps = outcome%steps
     ! The propagated error may be small by chance at the end, although perturbations grew before.
     error = min(outcome%least*sqrt(outcome%growth), UNSURE*request%tolerance)
-    solution%error = max(outcome%error, error) + blurred
+    solution%error = max(FITTED*outcome%error, error) + blurred
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE &

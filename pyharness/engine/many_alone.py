@@ -29,7 +29,15 @@ from pyharness.engine.recorded import packed_tape
 from pyharness.engine.registry import check_prepared, check_torque, requested_tolerance
 from pyharness.engine.solve import solve
 from pyharness.engine.solver import prepare
-from pyharness.model.arrays import count_bodies, only_one, row_of, rows_of, spread, threads_of
+from pyharness.model.arrays import (
+    count_bodies,
+    only_one,
+    row_of,
+    rows_of,
+    spread,
+    threads_of,
+    unit_quaternions,
+)
 from pyharness.model.codes import Statuses
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, TimedError, kind_of
@@ -127,6 +135,9 @@ def solve_one_by_one(
     found.omega[:] = own.omega
     if found.attitude is not None:
         found.attitude[:] = own.attitude
+        # At time 0 it is normalised as those with which the kernel of many bodies begins.
+        at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
+        found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])
     return found
 
 

@@ -106,8 +106,8 @@ contains
     blurred = ROUNDING*(outcome%growth + outcome%blur)
     solution%steps = outcome%steps
     ! The propagated error may be small by chance at the end, although perturbations grew before.
-    error = min(outcome%least*sqrt(outcome%growth), UNSURE*request%tolerance)
-    solution%error = max(FITTED*outcome%error, error) + blurred
+    error = max(FITTED*outcome%error, outcome%least*sqrt(outcome%growth))
+    solution%error = max(outcome%error, min(error, UNSURE*request%tolerance)) + blurred
     solution%growth = outcome%growth
     solution%spent = spent
     if (solution%status == COMPLETE &

@@ -106,7 +106,8 @@ contains
     blurred = ROUNDING*(outcome%growth + outcome%blur)
     solution%steps = outcome%steps
     ! The propagated error may be small by chance at the end, although perturbations grew before.
-    error = max(FITTED*outcome%error, outcome%least*sqrt(outcome%growth))
+    error = outcome%least*sqrt(outcome%growth)
+    if (blurred <= UNSURE*request%tolerance) error = max(error, FITTED*outcome%error)
     solution%error = max(outcome%error, min(error, UNSURE*request%tolerance)) + blurred
     solution%growth = outcome%growth
     solution%spent = spent

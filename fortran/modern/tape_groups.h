@@ -101,7 +101,6 @@ static int level_of_combination(const struct tape *tape, int n, const int *level
   return level;
 }
 
-
 static inline int kind_of(const int *operation)
 {
   return operation[0] == PRODUCT ? OF_PRODUCTS : operation[0] == LINEAR ? OF_COMBINATIONS : OF_OTHERS;

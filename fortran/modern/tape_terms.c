@@ -419,7 +419,9 @@ static inline double largest(const struct tape *tape, int k, const double *weigh
     double lanes[IN_REGISTER];
     const reg_bits counts = most > (reg){0.0};
     *(reg_anywhere *)lanes = (reg)((reg_bits)most & counts);
+#pragma GCC unroll 3
     for (int half = IN_REGISTER / 2; half > 0; half /= 2)
+#pragma GCC unroll 4
       for (int lane = 0; lane < half; lane++)
         if (lanes[lane + half] > lanes[lane]) lanes[lane] = lanes[lane + half];
     if (lanes[0] > found) found = lanes[0];
@@ -533,9 +535,11 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int
   for (int i = 0; i < n; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg sum = {0.0}, other = {0.0};
+#pragma GCC unroll 7
       for (int j = 0; j < n; j++)
         sum += jacobian[0][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k] + p);
       for (int d = 1; d <= degree; d++)
+#pragma GCC unroll 7
         for (int j = 0; j < n; j++)
           other += jacobian[d][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k - d] + p);
       *(reg *)(v[i][k + 1] + p) = part * (sum + other);

@@ -22,7 +22,8 @@ def written(source: str) -> dict[str, str]:
         for name, numbers in classes.items()
     }
     # The other statuses include OVERFLOW, a macro of some math.h.
-    for_c = classes["Operations"] | {"COMPLETE": classes["Statuses"]["COMPLETE"]}
+    for_c = classes["Operations"] | classes["Storage"]
+    for_c["COMPLETE"] = classes["Statuses"]["COMPLETE"]
     listed = ", ".join(f"{name} = {value}" for name, value in for_c.items())
     return texts | {"codes.h": f"enum {{ {listed} }};"}
 

@@ -30,12 +30,13 @@ module tape
     integer, pointer, contiguous :: table_starts(:)
     real(dp), pointer, contiguous :: breaks(:)       !! s
     real(dp), pointer, contiguous :: pieces(:, :)    !! (4, :): coefficients in ascending order
+    type(c_ptr) :: leaves                            !! compiled operations; null: interpreted
   end type tape_t
 
   ! What C reads of a tape, and the terms that it computes.
   type, bind(c), public :: tape_arrays_t
     integer(c_int) :: n_unknowns, n_operations, n_combinations
-    type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v, work
+    type(c_ptr) :: operations, starts, slots, coefficients, constants, a, v, work, leaves
   end type tape_arrays_t
 
   ! Many bodies under one torque, as tape_lanes.c reads them.
@@ -62,11 +63,12 @@ contains
 
   function tape_of(numbers) result(tape)
     !! Return the tape that an array contains. Its first numbers are the counts of unknowns, slots,
-    !! operations, combinations, terms, tables and pieces. The arrays of the tape follow: those of
-    !! integers, two integers in the place of a number, then the others.
+    !! operations, combinations, terms, tables and pieces, and the address of compiled operations
+    !! or 0. The arrays of the tape follow: those of integers, two integers in the place of a number,
+    !! then the others.
     real(dp), intent(in), target :: numbers(0:)
     type(tape_t) :: tape
-    integer, parameter :: COUNTS = 7
+    integer, parameter :: COUNTS = 8
     integer, pointer, contiguous :: integers(:)
     integer :: n_combinations, n_terms, n_tables, n_pieces, at
 
@@ -77,6 +79,7 @@ contains
     n_terms = int(numbers(4))
     n_tables = int(numbers(5))
     n_pieces = int(numbers(6))
+    tape%leaves = transfer(numbers(7), tape%leaves)
     at = COUNTS
     call take_integers(4*tape%n_operations)
     tape%operations(1:4, 1:tape%n_operations) => integers
@@ -113,7 +116,8 @@ contains
 
     arrays_of = tape_arrays_t(tape%n_unknowns, tape%n_operations, size(tape%constants), &
                               c_loc(tape%operations), c_loc(tape%starts), c_loc(tape%slots), &
-                              c_loc(tape%coefficients), c_loc(tape%constants), a, v, work)
+                              c_loc(tape%coefficients), c_loc(tape%constants), a, v, work, &
+                              tape%leaves)
   end function arrays_of
 
   pure integer function piece_at(tape, table, t, forward)

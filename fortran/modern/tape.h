@@ -18,9 +18,19 @@ enum { IN_REGISTER = 2 };
 typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
 typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 
-enum { WITH_ATTITUDE = 7, MOST_UNKNOWNS = 15 }; /* numbers of unknowns */
+enum { WITH_ATTITUDE = 7 };  /* number of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
+
+/* Functions that were compiled for the operations of one tape, by pyharness/engine/leaves.py. Two
+   arguments are the coefficients and constants of the combinations. */
+struct leaves {
+  /* As expand_tape of tape_terms.c; the last array is `unknowns` of its working storage. */
+  void (*expand)(double *terms, const double *, const double *, double *unknowns, double h, int order);
+  /* As set_columns of tape_terms.c, for all columns at four parts of the step. */
+  void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
+                       double h, double *jacobian);
+};
 
 /* Numbers of slots and combinations begin with 1. */
 struct tape {
@@ -31,6 +41,7 @@ struct tape {
   void *a;    /* terms of each slot */
   void *v;    /* terms of the perturbations of each slot */
   void *work; /* working storage of expand_tape, and of perturb_tape by the Jacobian */
+  const struct leaves *leaves; /* NULL: the operations are interpreted */
 };
 
 #endif

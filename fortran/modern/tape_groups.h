@@ -8,7 +8,7 @@
 
 #include "tape.h"
 
-enum { SIDE_BY_SIDE = 8, TERMS = 40, TERMS_OF_PERTURBATION = 29 };
+enum { SIDE_BY_SIDE = 8, TERMS = SERIES_LENGTH, TERMS_OF_PERTURBATION = PERTURBATION_LENGTH };
 typedef double row[SIDE_BY_SIDE];
 
 /* The Jacobian is computed at two or three nodes of a step, from as many terms as the least order has. */

@@ -2,10 +2,10 @@ module tape_growth
   !! The error amplification of an integration of a tape: the largest norm of the state-transition
   !! matrices from earlier times to the requested ones, which are formed in blocks of steps.
   use kinds, only: dp
+  use storage, only: MOST_UNKNOWNS
   implicit none(type, external)
   private
 
-  integer, parameter :: MOST_UNKNOWNS = 15
   integer, parameter :: STEPS_IN_BLOCK = 4
   integer, parameter :: MOST_BLOCKS = 64 ! even
   integer, parameter :: MOST_STEPS_IN_BLOCK = 2**28 ! within the range of the counter

@@ -9,6 +9,7 @@ module tape_series
                         FLOOR_OF => FLOOR, LINEAR, LOGARITHM => LOG, PRODUCT, QUOTIENT, &
                         SELECT_OF => SELECT, SINE_COSINE, SQUARE_ROOT => SQRT, SWITCH, TABLE, &
                         TANGENT => TANH
+  use storage, only: PERTURBATION_LENGTH, SERIES_LENGTH
   use tape, only: arrays_of, FIRST_UNKNOWN, piece_at, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: MOST_UNKNOWNS
   use tape_powers, only: find_powers, powers_t
@@ -16,8 +17,8 @@ module tape_series
   implicit none(type, external)
   private
 
-  integer, parameter, public :: MOST_ORDER = 28
-  integer, parameter, public :: LAST_TERM = 39         ! of tape_terms.c
+  integer, parameter, public :: MOST_ORDER = PERTURBATION_LENGTH - 1
+  integer, parameter, public :: LAST_TERM = SERIES_LENGTH - 1
   integer, parameter, public :: SIDE_BY_SIDE = 8       ! perturbations in a register
   integer, parameter :: BYTES = 8                      ! of a number
   real(dp), parameter :: EPSILON_OF_FUNCTION = 2.0_dp ! rounding error of a function, in units

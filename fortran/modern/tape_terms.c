@@ -165,6 +165,10 @@ void OF_LEVEL(expand_tape, LEVEL)(const struct tape *tape, double h, int order)
   series *const a = tape->a;
   double *const terms = a[0];
   const struct work *work = tape->work;
+  if (tape->leaves) {
+    tape->leaves->expand(terms, tape->coefficients, tape->constants, (double *)work->unknowns, h, order);
+    return;
+  }
   const int derivatives = tape->n_combinations - tape->n_unknowns;
   const int n_sums = (work->n_pairs + ABREAST - 1) / ABREAST;
   const int n_groups = (tape->n_unknowns + ABREAST - 1) / ABREAST;
@@ -558,7 +562,10 @@ static ALWAYS_INLINE void set_block(const struct tape *tape, const int block, co
   const double middle = 0.5 * factor;
   const nodal parts = {middle - distance, is_few ? middle + distance : middle, middle + distance};
   row *to[NODES] = {jacobian[0][block], jacobian[1][block], jacobian[2][block]};
-  set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
+  if (!tape->leaves) set_columns(tape, nodes, block * SIDE_BY_SIDE, columns, h, parts, to);
+  else if (block == 0)
+    tape->leaves->set_jacobian(tape->a, tape->coefficients, tape->constants, (const double *)&parts, h,
+                               jacobian[0][0][0]);
   for (int i = 0; i < tape->n_unknowns; i++) {
     for (int p = 0; p < columns; p += IN_REGISTER) {
       reg *const before = (reg *)(to[0][i] + p), *const amid = (reg *)(to[1][i] + p);

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pyharness.engine.problem import normalized, remainders
 from pyharness.engine.system import system_of
-from pyharness.model.codes import Methods, Operations, Places, Statuses
+from pyharness.model.codes import Methods, Operations, Places, Statuses, Storage
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import SLIDING, InputError, TimedError
 from pyharness.model.extension import COMPLETE, extension
@@ -37,8 +37,6 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
-# The largest order in fortran/modern/tape_series.f90, plus 1.
-_N_TERMS = 29
 # The first trial step, in the user's unit of time. Its length hardly matters, because the series
 # gives any shorter step, or one up to 16 times longer.
 LONGEST_TRIAL = 1e3
@@ -74,12 +72,30 @@ def system(scene: Scene) -> Tape:
     return system_of(scene, scene.attitude is not None)
 
 
-@lru_cache(maxsize=64)
-def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
-    """Return a tape as the kernel's array, whose format is in fortran/modern/tape.f90.
+class Listing(NamedTuple):
+    """A tape as lists, with slots and combinations numbered from 1.
 
-    The last `n_unknowns` outputs, by default all, are derivatives. Sine and cosine of one angle
-    become one operation, because the recurrence of one needs the other.
+    An operation is a kind of `Operations`, two operands and a result; a combination is a constant
+    and pairs of slot and coefficient. The last `n_unknowns` combinations are derivatives.
+    """
+
+    n_unknowns: int
+    n_slots: int
+    operations: list[tuple[int, int, int, int]]
+    combinations: list[tuple[float, list[tuple[int, float]]]]
+    tables: list[Table]
+
+
+# The place of the address of compiled leaves in a tape's array.
+_LEAVES = 7
+
+
+@lru_cache(maxsize=64)
+def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
+    """Return a tape as lists; the last `n_unknowns` outputs, by default all, are derivatives.
+
+    Sine and cosine of one angle become one operation, because the recurrence of one needs the
+    other.
     """
     places = {slot: slot + 1 for slot in range(tape.n_inputs)}
     n_slots = tape.n_inputs
@@ -120,14 +136,21 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
         n_slots += count
     for output in tape.outputs:
         combined(output)
+    return Listing(n_unknowns or len(tape.outputs), n_slots, operations, combinations, tables)
+
+
+@lru_cache(maxsize=64)
+def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
+    """Return a tape as the kernel's array, whose format is in fortran/modern/tape.f90."""
+    n_unknowns, n_slots, operations, combinations, tables = listing(tape, n_unknowns)
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
     # f2py refuses empty arrays. The kernel does not read these entries.
     breaks = [each.breaks for each in tables] or [np.zeros(1)]
     pieces = [each.pieces.ravel() for each in tables] or [np.zeros(4)]
     counts = [
-        n_unknowns or len(tape.outputs), n_slots, len(operations), len(combinations), len(terms),
-        len(tables), sum(map(len, breaks)),
+        n_unknowns, n_slots, len(operations), len(combinations), len(terms),
+        len(tables), sum(map(len, breaks)), 0,
     ]  # fmt: skip
     packed = np.concatenate(
         [
@@ -153,11 +176,18 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     return pairs.view(np.float64)
 
 
-def packed_scene(scene: Scene, code: int, tolerance: float, effort: float) -> Array:
-    """Return a scene and its method's settings as one array, in the order of `Places`."""
+def packed_scene(
+    scene: Scene, code: int, tolerance: float, effort: float, leaves: int = 0
+) -> Array:
+    """Return a scene and its method's settings as one array, in the order of `Places`.
+
+    `leaves` is the address of the compiled leaves of a tape.
+    """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:
-        return np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+        packed = np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+        packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
+        return packed
     coefficients, constant, rate, sines, cosines = normalized(scene)
     packed[Places.N_SINES] = sines.shape[1]
     packed[Places.N_COSINES] = cosines.shape[1]
@@ -216,7 +246,7 @@ def taylor_step(
     InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
-        tape, t, state, tolerances, relative, trial, longest, _N_TERMS
+        tape, t, state, tolerances, relative, trial, longest, Storage.PERTURBATION_LENGTH
     )
     if status == Statuses.SLIDING:
         raise TimedError(SLIDING, t)

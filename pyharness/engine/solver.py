@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_call
 from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
-from pyharness.engine.recorded import packed_scene
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -19,9 +18,11 @@ from pyharness.engine.registry import (
     requested_tolerance,
 )
 from pyharness.engine.sensitivity import judge_ending
+from pyharness.engine.recorded import packed_scene, system
 from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
+from pyharness.model.constant_body import with_constant_body
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import known
 from pyharness.model.extension import extension
@@ -86,6 +87,9 @@ class Solver(BoundKernel[Result]):
         The chosen method, and the parts that are computed, with reasons; about principal axes.
     status, error, growth, digits, steps, method
         Reports on this thread's last call, unless it raised an error.
+    leaves : str or None
+        ``compiled``, or ``interpreter`` and, where compiled leaves were requested, why; None
+        without a recorded torque.
     many : callable
         A function that solves from many initial states in one call.
 
@@ -105,17 +109,25 @@ class Solver(BoundKernel[Result]):
     packed: Array
     _packed_with_gil: Array | None
     settings: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
+    leaves: str | None
+    _compiled: bool
 
     # The base class binds a kernel to its data in C, because Python code in a call would take as
     # long as an easy solution.
     def __new__(
         cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float,
-        with_attitude: bool,
+        with_attitude: bool, compiled: bool = False,
     ) -> Self:  # fmt: skip
         """Create a solver; users call `prepare` instead."""
         entry = extension()
         kernel = entry.solve_packed_attitude if with_attitude else entry.solve_packed
-        packed = packed_scene(chosen.scene, _code(chosen, with_attitude), tolerance, effort)
+        code = _code(chosen, with_attitude)
+        address, leaves = 0, "interpreter" if code == Methods.TAPE else None
+        if compiled and leaves:
+            from pyharness.engine.leaf_cache import leaves_of
+
+            address, leaves = leaves_of(system(with_constant_body(chosen.scene)))
+        packed = packed_scene(chosen.scene, code, tolerance, effort, address)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
             # The call that keeps the GIL has no fallback, which may take long. If it fails, the
@@ -134,12 +146,13 @@ class Solver(BoundKernel[Result]):
         )  # fmt: skip
         solver.scene, solver.plan, solver.with_attitude = scene, chosen, with_attitude
         solver.packed, solver._packed_with_gil = packed, packed_with_gil
-        solver.settings = tolerance, asked, effort
+        solver.settings, solver.leaves = (tolerance, asked, effort), leaves
+        solver._compiled = compiled
         return solver
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the class and the arguments for `copy` and `pickle`."""
-        return type(self), (self.scene, self.plan, *self.settings, self.with_attitude)
+        return type(self), (self.scene, self.plan, *self.settings, self.with_attitude, self._compiled)
 
     def __repr__(self) -> str:
         """Return the solver's class, scene and method."""
@@ -256,6 +269,7 @@ def prepare(
     *,
     effort: float = ...,
     attitude: Literal[False] = ...,
+    compiled: bool = ...,
 ) -> Solver[Array]: ...
 @overload
 def prepare(
@@ -265,6 +279,7 @@ def prepare(
     *,
     effort: float = ...,
     attitude: Literal[True],
+    compiled: bool = ...,
 ) -> Solver[tuple[Array, Array]]: ...
 @with_hints
 def prepare(
@@ -274,6 +289,7 @@ def prepare(
     *,
     effort: float = 1.0,
     attitude: bool = False,
+    compiled: bool = False,
 ) -> Solver[Any]:
     """Prepare a solver for many calls with the same scene.
 
@@ -292,6 +308,9 @@ def prepare(
         Factor on the work limit of a call (some ten seconds); beyond it the status is `gave up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
+    compiled : bool
+        Whether a C compiler translates a recorded torque, in some 0.1 s, unless the user's cache
+        has it; without a compiler it is interpreted. `Solver.leaves` says which.
 
     Returns
     -------
@@ -319,7 +338,7 @@ def prepare(
     array([-0.958924,  0.283662, 10.      ])
     """
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
-    attitude = boolean("attitude", attitude)
+    attitude, compiled = boolean("attitude", attitude), boolean("compiled", compiled)
     method = known("method", method, PREPARED)
     tolerance = requested_tolerance(method, tolerance)
     effort = checked_effort(effort)
@@ -333,4 +352,4 @@ def prepare(
     else:
         about_principal = replace(about_principal, attitude=None)
     chosen = plan(with_merged_waves(about_principal), method, tolerance, rows=attitude)
-    return Solver(scene, chosen, tolerance, method, effort, attitude)
+    return Solver(scene, chosen, tolerance, method, effort, attitude, compiled)

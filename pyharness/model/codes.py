@@ -78,6 +78,14 @@ class Blocks:
     LANE_COUNT = 32  # several vector registers, so that some compute while others wait
 
 
+class Storage:
+    """Lengths of arrays in which the kernel of a tape keeps series."""
+
+    SERIES_LENGTH = 40  # terms of a slot
+    PERTURBATION_LENGTH = 29  # terms of a perturbation
+    MOST_UNKNOWNS = 15
+
+
 class Operations:
     """The operations of a tape, as the kernel knows them."""
 

@@ -1,0 +1,172 @@
+"""The compiler of leaves, and the folder in which it keeps them.
+
+A file of the folder is loaded only if it and the folder belong to the user, nobody else may write
+them, and its name ends in the hash of its content.
+"""
+
+import ctypes
+import os
+import shlex
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache, lru_cache
+from hashlib import sha256
+from pathlib import Path
+
+from pyharness.engine.leaves import Structure, source, structure
+from pyharness.engine.recorded import listing
+from pyharness.model.tape import Tape
+
+MOST_BYTES = 20_000_000  # of all files; the oldest ones are deleted
+_MOST_SECONDS = 60.0  # of a compilation
+_FORGOTTEN = 3600.0  # age (s) of what a killed compilation has left
+_FLAGS = ("-O2", "-ffp-contract=fast", "-fPIC", "-shared")
+_NATIVE = "-march=native"
+_FUNCTIONS = ("expand", "set_jacobian")  # the order of struct leaves in fortran/modern/tape.h
+
+
+class LeavesError(Exception):
+    """Why leaves can't be compiled or loaded, in one line."""
+
+
+def folder() -> Path:
+    """Return the folder of compiled leaves, which may be missing."""
+    home = os.environ.get("XDG_CACHE_HOME", "")
+    return Path(home if os.path.isabs(home) else Path("~/.cache").expanduser(), "pyharness", "leaves")
+
+
+def size() -> int:
+    """Return the size of the folder's files in bytes."""
+    return sum(info.st_size for _, info in _files())
+
+
+def leaves_of(tape: Tape) -> tuple[int, str]:
+    """Return the address of the compiled leaves of a tape, and ``compiled``.
+
+    They are compiled if the folder has none. Where that fails, return 0 and why.
+    """
+    shape = structure(listing(tape))
+    if shape is None:
+        return 0, "interpreter: switches and very long torques are not compiled"
+    try:
+        return ctypes.addressof(_loaded(shape, str(folder()))), "compiled"
+    except LeavesError as error:
+        return 0, f"interpreter: {error}"
+
+
+@lru_cache(maxsize=None)  # a kernel may use what has been loaded for as long as the process lives
+def _loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
+    try:
+        found = _found(Path(place), _key(source(tape)))
+        library = ctypes.CDLL(str(found or _compiled(Path(place), source(tape))))
+        functions = [ctypes.cast(getattr(library, name), ctypes.c_void_p) for name in _FUNCTIONS]
+    except (OSError, AttributeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise LeavesError(f"compiled leaves can't be loaded or stored in {place}: {reason}") from None
+    return (ctypes.c_void_p * len(functions))(*(each.value for each in functions))
+
+
+@cache
+def compiler() -> tuple[str, ...]:
+    """Return the command of the C compiler: CC, cc, gcc or clang.
+
+    Raise LeavesError if none is found.
+    """
+    for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
+        program, *arguments = shlex.split(command) or [""]
+        if found := shutil.which(program):
+            return (found, *arguments)
+    raise LeavesError("no C compiler is found: install one, or name it with CC=...")
+
+
+@cache
+def _machine() -> str:
+    """Return what else the code depends on: the compiler, its version and the processor."""
+    file = os.stat(os.path.realpath(compiler()[0]))
+    from numpy._core._multiarray_umath import __cpu_features__ as features
+
+    known = sorted(name for name, has in features.items() if has)
+    return repr((compiler(), _FLAGS, file.st_size, file.st_mtime_ns, sys.platform, os.uname().machine, known))
+
+
+def _key(text: str) -> str:
+    return sha256((text + _machine()).encode()).hexdigest()[:32]
+
+
+def _is_safe(info: os.stat_result) -> bool:
+    """Return whether a file or folder is the user's, and nobody else may write it."""
+    return info.st_uid == os.geteuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _files() -> Iterator[tuple[Path, os.stat_result]]:
+    with suppress(OSError):
+        for each in folder().iterdir():
+            yield each, each.lstat()
+
+
+def _found(place: Path, key: str) -> Path | None:
+    """Return the file of a key; None if there is none that may be loaded."""
+    try:
+        info = place.lstat()
+    except OSError:
+        return None
+    if not stat.S_ISDIR(info.st_mode) or not _is_safe(info):
+        return None
+    for path in place.glob(f"{key}-*.so"):
+        info = path.lstat()
+        if not stat.S_ISREG(info.st_mode) or not _is_safe(info):
+            continue
+        if path.name == f"{key}-{sha256(path.read_bytes()).hexdigest()}.so":
+            return path
+        path.unlink()
+    return None
+
+
+def _compiled(place: Path, text: str) -> Path:
+    """Compile leaves, and return their file, which appears in the folder as a whole."""
+    place.mkdir(mode=0o700, parents=True, exist_ok=True)
+    info = place.lstat()
+    if not stat.S_ISDIR(info.st_mode) or not _is_safe(info):
+        raise LeavesError(f"{place} is not the user's own folder, or others may write it")
+    _clean(place)
+    with tempfile.TemporaryDirectory(dir=place, prefix="new-") as new:
+        code, result = Path(new, "leaves.c"), Path(new, "leaves.so")
+        code.write_text(text)
+        command = [*compiler(), *_FLAGS, str(code), "-o", str(result)]
+        if _run([*command, _NATIVE]) and (reason := _run(command)):
+            raise LeavesError(f"{compiler()[0]} failed: {reason}")
+        result.chmod(0o700)
+        target = place / f"{_key(text)}-{sha256(result.read_bytes()).hexdigest()}.so"
+        result.replace(target)
+    return target
+
+
+def _run(command: list[str]) -> str:
+    """Run a compiler, and return the first line of its complaint; empty if it succeeded."""
+    try:
+        run = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_MOST_SECONDS
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    return (run.stderr.strip() or f"exit status {run.returncode}").splitlines()[0] if run.returncode else ""
+
+
+def _clean(place: Path) -> None:
+    """Delete the oldest files beyond the limit of size, and what killed compilations left."""
+    room, now = MOST_BYTES, time.time()
+    for path, info in sorted(_files(), key=lambda each: -each[1].st_mtime):
+        if stat.S_ISDIR(info.st_mode):
+            if path.name.startswith("new-") and now - info.st_mtime > _FORGOTTEN:
+                shutil.rmtree(path, ignore_errors=True)
+            continue
+        room -= info.st_size
+        if room < 0:
+            with suppress(OSError):
+                path.unlink()

@@ -1,0 +1,309 @@
+"""Compiled leaves: C of the series and of the Jacobian of a tape, instead of the interpreter's.
+
+The interpreter is fortran/modern/tape_terms.c. Numbers are read from memory, so that tapes of one
+structure share their leaves.
+"""
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from itertools import chain
+from typing import NamedTuple
+
+from pyharness.engine.recorded import Listing
+from pyharness.model.codes import Operations, Storage
+
+_ABREAST = 4  # products side by side, and nodes of the Jacobian
+_CHUNK = 8  # groups of products that are summed together, as many as there are registers for
+_BLOCK = 8  # columns of the Jacobian in a row of its storage
+_NODES = 3  # of the Jacobian
+_TERMS_AMID = 8  # terms of a series at a node
+_SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # of a Jacobian
+_MOST_OPERATIONS = 500  # whose products fit on the stack of a thread
+_TIME, _FIRST_UNKNOWN = 1, 2  # slots, from 1
+
+_HEADER = """
+typedef double abreast __attribute__((vector_size(32)));
+typedef long long bits __attribute__((vector_size(32)));
+static double halved(double x, double root) { return x ? x / (2.0 * root) : 0.0; }
+static abreast slope_of_root(abreast root)
+{
+  const bits is_other = root != 0.0;
+  return (abreast)((bits)(0.5 / root) & is_other);
+}
+static void put(double *to, double h, abreast a, abreast b, abreast c, abreast d)
+{
+  for (int node = 0; node < NODES; node++)
+    *(abreast *)(to + node * SIZE) = h * (abreast){a[node], b[node], c[node], d[node]};
+}
+"""
+
+
+_Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an operation
+
+
+class Operation(NamedTuple):
+    """The recurrence and the slopes of an operation, as C.
+
+    Its slots are o, p and q, its operands x and y. Term k of slot o is t_o, term 0 is z_o, term
+    k - 1 is b_o, term 1 of the operand is f_x, and the value at a node is m_o; i is 1/k. The sums s0
+    and s1 are those of the products of terms 1 to k - 1 of the slots in `pairs`.
+    """
+
+    series: tuple[str, ...]
+    pairs: tuple[str, ...] = ()
+    value: str = ""  # of slot o at a node; without it the series is summed
+    slopes: tuple[str, ...] = ()  # of slot o by x and by y
+    second: str = ""  # slope of slot p by x
+
+
+_OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
+_SINE = Operation(
+    ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -i*(s1 + t_q*z_o)"), ("qp", "qo"),
+    slopes=("m_p",), second="-m_o",
+)  # fmt: skip
+_WAVE = -1  # sine and cosine of an angle proportional to time
+OPERATIONS = {
+    Operations.PRODUCT: Operation(
+        ("t_o = s0 + z_x*t_y + z_y*t_x",), ("xy",), "m_x*m_y", ("m_y", "m_x")
+    ),
+    Operations.QUOTIENT: Operation(
+        ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y")
+    ),
+    # A norm is constant at rest.
+    Operations.SQRT: Operation(
+        ("t_o = halved(t_x - s0, z_o)",), ("oo",), slopes=("slope_of_root(m_o)",)
+    ),
+    # Term 0 of the second slot says that the exponential is constant.
+    Operations.EXP: Operation(
+        ("t_p = z_p ? 0.0 : k*t_x", "t_o = i*(s0 + t_p*z_o)"), ("po",), slopes=("m_o",)
+    ),
+    Operations.TANH: Operation(
+        ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -s1 - 2.0*t_o*z_o"), ("qp", "oo"),
+        slopes=("m_p",), second="-2.0*m_o*m_p",
+    ),
+    Operations.SINE_COSINE: _SINE,
+    _WAVE: _SINE._replace(
+        series=("t_q = k*t_x", "t_o = i*f_x*b_p", "t_p = -i*f_x*b_o"), pairs=()
+    ),
+    Operations.TABLE: Operation(("t_o = later_o",)),
+    Operations.LOG: _OF_ANGLE,
+    Operations.ATAN: _OF_ANGLE,
+    Operations.ASIN: _OF_ANGLE,
+}  # fmt: skip
+
+
+class Structure(NamedTuple):
+    """What the leaves of a tape depend on."""
+
+    n_unknowns: int
+    operations: tuple[_Listed, ...]
+    # Whether there is a constant, and slots with the coefficients 1 and -1, or 0 for any other.
+    combinations: tuple[tuple[bool, tuple[tuple[int, int], ...]], ...]
+
+
+def structure(tape: Listing) -> Structure | None:
+    """Return the structure of a tape, or None if its operations stay interpreted."""
+    kinds = {operation[0] for operation in tape.operations}
+    if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
+        return None
+    combinations = (
+        (
+            bool(constant),
+            tuple((slot, int(each) if abs(each) == 1.0 else 0) for slot, each in terms),
+        )
+        for constant, terms in tape.combinations
+    )
+    return Structure(tape.n_unknowns, tuple(tape.operations), tuple(combinations))
+
+
+@lru_cache(maxsize=64)
+def source(tape: Structure) -> str:
+    """Return the C source of the leaves: the functions `expand` and `set_jacobian` of tape.h."""
+    sizes = f"enum {{ NODES = {_NODES}, SIZE = {_SIZE} }};"
+    return "\n".join([sizes, _HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
+
+
+def _of(operation: _Listed) -> Operation:
+    is_wave = operation[0] == Operations.SINE_COSINE and operation[2] > 0
+    return OPERATIONS[_WAVE if is_wave else operation[0]]
+
+
+def _slots(operation: _Listed) -> dict[str, int]:
+    _, x, y, out = operation
+    return {"x": x, "y": y, "o": out, "p": out + 1, "q": out + 2}
+
+
+def _place(slot: int, k: str) -> str:
+    return f"a[{(slot - 1) * Storage.SERIES_LENGTH} + {k}]"
+
+
+def _written(text: str, operation: _Listed) -> str:
+    """Return C with the slots of an operation in the place of letters."""
+    slots = _slots(operation)
+
+    def name(match: re.Match[str]) -> str:
+        what, slot = match[1], slots[match[2]]
+        place = {"b": "k - 1", "f": "1", "l": "k"}.get(what)
+        return _place(slot, place) if place else f"{what}{slot}"
+
+    return re.sub(r"\b([tzmbfl])_([xyopq])\b", name, text)
+
+
+def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
+    """Return a linear combination of the numbers `name` of slots, with its constant if `is_value`."""
+    begin = sum(len(terms) for _, terms in tape.combinations[: number - 1])
+    constant, terms = tape.combinations[number - 1]
+    parts = [f"d[{number - 1}]"] if is_value and constant else []
+    for i, (slot, unit) in enumerate(terms, begin):
+        parts.append(f"{'-' * (unit < 0)}{name}{slot}" if unit else f"c[{i}]*{name}{slot}")
+    return " + ".join(parts).replace("+ -", "- ") or "0.0"
+
+
+def _rates(tape: Structure) -> range:
+    """Return the numbers of the combinations that are the derivatives of the unknowns."""
+    return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
+
+
+def _unknowns(tape: Structure) -> range:
+    return range(_FIRST_UNKNOWN, _FIRST_UNKNOWN + tape.n_unknowns)
+
+
+def _expand(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes the terms of all slots, order by order."""
+    pairs: dict[tuple[int, int], int] = {}
+    terms = []  # of order k
+    for operation in tape.operations:
+        slots, sums = _slots(operation), []
+        if operation[0] == Operations.LINEAR:
+            series: tuple[str, ...] = (f"t_o = {_combined(tape, operation[1], 't', is_value=False)}",)
+        else:
+            series = _of(operation).series
+            both = [sorted(slots[letter] for letter in pair) for pair in _of(operation).pairs]
+            sums = [pairs.setdefault((x, y), len(pairs)) for x, y in both]
+        for line in series:
+            text = re.sub(r"\bs([01])\b", lambda match: f"sum[{sums[int(match[1])]}]", line)
+            terms.append(f"const double {_written(text, operation)};")
+            terms.append(f"{_place(slots[line[2]], 'k')} = t{slots[line[2]]};")
+    groups = [list(pairs)[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
+    for g, group in enumerate(groups):
+        terms.append(f"x[{g}][k] = {_vector([f't{x}' for x, _ in group])};")
+        terms.append(f"y[{g}][k] = {_vector([f't{y}' for _, y in group])};")
+    unknowns = _unknowns(tape)
+    first = [_combined(tape, number, "z", is_value=True) for number in _rates(tape)]
+    later = [_combined(tape, number, "t", is_value=False) for number in _rates(tape)]
+    shape = f"[{max(1, len(groups))}][{Storage.SERIES_LENGTH}]"
+    yield "void expand(double *restrict a, const double *restrict c, const double *restrict d,"
+    yield "            double *restrict unknowns, double h, int order)\n{"
+    yield f"  abreast x{shape}, y{shape}, sums[{max(1, len(groups))}];"
+    yield "  const double *const sum = (const double *)sums;"
+    for slot in sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(terms + first))}):
+        yield f"  const double z{slot} = {_place(slot, '0')};"
+    for slot, rate in zip(unknowns, first, strict=True):
+        yield f"  double t{slot} = h*({rate});"
+    yield from _kept(unknowns, "1")
+    yield f"  double t{_TIME} = {_place(_TIME, '1')};"
+    yield "  for (int k = 1; k < order; k++) {"
+    yield "    const double i = 1.0/k, part = h/(k + 1);"
+    for begin in range(0, len(groups), _CHUNK):
+        chunk = range(begin, min(len(groups), begin + _CHUNK))
+        yield from (f"    abreast s{g} = {{0.0}};" for g in chunk)
+        yield "    for (int j = 1; j < k; j++) {"
+        yield from (f"      s{g} += x[{g}][j]*y[{g}][k - j];" for g in chunk)
+        yield "    }"
+        yield from (f"    sums[{g}] = s{g};" for g in chunk)
+    yield from (f"    {each}" for each in terms)
+    for slot, rate in zip(unknowns, later, strict=True):
+        yield f"    const double next{slot} = part*({rate});"
+    yield from (f"    t{slot} = next{slot};" for slot in unknowns)
+    yield from _kept(unknowns, "k + 1")
+    yield f"    t{_TIME} = 0.0;\n  }}\n}}"
+
+
+def _vector(names: list[str]) -> str:
+    return f"(abreast){{{', '.join(names + ['0.0'] * (_ABREAST - len(names)))}}}"
+
+
+def _kept(unknowns: range, k: str) -> Iterator[str]:
+    """Yield the statements that store term k of the unknowns, one by one and in groups."""
+    yield from (f"  {_place(slot, k)} = t{slot};" for slot in unknowns)
+    for begin in unknowns[::_ABREAST]:
+        at = (begin - _FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
+        names = [f"t{slot}" for slot in range(begin, min(begin + _ABREAST, unknowns.stop))]
+        yield f"  *(abreast *)(unknowns + {at} + {_ABREAST}*({k})) = {_vector(names)};"
+
+
+def _set_jacobian(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes the derivatives of the rates by the unknowns at the nodes."""
+    # Of each slot: the names of its derivatives, by the unknowns on which it depends.
+    by = {slot: {slot: "one"} for slot in _unknowns(tape)}
+    yield "void set_jacobian(const double *restrict a, const double *restrict c,"
+    yield "                  const double *restrict d, const double *restrict parts, double h,"
+    yield "                  double *restrict jacobian)\n{"
+    yield "  const abreast u = *(const abreast *)parts, zero = {0.0}, one = zero + 1.0;"
+    yield from (_summed(slot) for slot in (_TIME, *_unknowns(tape)))
+    for operation in tape.operations:
+        kind, x, y, out = operation
+        if kind == Operations.LINEAR:
+            yield f"  const abreast m{out} = zero + {_combined(tape, x, 'm', is_value=True)};"
+            slopes = {out: _slopes_of_combination(tape, x, by)}
+        else:
+            rule = _of(operation)
+            value = _written(rule.value, operation)
+            yield f"  const abreast m{out} = {value};" if value else _summed(out)
+            if rule.second:
+                yield _summed(out + 1)
+            slopes = {out: _products(zip((x, y), rule.slopes, strict=False), operation, by)}
+            if rule.second:
+                slopes[out + 1] = _products([(x, rule.second)], operation, by)
+        for slot, texts in slopes.items():
+            by[slot] = {unknown: f"v{slot}_{unknown}" for unknown in texts}
+            for unknown, text in texts.items():
+                yield f"  const abreast {by[slot][unknown]} = {text};"
+    for i, number in enumerate(_rates(tape)):
+        texts = _slopes_of_combination(tape, number, by)
+        for column in range(0, _BLOCK * -(-tape.n_unknowns // _BLOCK), _ABREAST):
+            place = (column // _BLOCK * Storage.MOST_UNKNOWNS + i) * _BLOCK + column % _BLOCK
+            row = [texts.get(_FIRST_UNKNOWN + column + j, "zero") for j in range(_ABREAST)]
+            yield f"  put(jacobian + {place}, h, {', '.join(row)});"
+    yield "}"
+
+
+def _summed(slot: int) -> str:
+    """Return the statement that sums a series at the nodes."""
+    sum_of = _place(slot, str(_TERMS_AMID - 1))
+    for k in reversed(range(_TERMS_AMID - 1)):
+        sum_of = f"({_place(slot, str(k))} + u*{sum_of})"
+    return f"  const abreast m{slot} = {sum_of};"
+
+
+def _slopes_of_combination(
+    tape: Structure, number: int, by: dict[int, dict[int, str]]
+) -> dict[int, str]:
+    """Return the derivatives of a linear combination by unknowns, as C."""
+    begin = sum(len(terms) for _, terms in tape.combinations[: number - 1])
+    parts = [
+        (unknown, f"{unit}.0*{name}" if unit else f"c[{i}]*{name}")
+        for i, (slot, unit) in enumerate(tape.combinations[number - 1][1], begin)
+        for unknown, name in by.get(slot, {}).items()
+    ]
+    return _sums(parts)
+
+
+def _products(
+    slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
+) -> dict[int, str]:
+    """Return the derivatives of an operation by unknowns, from those by its operands."""
+    parts = [
+        (unknown, f"({_written(slope, operation)})*{name}")
+        for slot, slope in slopes
+        for unknown, name in by.get(slot, {}).items()
+    ]
+    return _sums(parts)
+
+
+def _sums(parts: Iterable[tuple[int, str]]) -> dict[int, str]:
+    sums: dict[int, list[str]] = {}
+    for unknown, text in parts:
+        sums.setdefault(unknown, []).append(text)
+    return {unknown: " + ".join(texts) for unknown, texts in sums.items()}

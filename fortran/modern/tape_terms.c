@@ -536,18 +536,21 @@ static ALWAYS_INLINE void perturb_with(const int n, const int columns, const int
 {
   const double part = 1.0 / (k + 1);
   const int degree = k < nodes - 1 ? k : nodes - 1;
-  for (int i = 0; i < n; i++) {
-    for (int p = 0; p < columns; p += IN_REGISTER) {
-      reg sum = {0.0}, other = {0.0};
+  for (int p = 0; p < columns; p += IN_REGISTER) {
+    reg sums[MOST_UNKNOWNS];
 #pragma GCC unroll 7
-      for (int j = 0; j < n; j++)
-        sum += jacobian[0][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k] + p);
-      for (int d = 1; d <= degree; d++)
+    for (int i = 0; i < n; i++) sums[i] = (reg){0.0};
+    for (int d = 0; d <= degree; d++) {
 #pragma GCC unroll 7
-        for (int j = 0; j < n; j++)
-          other += jacobian[d][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * *(reg *)(v[j][k - d] + p);
-      *(reg *)(v[i][k + 1] + p) = part * (sum + other);
+      for (int j = 0; j < n; j++) {
+        const reg x = *(const reg *)(v[j][k - d] + p);
+#pragma GCC unroll 7
+        for (int i = 0; i < n; i++)
+          sums[i] += jacobian[d][j / SIDE_BY_SIDE][i][j % SIDE_BY_SIDE] * x;
+      }
     }
+#pragma GCC unroll 7
+    for (int i = 0; i < n; i++) *(reg *)(v[i][k + 1] + p) = part * sums[i];
   }
 }
 

@@ -208,9 +208,12 @@ def _expand(tape: Structure) -> Iterator[str]:
     for begin in range(0, len(groups), _CHUNK):
         chunk = range(begin, min(len(groups), begin + _CHUNK))
         yield from (f"    abreast s{g} = {{0.0}};" for g in chunk)
-        yield "    for (int j = 1; j < k; j++) {"
+        # The newest terms come last, so that the others need not wait for them.
+        yield "    for (int j = 2; j < k - 1; j++) {"
         yield from (f"      s{g} += x[{g}][j]*y[{g}][k - j];" for g in chunk)
         yield "    }"
+        yield from (f"    if (k > 2) s{g} += x[{g}][1]*y[{g}][k - 1];" for g in chunk)
+        yield from (f"    if (k > 1) s{g} += x[{g}][k - 1]*y[{g}][1];" for g in chunk)
         yield from (f"    sums[{g}] = s{g};" for g in chunk)
     yield from (f"    {each}" for each in terms)
     for slot, rate in zip(unknowns, later, strict=True):

@@ -171,3 +171,14 @@ subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, a
   call solve_tape_bodies(packed, bodies, omega, status, raised)
   call watch(c_null_ptr)
 end subroutine tape_many
+
+subroutine ready_leaves(key, number)
+  ! Return the number of the compiled operations of a tape, by the key of its structure; 0 if there
+  ! are none.
+  use levels, only: find => ready_leaves
+  implicit none
+  integer(8), intent(in) :: key
+  integer(8), intent(out) :: number
+
+  number = find(key)
+end subroutine ready_leaves

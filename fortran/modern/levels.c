@@ -3,6 +3,9 @@
    Plain code runs on every processor. */
 #include <stdint.h>
 
+#include "ready_keys.h"
+#include "tape.h"
+
 typedef void solver(const void *problem, const void *request, void *solution);
 typedef void quick_solver(const void *problem, const void *request, int contest, void *solution);
 typedef void free_solver(const void *bodies, int n, double *omega, int8_t *status);
@@ -21,12 +24,13 @@ typedef void runner(void *ensemble);
   runner solve_tape_bodies_##level;                                                            \
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
-  solver vary_solution_##level;
+  solver vary_solution_##level;                                                                \
+  extern const struct leaves ready_leaves_##level[];
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
    solve_tape_##level,         step_tape_##level,        vary_solution_##level,                \
-   solve_tape_bodies_##level}
+   solve_tape_bodies_##level,  ready_leaves_##level}
 
 DECLARED(plain)
 #ifdef WITH_LEVELS
@@ -45,6 +49,7 @@ static struct {
   solver *step;
   solver *vary;
   runner *bodies;
+  const struct leaves *leaves; /* of ready torques, in the order of ready_keys */
 } chosen, known[] = {
   TAKEN(plain),
 #ifdef WITH_LEVELS
@@ -119,5 +124,19 @@ void tape_variation(const void *tape, const void *request, void *variation)
 }
 
 void tape_bodies(void *bodies) { chosen.bodies(bodies); }
+
+/* Return the number of the compiled operations of a ready torque, which is negative; 0 for others. */
+int64_t ready_leaves(int64_t key)
+{
+  for (int64_t i = 0; i < (int64_t)(sizeof ready_keys / sizeof *ready_keys); i++)
+    if (ready_keys[i] == key) return -1 - i;
+  return 0;
+}
+
+/* Return the compiled operations of a ready torque, or at an address. */
+const void *leaves_at(int64_t number)
+{
+  return number < 0 ? chosen.leaves + (-1 - number) : (const void *)(intptr_t)number;
+}
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -1,12 +1,12 @@
 module levels
   !! The interfaces of levels.c: the kernels of the chosen instruction set. C passes on the address
   !! of a problem_t, a request_t, a solution_t, a bodies_t or an ensemble_t and does not read it.
-  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_int, c_int64_t, c_ptr
   use bodies, only: i1
   implicit none(type, external)
   private
 
-  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, run_lanes, &
+  public :: choose_level, many_fixed, many_free, many_taylor, quick_solve, ready_leaves, run_lanes, &
             tape_bodies, tape_solve, tape_step, tape_variation, taylor_solve
 
   interface
@@ -50,6 +50,13 @@ module levels
       type(*), intent(in) :: tape, request
       type(*), intent(inout) :: variation
     end subroutine tape_variation
+
+    integer(c_int64_t) function ready_leaves(key) bind(c, name="ready_leaves")
+      !! Return the number of the compiled operations of a ready torque, or 0.
+      import :: c_int64_t
+      implicit none(type, external)
+      integer(c_int64_t), intent(in), value :: key
+    end function ready_leaves
 
     subroutine quick_solve(problem, request, contest, solution) bind(c, name="quick_solve")
       !! Call quick_solve of scaled_runge_kutta.f90 at the chosen level.

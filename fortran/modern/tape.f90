@@ -1,7 +1,7 @@
 module tape
   !! The equations of motion as a tape: a list of operations, each of which writes a slot. Slot 1 is
   !! the time, slots 2 to 4 are omega, and slots 5 to 8 are the attitude, a quaternion.
-  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_loc, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_ptr
   use kinds, only: dp
   implicit none(type, external)
   private
@@ -57,14 +57,23 @@ module tape
     type(c_ptr) :: parameters           !! (n_parameters, n_sets): further inputs of the tape
   end type tape_bodies_t
 
+  interface
+    type(c_ptr) function leaves_at(number) bind(c, name="leaves_at")
+      !! Return the compiled operations of a ready torque, or at an address; or null.
+      import :: c_int64_t, c_ptr
+      implicit none(type, external)
+      integer(c_int64_t), intent(in), value :: number
+    end function leaves_at
+  end interface
+
   public :: arrays_of, next_break, piece_at, tape_of
 
 contains
 
   function tape_of(numbers) result(tape)
     !! Return the tape that an array contains. Its first numbers are the counts of unknowns, slots,
-    !! operations, combinations, terms, tables and pieces, and the address of compiled operations
-    !! or 0. The arrays of the tape follow: those of integers, two integers in the place of a number,
+    !! operations, combinations, terms, tables and pieces, and the number that `leaves_at` reads. The
+    !! arrays of the tape follow: those of integers, two integers in the place of a number,
     !! then the others.
     real(dp), intent(in), target :: numbers(0:)
     type(tape_t) :: tape
@@ -79,7 +88,7 @@ contains
     n_terms = int(numbers(4))
     n_tables = int(numbers(5))
     n_pieces = int(numbers(6))
-    tape%leaves = transfer(numbers(7), tape%leaves)
+    tape%leaves = leaves_at(transfer(numbers(7), 0_c_int64_t))
     at = COUNTS
     call take_integers(4*tape%n_operations)
     tape%operations(1:4, 1:tape%n_operations) => integers

@@ -7,11 +7,14 @@ structure share their leaves.
 import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from hashlib import sha256
 from itertools import chain
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from pyharness.engine.recorded import Listing
 from pyharness.model.codes import Operations, Storage
+
+if TYPE_CHECKING:
+    from pyharness.engine.recorded import Listing
 
 _ABREAST = 4  # products side by side, and nodes of the Jacobian
 _CHUNK = 8  # groups of products that are summed together, as many as there are registers for
@@ -22,7 +25,8 @@ _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # 
 _MOST_OPERATIONS = 500  # whose products fit on the stack of a thread
 _TIME, _FIRST_UNKNOWN = 1, 2  # slots, from 1
 
-_HEADER = """
+_HEADER = f"""
+enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};""" + """
 typedef double abreast __attribute__((vector_size(32)));
 typedef long long bits __attribute__((vector_size(32)));
 static double halved(double x, double root) { return x ? x / (2.0 * root) : 0.0; }
@@ -33,7 +37,7 @@ static abreast slope_of_root(abreast root)
 }
 static void put(double *to, double h, abreast a, abreast b, abreast c, abreast d)
 {
-  for (int node = 0; node < NODES; node++)
+  for (int node = 0; node < PARTS; node++)
     *(abreast *)(to + node * SIZE) = h * (abreast){a[node], b[node], c[node], d[node]};
 }
 """
@@ -98,30 +102,33 @@ class Structure(NamedTuple):
 
     n_unknowns: int
     operations: tuple[_Listed, ...]
-    # Whether there is a constant, and slots with the coefficients 1 and -1, or 0 for any other.
-    combinations: tuple[tuple[bool, tuple[tuple[int, int], ...]], ...]
+    combinations: tuple[tuple[int, ...], ...]  # the slots of each
 
 
-def structure(tape: Listing) -> Structure | None:
+def structure(tape: "Listing") -> Structure | None:
     """Return the structure of a tape, or None if its operations stay interpreted."""
     kinds = {operation[0] for operation in tape.operations}
     if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
         return None
-    combinations = (
-        (
-            bool(constant),
-            tuple((slot, int(each) if abs(each) == 1.0 else 0) for slot, each in terms),
-        )
-        for constant, terms in tape.combinations
-    )
+    combinations = (tuple(slot for slot, _ in terms) for _, terms in tape.combinations)
     return Structure(tape.n_unknowns, tuple(tape.operations), tuple(combinations))
 
 
+def key(tape: Structure) -> int:
+    """Return an integer of 63 bits that identifies a structure."""
+    return int.from_bytes(sha256(repr(tuple(tape)).encode()).digest()[:8]) >> 1
+
+
 @lru_cache(maxsize=64)
-def source(tape: Structure) -> str:
-    """Return the C source of the leaves: the functions `expand` and `set_jacobian` of tape.h."""
-    sizes = f"enum {{ NODES = {_NODES}, SIZE = {_SIZE} }};"
-    return "\n".join([sizes, _HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
+def source(tape: Structure, suffix: str = "") -> str:
+    """Return the C source of the functions `expand` and `set_jacobian` of tape.h.
+
+    With a suffix to their names they are static.
+    """
+    text = "\n".join([_HEADER, *chain(_expand(tape), _set_jacobian(tape))]) + "\n"
+    if suffix:
+        text = re.sub(r"^void (expand|set_jacobian)", rf"static void \1{suffix}", text, flags=re.M)
+    return text
 
 
 def _of(operation: _Listed) -> Operation:
@@ -152,12 +159,15 @@ def _written(text: str, operation: _Listed) -> str:
 
 def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
     """Return a linear combination of the numbers `name` of slots, with its constant if `is_value`."""
-    begin = sum(len(terms) for _, terms in tape.combinations[: number - 1])
-    constant, terms = tape.combinations[number - 1]
-    parts = [f"d[{number - 1}]"] if is_value and constant else []
-    for i, (slot, unit) in enumerate(terms, begin):
-        parts.append(f"{'-' * (unit < 0)}{name}{slot}" if unit else f"c[{i}]*{name}{slot}")
-    return " + ".join(parts).replace("+ -", "- ") or "0.0"
+    parts = [f"d[{number - 1}]"] * is_value
+    parts += [f"c[{i}]*{name}{slot}" for i, slot in _terms(tape, number)]
+    return " + ".join(parts) or "0.0"
+
+
+def _terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
+    """Yield the index of the coefficient, and the slot, of each term of a combination."""
+    begin = sum(map(len, tape.combinations[: number - 1]))
+    yield from enumerate(tape.combinations[number - 1], begin)
 
 
 def _rates(tape: Structure) -> range:
@@ -284,10 +294,9 @@ def _slopes_of_combination(
     tape: Structure, number: int, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
     """Return the derivatives of a linear combination by unknowns, as C."""
-    begin = sum(len(terms) for _, terms in tape.combinations[: number - 1])
     parts = [
-        (unknown, f"{unit}.0*{name}" if unit else f"c[{i}]*{name}")
-        for i, (slot, unit) in enumerate(tape.combinations[number - 1][1], begin)
+        (unknown, f"c[{i}]*{name}")
+        for i, slot in _terms(tape, number)
         for unknown, name in by.get(slot, {}).items()
     ]
     return _sums(parts)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyharness.engine.leaves import key, structure
 from pyharness.engine.problem import normalized, remainders
 from pyharness.engine.system import system_of
 from pyharness.model.codes import Methods, Operations, Places, Statuses, Storage
@@ -86,7 +87,7 @@ class Listing(NamedTuple):
     tables: list[Table]
 
 
-# The place of the address of compiled leaves in a tape's array.
+# The place in a tape's array of the address of compiled leaves, or the number of a ready torque's.
 _LEAVES = 7
 
 
@@ -142,7 +143,8 @@ def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
 @lru_cache(maxsize=64)
 def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     """Return a tape as the kernel's array, whose format is in fortran/modern/tape.f90."""
-    n_unknowns, n_slots, operations, combinations, tables = listing(tape, n_unknowns)
+    listed = listing(tape, n_unknowns)
+    n_unknowns, n_slots, operations, combinations, tables = listed
     terms = [term for _, each in combinations for term in each]
     starts = np.cumsum([1, *(len(each) for _, each in combinations)])
     # f2py refuses empty arrays. The kernel does not read these entries.
@@ -165,6 +167,9 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
             *pieces,
         ]
     )
+    shape = structure(listed)
+    if shape is not None:
+        packed[_LEAVES : _LEAVES + 1].view(np.int64)[:] = extension().ready_leaves(key(shape))
     packed.flags.writeable = False
     return packed
 
@@ -181,12 +186,13 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of the compiled leaves of a tape.
+    `leaves` is the address of the compiled leaves of a tape; 0: those of a ready torque, or none.
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:
         packed = np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
-        packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
+        if leaves:
+            packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
         return packed
     coefficients, constant, rate, sines, cosines = normalized(scene)
     packed[Places.N_SINES] = sines.shape[1]

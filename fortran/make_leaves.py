@@ -1,0 +1,60 @@
+"""Write the compiled leaves of the ready torques: make_leaves.py ROOT SOURCE HEADER.
+
+The body has three different moments. The torques have as many numbers as they can have.
+"""
+
+import sys
+from pathlib import Path
+
+
+def main(root: str, target: str, header: str) -> None:
+    """Write the C source of all leaves, which has tables of them, and the header of their keys."""
+    sys.dont_write_bytecode = True
+    sys.path.insert(0, root)
+    # The finder of an editable installation, an instance, would build the package first.
+    sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
+    from pyharness import Scene, TorqueLaw, torques
+    from pyharness.engine.leaves import key, source, structure
+    from pyharness.engine.recorded import listing, system
+    from pyharness.model.constant_body import with_constant_body
+
+    three = (0.1, 0.2, 0.3)
+    turning = TorqueLaw(three, sines=[(three, 0.4)], frame="space")
+    terms = [
+        torques.damping(three),
+        torques.drag([0.1]),
+        torques.drag([0.0, 0.1]),
+        torques.drag([0.1, 0.2]),
+        torques.attitude_control(0.1, 0.2),
+        torques.wheels(three),
+        torques.wheels(three, three),
+        *(torques.wheels(three, axis) for axis in ((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))),
+        torques.gravity_gradient((1.0, 1.2, 1.5), 0.3),
+        torques.magnetic_dipole(three, three),
+        torques.magnetic_dipole(three, turning),
+        torques.magnetic_damping(0.1, three),
+        torques.magnetic_damping(0.1, turning),
+        torques.in_space(three),
+        turning,
+    ]
+    structures = {}
+    for term in terms:
+        for attitude in (None, (1.0, 0.0, 0.0, 0.0)):
+            scene = Scene("ready", (1.0, 2.0, 3.0), (1.0, 1.2, 1.5), torque=term, attitude=attitude)
+            if attitude or not scene.torque.needs_attitude:
+                shape = structure(listing(system(with_constant_body(scene))))
+                structures[key(shape)] = shape
+    texts = ['#include "tape.h"']
+    for number, shape in enumerate(structures.values()):
+        text = source(shape, f"_{number}")
+        # One definition of what all have.
+        texts.append(text if number == 0 else text[text.index("static void expand") :])
+    names = [f"{{expand_{number}, set_jacobian_{number}}}" for number in range(len(structures))]
+    texts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(names)}}};")
+    Path(target).write_text("\n".join(texts) + "\n")
+    keys = ", ".join(f"INT64_C({each})" for each in structures)
+    Path(header).write_text(f"static const int64_t ready_keys[] = {{{keys}}};\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

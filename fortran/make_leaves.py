@@ -5,6 +5,7 @@ The body has three different moments. The torques have as many numbers as they c
 
 import sys
 from pathlib import Path
+from typing import Any
 
 
 def main(root: str, target: str, header: str) -> None:
@@ -20,7 +21,7 @@ def main(root: str, target: str, header: str) -> None:
 
     three = (0.1, 0.2, 0.3)
     turning = TorqueLaw(three, sines=[(three, 0.4)], frame="space")
-    terms = [
+    terms: list[Any] = [
         torques.damping(three),
         torques.drag([0.1]),
         torques.drag([0.0, 0.1]),
@@ -43,6 +44,7 @@ def main(root: str, target: str, header: str) -> None:
             scene = Scene("ready", (1.0, 2.0, 3.0), (1.0, 1.2, 1.5), torque=term, attitude=attitude)
             if attitude or not scene.torque.needs_attitude:
                 shape = structure(listing(system(with_constant_body(scene))))
+                assert shape is not None
                 structures[key(shape)] = shape
     texts = ['#include "tape.h"']
     for number, shape in enumerate(structures.values()):

@@ -125,18 +125,21 @@ void tape_variation(const void *tape, const void *request, void *variation)
 
 void tape_bodies(void *bodies) { chosen.bodies(bodies); }
 
-/* Return the number of the compiled operations of a ready torque, which is negative; 0 for others. */
+enum { LEAST_ADDRESS = 4096 };
+
+/* Return the number, from 1, of the compiled operations of a ready torque; 0 for others. */
 int64_t ready_leaves(int64_t key)
 {
   for (int64_t i = 0; i < (int64_t)(sizeof ready_keys / sizeof *ready_keys); i++)
-    if (ready_keys[i] == key) return -1 - i;
+    if (ready_keys[i] == key) return i + 1;
   return 0;
 }
 
-/* Return the compiled operations of a ready torque, or at an address. */
+/* Return the compiled operations of a ready torque, by its number, or at an address. */
 const void *leaves_at(int64_t number)
 {
-  return number < 0 ? chosen.leaves + (-1 - number) : (const void *)(intptr_t)number;
+  return number > 0 && number < LEAST_ADDRESS ? chosen.leaves + number - 1
+                                              : (const void *)(intptr_t)number;
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

@@ -6,17 +6,19 @@ them, and its name ends in the hash of its content.
 
 import ctypes
 import os
+import platform
 import shlex
 import shutil
 import stat
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache, lru_cache
+from ctypes import CDLL as CDLL
+from functools import cache
 from hashlib import sha256
+from itertools import takewhile
 from pathlib import Path
 
 from pyharness.engine.leaves import Structure, source, structure
@@ -37,8 +39,8 @@ class LeavesError(Exception):
 
 def folder() -> Path:
     """Return the folder of compiled leaves, which may be missing."""
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    return Path(home if os.path.isabs(home) else Path("~/.cache").expanduser(), "pyharness", "leaves")
+    home = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
 
 def size() -> int:
@@ -53,22 +55,23 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
     """
     shape = structure(listing(tape))
     if shape is None:
-        return 0, "interpreter: switches and very long torques are not compiled"
+        return 0, "interpreter: switches and torques of 500 operations are not compiled"
     try:
-        return ctypes.addressof(_loaded(shape, str(folder()))), "compiled"
-    except LeavesError as error:
+        return ctypes.addressof(loaded(shape, str(folder()))), "compiled"
+    except (LeavesError, RuntimeError) as error:  # no home folder is known
         return 0, f"interpreter: {error}"
 
 
-@lru_cache(maxsize=None)  # a kernel may use what has been loaded for as long as the process lives
-def _loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
+@cache  # a kernel may use what has been loaded for as long as the process lives
+def loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
+    """Return the addresses of leaves in their order in `_FUNCTIONS`; raise LeavesError."""
     try:
         found = _found(Path(place), _key(source(tape)))
-        library = ctypes.CDLL(str(found or _compiled(Path(place), source(tape))))
+        library = CDLL(str(found or compiled_file(Path(place), source(tape))))
         functions = [ctypes.cast(getattr(library, name), ctypes.c_void_p) for name in _FUNCTIONS]
     except (OSError, AttributeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise LeavesError(f"compiled leaves can't be loaded or stored in {place}: {reason}") from None
+        raise LeavesError(f"leaves can't be loaded from or stored in {place}: {reason}") from None
     return (ctypes.c_void_p * len(functions))(*(each.value for each in functions))
 
 
@@ -86,17 +89,19 @@ def compiler() -> tuple[str, ...]:
 
 
 @cache
-def _machine() -> str:
+def machine() -> str:
     """Return what else the code depends on: the compiler, its version and the processor."""
     file = os.stat(os.path.realpath(compiler()[0]))
-    from numpy._core._multiarray_umath import __cpu_features__ as features
-
-    known = sorted(name for name, has in features.items() if has)
-    return repr((compiler(), _FLAGS, file.st_size, file.st_mtime_ns, sys.platform, os.uname().machine, known))
+    names = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
+    about = platform.platform() + platform.processor()
+    with suppress(OSError), open("/proc/cpuinfo") as lines:
+        for line in takewhile(str.strip, lines):
+            about += line if line.startswith(names) else ""
+    return repr((compiler(), _FLAGS, file.st_size, file.st_mtime_ns, about))
 
 
 def _key(text: str) -> str:
-    return sha256((text + _machine()).encode()).hexdigest()[:32]
+    return sha256((text + machine()).encode()).hexdigest()[:32]
 
 
 def _is_safe(info: os.stat_result) -> bool:
@@ -128,7 +133,7 @@ def _found(place: Path, key: str) -> Path | None:
     return None
 
 
-def _compiled(place: Path, text: str) -> Path:
+def compiled_file(place: Path, text: str) -> Path:
     """Compile leaves, and return their file, which appears in the folder as a whole."""
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
     info = place.lstat()
@@ -155,7 +160,10 @@ def _run(command: list[str]) -> str:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return str(error)
-    return (run.stderr.strip() or f"exit status {run.returncode}").splitlines()[0] if run.returncode else ""
+    if run.returncode == 0:
+        return ""
+    lines = run.stderr.strip().splitlines() or [f"exit status {run.returncode}"]
+    return next((line for line in lines if "error" in line), lines[0])
 
 
 def _clean(place: Path) -> None:

@@ -22,11 +22,13 @@ _BLOCK = 8  # columns of the Jacobian in a row of its storage
 _NODES = 3  # of the Jacobian
 _TERMS_AMID = 8  # terms of a series at a node
 _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # of a Jacobian
-_MOST_OPERATIONS = 500  # whose products fit on the stack of a thread
+_MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
 _TIME, _FIRST_UNKNOWN = 1, 2  # slots, from 1
 
-_HEADER = f"""
-enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};""" + """
+_HEADER = (
+    f"""
+enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};"""
+    + """
 typedef double abreast __attribute__((vector_size(32)));
 typedef long long bits __attribute__((vector_size(32)));
 static double halved(double x, double root) { return x ? x / (2.0 * root) : 0.0; }
@@ -41,6 +43,7 @@ static void put(double *to, double h, abreast a, abreast b, abreast c, abreast d
     *(abreast *)(to + node * SIZE) = h * (abreast){a[node], b[node], c[node], d[node]};
 }
 """
+)
 
 
 _Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an operation
@@ -49,8 +52,8 @@ _Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an 
 class Operation(NamedTuple):
     """The recurrence and the slopes of an operation, as C.
 
-    Its slots are o, p and q, its operands x and y. Term k of slot o is t_o, term 0 is z_o, term
-    k - 1 is b_o, term 1 of the operand is f_x, and the value at a node is m_o; i is 1/k. The sums s0
+    Its slots are o, p and q, its operands x and y. Of slot o, t_o is term k, or l_o if it is known;
+    b_o is term k - 1, z_o term 0, f_o term 1, and m_o the value at a node; i is 1/k. The sums s0
     and s1 are those of the products of terms 1 to k - 1 of the slots in `pairs`.
     """
 
@@ -90,7 +93,7 @@ OPERATIONS = {
     _WAVE: _SINE._replace(
         series=("t_q = k*t_x", "t_o = i*f_x*b_p", "t_p = -i*f_x*b_o"), pairs=()
     ),
-    Operations.TABLE: Operation(("t_o = later_o",)),
+    Operations.TABLE: Operation(("t_o = l_o",)),
     Operations.LOG: _OF_ANGLE,
     Operations.ATAN: _OF_ANGLE,
     Operations.ASIN: _OF_ANGLE,
@@ -98,7 +101,7 @@ OPERATIONS = {
 
 
 class Structure(NamedTuple):
-    """What the leaves of a tape depend on."""
+    """The parts of a tape on which its leaves depend."""
 
     n_unknowns: int
     operations: tuple[_Listed, ...]
@@ -158,7 +161,7 @@ def _written(text: str, operation: _Listed) -> str:
 
 
 def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return a linear combination of the numbers `name` of slots, with its constant if `is_value`."""
+    """Return a linear combination of the numbers `name` of slots; a value has a constant."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in _terms(tape, number)]
     return " + ".join(parts) or "0.0"
@@ -184,16 +187,18 @@ def _expand(tape: Structure) -> Iterator[str]:
     pairs: dict[tuple[int, int], int] = {}
     terms = []  # of order k
     for operation in tape.operations:
-        slots, sums = _slots(operation), []
+        slots = _slots(operation)
         if operation[0] == Operations.LINEAR:
-            series: tuple[str, ...] = (f"t_o = {_combined(tape, operation[1], 't', is_value=False)}",)
+            rule = Operation((f"t_o = {_combined(tape, operation[1], 't', is_value=False)}",))
         else:
-            series = _of(operation).series
-            both = [sorted(slots[letter] for letter in pair) for pair in _of(operation).pairs]
-            sums = [pairs.setdefault((x, y), len(pairs)) for x, y in both]
-        for line in series:
-            text = re.sub(r"\bs([01])\b", lambda match: f"sum[{sums[int(match[1])]}]", line)
-            terms.append(f"const double {_written(text, operation)};")
+            rule = _of(operation)
+        both = [sorted(slots[letter] for letter in pair) for pair in rule.pairs]
+        sums = [f"sum[{pairs.setdefault((x, y), len(pairs))}]" for x, y in both]
+        for line in rule.series:
+            text = _written(line, operation)
+            for number, place in enumerate(sums):
+                text = text.replace(f"s{number}", place)
+            terms.append(f"const double {text};")
             terms.append(f"{_place(slots[line[2]], 'k')} = t{slots[line[2]]};")
     groups = [list(pairs)[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
     for g, group in enumerate(groups):
@@ -247,7 +252,7 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the derivatives of the rates by the unknowns at the nodes."""
+    """Yield the function that computes the derivatives of the rates at the nodes."""
     # Of each slot: the names of its derivatives, by the unknowns on which it depends.
     by = {slot: {slot: "one"} for slot in _unknowns(tape)}
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"

@@ -181,6 +181,11 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     return pairs.view(np.float64)
 
 
+def has_ready_leaves(tape: Tape) -> bool:
+    """Return whether a tape is that of a ready torque, whose leaves were built."""
+    return bool(kernel_tape(tape)[_LEAVES] != 0.0)
+
+
 def packed_scene(
     scene: Scene, code: int, tolerance: float, effort: float, leaves: int = 0
 ) -> Array:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_call
 from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
+from pyharness.engine.recorded import has_ready_leaves, packed_scene, system
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -18,7 +19,6 @@ from pyharness.engine.registry import (
     requested_tolerance,
 )
 from pyharness.engine.sensitivity import judge_ending
-from pyharness.engine.recorded import packed_scene, system
 from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
@@ -88,8 +88,9 @@ class Solver(BoundKernel[Result]):
     status, error, growth, digits, steps, method
         Reports on this thread's last call, unless it raised an error.
     leaves : str or None
-        ``compiled``, or ``interpreter`` and, where compiled leaves were requested, why; None
-        without a recorded torque.
+        What computes the series of a recorded torque: code that was ``built`` with the package
+        (ready torques) or ``compiled``, or the ``interpreter``, with the reason where compilation
+        was requested; None for other torques.
     many : callable
         A function that solves from many initial states in one call.
 
@@ -122,11 +123,7 @@ class Solver(BoundKernel[Result]):
         entry = extension()
         kernel = entry.solve_packed_attitude if with_attitude else entry.solve_packed
         code = _code(chosen, with_attitude)
-        address, leaves = 0, "interpreter" if code == Methods.TAPE else None
-        if compiled and leaves:
-            from pyharness.engine.leaf_cache import leaves_of
-
-            address, leaves = leaves_of(system(with_constant_body(chosen.scene)))
+        address, leaves = leaves_for(chosen.scene, compiled) if code == Methods.TAPE else (0, None)
         packed = packed_scene(chosen.scene, code, tolerance, effort, address)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
@@ -152,7 +149,8 @@ class Solver(BoundKernel[Result]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the class and the arguments for `copy` and `pickle`."""
-        return type(self), (self.scene, self.plan, *self.settings, self.with_attitude, self._compiled)
+        options = self.with_attitude, self._compiled
+        return type(self), (self.scene, self.plan, *self.settings, *options)
 
     def __repr__(self) -> str:
         """Return the solver's class, scene and method."""
@@ -247,6 +245,18 @@ class Solver(BoundKernel[Result]):
             return "complete", None, None
         kind = "closed" if self.plan.closed_form else "gauss" * (self.plan.method in GAUSS)
         return judge_ending(self.plan.scene, kind, self.settings[0], self._ending)
+
+
+def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
+    """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
+    tape = system(with_constant_body(scene))
+    if has_ready_leaves(tape):
+        return 0, "built"
+    if not compiled:
+        return 0, "interpreter"
+    from pyharness.engine.leaf_cache import leaves_of
+
+    return leaves_of(tape)
 
 
 def _code(chosen: Plan, with_attitude: bool) -> int:

@@ -288,7 +288,7 @@ def test_sine_and_cosine_of_one_angle_are_one_operation() -> None:
     scene = scene_of(lambda t, omega: [np.sin(omega[0]), np.cos(omega[0]), np.cos(3.0 * t)])
     numbers = kernel_tape(system(scene))
     count = int(numbers[2])
-    operations = numbers[7 : 7 + 2 * count].view(np.int32).reshape(count, 4)
+    operations = numbers[8 : 8 + 2 * count].view(np.int32).reshape(count, 4)
     waves = operations[operations[:, 0] == Operations.SINE_COSINE]
     # The frequency of an angle proportional to time is known, so that its phase is not rounded.
     assert sorted(bool(each) for each in waves[:, 2]) == [False, True]

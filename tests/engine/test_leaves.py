@@ -1,0 +1,363 @@
+"""Compiled leaves against the interpreter and the series in decimal arithmetic, and their cache."""
+
+import os
+import pickle
+import stat
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pyharness import Scene, TorqueLaw, prepare, solve, torques
+from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
+from pyharness.engine import leaf_cache
+from pyharness.engine.leaves import source, structure
+from pyharness.engine.recorded import kernel_tape, listing, system, taylor_step
+from pyharness.model.constant_body import with_constant_body
+from pyharness.model.principal import principal
+from pyharness.truth.reference import reference
+
+MOMENTS = (1.0, 1.2, 1.5)
+
+
+def every_function(t: Any, w: Any) -> Any:
+    """Return a torque with every operation that has leaves."""
+    x = 0.3 * w[0] + 0.1 * t
+    return [
+        np.exp(-x) * np.sin(2.0 * x) - w[0] / (2.0 + w[1] * w[1]),
+        np.sqrt(1.0 + x * x) * np.log(2.0 + x * x) + np.tanh(w[1]) * np.cos(0.7 * t),
+        np.arctan(w[2]) + 0.2 * np.arcsin(0.1 * x) - w[2] * np.sqrt(w @ w),
+    ]
+
+
+def simple(t: Any, w: Any) -> Any:
+    """Return a torque that is compiled fast."""
+    return -w * w[0]
+
+
+def scene_of(torque: Any = every_function, **own: Any) -> Scene:
+    """Return a scene with a recorded torque."""
+    return Scene("leaves", (0.3, 0.2, 0.9), MOMENTS, torque=torque, **own)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of the cache, which is missing."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return leaf_cache.folder()
+
+
+@pytest.fixture
+def fresh() -> Iterator[None]:
+    """Let a test name another compiler."""
+    leaf_cache.compiler.cache_clear()
+    leaf_cache.machine.cache_clear()
+    yield
+    leaf_cache.compiler.cache_clear()
+    leaf_cache.machine.cache_clear()
+
+
+def terms(scene: Scene, address: int, h: float) -> Any:
+    """Return the terms of a step `h` (s), interpreted, or by the leaves at an address."""
+    array = kernel_tape(system(with_constant_body(scene))).copy()
+    array[7:8].view(np.int64)[:] = address
+    state = np.array([*scene.omega, *(scene.attitude or ())])
+    allowed = np.full(len(state), 1e-9)
+    return taylor_step(array, 0.4, state, allowed, 1e-12, h, h).terms
+
+
+def scenes(number: int) -> Scene:
+    """Return a random scene without switches, about principal axes."""
+    source_ = Random(f"leaves {number}")
+    drawn = draw_ready(source_, READY) if number % 2 else draw(source_, ("mixed", "decay", "drag"))
+    return principal(drawn[0])[0] if number else scene_of(attitude=(1.0, 0.2, 0.3, 0.4))
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_terms_are_those_of_the_interpreter(number: int) -> None:
+    scene = scenes(number)
+    address, leaves = leaf_cache.leaves_of(system(with_constant_body(scene)))
+    assert leaves == "compiled"
+    h = 1e-2 / max(map(abs, scene.omega))
+    interpreted, compiled = terms(scene, 0, h), terms(scene, address, h)
+    assert compiled.shape == interpreted.shape
+    difference, sizes = np.abs(compiled - interpreted), np.abs(interpreted)
+    assert (difference <= 4.0 * np.spacing(sizes.max(axis=0))).all()
+    # Rounding errors of earlier terms are larger, relative to a late term.
+    assert (difference <= 200.0 * np.spacing(sizes.max(axis=1, keepdims=True))).all()
+    assert (compiled != 0.0).sum() > 10
+
+
+@pytest.mark.parametrize("attitude", [None, (1.0, 0.2, 0.3, 0.4)])
+def test_growth_and_estimate_are_those_of_the_interpreter(attitude: Any) -> None:
+    scene = scene_of(attitude=attitude)
+    with_attitude = attitude is not None
+    prepare_any: Any = prepare
+    found: Any = [
+        prepare_any(scene, tolerance=1e-9, attitude=with_attitude, compiled=compiled)
+        for compiled in (False, True)
+    ]
+    states = [np.hstack(solver(scene.omega, 2.0)) for solver in found]
+    assert [each.leaves for each in found] == ["interpreter", "compiled"]
+    assert states[1] == pytest.approx(states[0], rel=0.0, abs=1e-12)
+    assert found[1].growth == pytest.approx(found[0].growth, rel=1e-9)
+    assert found[1].error == pytest.approx(found[0].error, rel=0.1)
+    truth = reference(scene, [2.0])
+    assert states[1][:3] == pytest.approx(truth.omega[0], rel=0.0, abs=1e-9)
+
+
+def test_ready_torques_have_leaves_that_were_built() -> None:
+    three = (0.3, 0.1, 0.2)
+    for torque in (
+        torques.damping(0.1), torques.damping(three), torques.drag([0.1, 0.2]),
+        torques.rate_control(three, three), torques.attitude_control(0.3, three),
+        torques.wheels(three), torques.gravity_gradient(MOMENTS, 0.7),
+        torques.magnetic_dipole(three, three), torques.magnetic_damping(0.1, three),
+        torques.in_space(three), TorqueLaw(three, sines=[(three, 2.0)], frame="space"),
+    ):  # fmt: skip
+        scene = scene_of(torque, attitude=(1.0, 0.0, 0.0, 0.0))
+        assert prepare(scene, attitude=True).leaves == "built"
+        if not scene.torque.needs_attitude:
+            assert prepare(scene).leaves == "built"
+    assert kernel_tape(system(scene_of()))[7] == 0.0
+
+
+def test_switches_are_interpreted() -> None:
+    solver = prepare(scene_of(lambda t, w: -np.clip(w, -0.1, 0.1)), compiled=True)
+    assert solver.leaves == "interpreter: switches and torques of 500 operations are not compiled"
+    assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
+    assert prepare(scene_of(TorqueLaw()), compiled=True).leaves is None
+
+
+def test_copies_threads_and_children_solve(folder: Path) -> None:
+    solver = prepare(scene_of(), compiled=True)
+    wanted = solver((0.3, 0.2, 0.9), 5.0).tolist()
+    written = pickle.dumps(solver)
+    assert str(folder).encode() not in written
+    again = pickle.loads(written)
+    assert again.leaves == "compiled"
+    assert again((0.3, 0.2, 0.9), 5.0).tolist() == wanted
+    results: list[Any] = []
+    threads = [
+        threading.Thread(target=lambda: results.append(solver((0.3, 0.2, 0.9), 5.0).tolist()))
+        for _ in range(8)
+    ]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert results == [wanted] * 8
+    child = os.fork()
+    if child == 0:
+        os._exit(solver((0.3, 0.2, 0.9), 5.0).tolist() != wanted)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+# ---- The cache ----------------------------------------------------------------------------------
+
+
+def compiled_once(folder: Path) -> Path:
+    """Compile leaves, and return their file."""
+    prepare(scene_of(simple), compiled=True)
+    (found,) = folder.glob("*.so")
+    return found
+
+
+def test_files_are_private_and_used_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = compiled_once(folder)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert stat.S_IMODE(found.stat().st_mode) == 0o700
+    assert list(folder.iterdir()) == [found]
+    assert leaf_cache.size() == found.stat().st_size
+    leaf_cache.loaded.cache_clear()
+    monkeypatch.setattr(leaf_cache, "compiled_file", None)
+    assert prepare(scene_of(simple), compiled=True).leaves == "compiled"
+
+
+def rewritten(file: Path, content: bytes) -> None:
+    """Replace a file, which may be mapped into memory."""
+    file.unlink()
+    file.write_bytes(content)
+    file.chmod(0o700)
+
+
+def of_another_user(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+
+
+def damaged(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rewritten(file, file.read_bytes()[:-1] + b"\1")
+
+
+def of_another_processor(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leaf_cache, "machine", lambda: "another one")
+
+
+def of_another_version(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = structure(listing(system(scene_of(simple))))
+    assert shape is not None
+    text = source(shape) + "/* newer */"
+    monkeypatch.setattr(leaf_cache, "source", lambda _: text)
+
+
+def as_a_link(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file.rename(file.parent.parent / file.name)
+    file.symlink_to(file.parent.parent / file.name)
+
+
+def in_a_linked_folder(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file.parent.rename(file.parent.parent / "elsewhere")
+    file.parent.symlink_to(file.parent.parent / "elsewhere")
+
+
+def a_folder(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+HOSTILE: dict[str, Callable[[Path, pytest.MonkeyPatch], Any]] = {
+    "another user": of_another_user,
+    "another processor": of_another_processor,
+    "another version": of_another_version,
+    "a link": as_a_link,
+    "a linked folder": in_a_linked_folder,
+    "damaged": damaged,
+    "truncated": lambda file, _: rewritten(file, file.read_bytes()[:1000]),
+    "empty": lambda file, _: rewritten(file, b""),
+    "writable by all": lambda file, _: file.chmod(0o777),
+    "a folder writable by all": lambda file, _: file.parent.chmod(0o777),
+    "another name": lambda file, _: file.rename(file.with_name(file.name[:-4] + "0.so")),
+    "a folder": a_folder,
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_file_is_never_loaded(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = compiled_once(folder)
+    leaf_cache.loaded.cache_clear()
+    HOSTILE[name](file, monkeypatch)
+    hostile = set()
+    for number, path in enumerate(folder.parent.parent.rglob("*.so")):
+        if path.is_file():
+            # A second name keeps the number of the file from being used again.
+            os.link(path.resolve(), folder.parent.parent / f"kept-{number}")
+            hostile.add(path.stat().st_ino)
+    opened: list[int] = []
+    library = leaf_cache.CDLL
+
+    def watched(path: str) -> Any:
+        opened.append(os.stat(path).st_ino)
+        return library(path)
+
+    monkeypatch.setattr(leaf_cache, "CDLL", watched)
+    solver = prepare(scene_of(simple), compiled=True)
+    assert hostile.isdisjoint(opened)
+    assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
+    if name in ("another user", "a linked folder", "a folder writable by all"):
+        reason = f"{folder} is not the user's own folder, or others may write it"
+        assert solver.leaves == f"interpreter: {reason}"
+    elif name != "a folder":
+        assert solver.leaves == "compiled"
+
+
+def script(folder: Path, text: str) -> str:
+    """Return a program that runs as a compiler."""
+    folder.parent.mkdir(exist_ok=True)
+    path = folder.parent / "cc-test"
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+COMPILERS = {
+    "missing": "/nonexistent/cc",
+    "failing": "echo 'no room on the disk' >&2; exit 1",
+    "silent": "exit 3",
+    "killed": "kill -9 $$",
+    "without a result": "exit 0",
+    "with garbage": 'for last; do :; done; case "$last" in -*) shift $(($# - 2)); last=$1;; esac; '
+    'echo garbage > "$last"',
+}
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize("name", COMPILERS)
+def test_without_a_working_compiler_the_interpreter_solves(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = COMPILERS[name]
+    if name == "missing":
+        monkeypatch.setenv("PATH", "")
+    else:
+        command = script(folder, command)
+    monkeypatch.setenv("CC", command)
+    solver = prepare(scene_of(simple), compiled=True)
+    assert str(solver.leaves).startswith("interpreter: ")
+    assert "\n" not in str(solver.leaves)
+    assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
+    assert not [each for each in folder.glob("*") if not each.name.endswith(".so")]
+
+
+def no_room(*_: Any, **__: Any) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def too_slow(*_: Any, **__: Any) -> None:
+    raise subprocess.TimeoutExpired("cc", 60.0)
+
+
+@pytest.mark.parametrize("what", ["mkdir", "write_text", "replace", "load", "slow", "file"])
+def test_without_room_or_rights_the_interpreter_solves(
+    what: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if what == "load":
+        monkeypatch.setattr(leaf_cache, "CDLL", no_room)  # as on a disk that is mounted noexec
+    elif what == "slow":
+        monkeypatch.setattr(subprocess, "run", too_slow)
+    elif what == "file":
+        folder.parent.write_text("in the place of the folder")
+    else:
+        monkeypatch.setattr(Path, what, no_room)
+    solver = prepare(scene_of(simple), compiled=True)
+    assert str(solver.leaves).startswith("interpreter: ")
+    assert solver((0.3, 0.2, 0.9), 1.0) == pytest.approx(solve(solver.scene, 1.0).omega[0])
+    if what != "file":
+        assert not list(folder.glob("new-*"))
+
+
+def test_two_processes_compile_at_once(folder: Path, tmp_path: Path) -> None:
+    code = (
+        "from pyharness import Scene, prepare\n"
+        "def torque(t, w): return [-w[0]*w[1]/(1 + t*t), -w[1], -w[2]]\n"
+        "scene = Scene('two', (0.3, 0.2, 0.9), (1, 1.2, 1.5), torque=torque)\n"
+        "print(prepare(scene, compiled=True).leaves)"
+    )
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=tmp_path
+        )
+        for _ in "ab"
+    ]
+    assert [each.communicate()[0] for each in both] == ["compiled\n"] * 2
+    assert len(list(folder.glob("*.so"))) == 1
+
+
+def test_the_folder_is_limited_and_cleaned(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = compiled_once(folder)
+    left = folder / "new-killed"
+    left.mkdir()
+    os.utime(left, (0, 0))
+    os.utime(file, (0, 0))
+    monkeypatch.setattr(leaf_cache, "MOST_BYTES", 100)
+    prepare(scene_of(lambda t, w: -w * w[1]), compiled=True)
+    assert not left.exists()
+    assert not file.exists()
+    assert len(list(folder.iterdir())) == 1

@@ -53,9 +53,9 @@ def list_own_contenders() -> list[SceneContender]:
     """Return our methods, and the programs, original and corrected."""
     both = partial(SceneContender, attitude=True)
     found = [
-        both("auto", "tolerance", partial(_prepared, "auto"), TOLERANCES),
-        both("taylor", "tolerance", partial(_prepared, "taylor"), TOLERANCES),
-        both("closed-form", "none", partial(_prepared, "closed-form"), (0.0,)),
+        both("auto", "tolerance", partial(prepared_maker, "auto"), TOLERANCES),
+        both("taylor", "tolerance", partial(prepared_maker, "taylor"), TOLERANCES),
+        both("closed-form", "none", partial(prepared_maker, "closed-form"), (0.0,)),
     ]
     names = (*FIXED_STEP, *GAUSS)
     in_steps = [(prepared_candidate(name, 1.0), METHODS[name].order) for name in names]
@@ -74,11 +74,14 @@ def refuse_rounding(solver: str, setting: float) -> None:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")
 
 
-def _prepared(name: str, scene: Scene) -> Maker:
+def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
+    """Return what makes a prepared solver of a method ready, with compiled leaves if asked."""
+
     def make(horizon: float, setting: float) -> Ready:
-        # A closed form has no setting.
         attitude = scene.attitude is not None
-        return prepared_candidate(name, setting or None, attitude=attitude).ready(scene, horizon)
+        # A closed form has no setting.
+        candidate = prepared_candidate(name, setting or None, False, attitude, compiled)
+        return candidate.ready(scene, horizon)
 
     return make
 

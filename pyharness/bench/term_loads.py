@@ -2,12 +2,19 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from pyharness.bench.contenders import TOLERANCES, Maker, SceneContender, list_own_contenders
+from pyharness.bench.contenders import (
+    TOLERANCES,
+    Maker,
+    SceneContender,
+    list_own_contenders,
+    prepared_maker,
+)
 from pyharness.bench.ensemble_contenders import EnsembleContender, EnsembleLoad, own_ensembles
 from pyharness.bench.ensemble_peers import ensemble_peers
 from pyharness.bench.measure import Workload
@@ -213,10 +220,11 @@ def _in_space(t: Any, w: Any, q: Any, sin: Any, cos: Any) -> Sequence[Any]:
     return _about_body(_PUSH, q)
 
 
-def term_methods() -> list[SceneContender]:
+def term_methods(compiled: bool = False) -> list[SceneContender]:
     """Return our contender for single bodies, `auto`, without coarse tolerances."""
     own = (each for each in list_own_contenders() if each.name == OURS)
-    return [replace(each, settings=_TOLERANCES[:-1]) for each in own]
+    prepare = partial(prepared_maker, OURS, compiled=compiled)
+    return [replace(each, prepare=prepare, settings=_TOLERANCES[:-1]) for each in own]
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:

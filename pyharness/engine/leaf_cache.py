@@ -48,6 +48,14 @@ def size() -> int:
     return sum(info.st_size for _, info in _files())
 
 
+def about_leaves() -> dict[str, str | int]:
+    """Return the folder of compiled leaves, its size in bytes, and the compiler, or why not."""
+    try:
+        return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
+    except (LeavesError, RuntimeError) as error:
+        return {"folder": "none", "bytes": 0, "compiler": str(error)}
+
+
 def leaves_of(tape: Tape) -> tuple[int, str]:
     """Return the address of the compiled leaves of a tape, and ``compiled``.
 

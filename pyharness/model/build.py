@@ -165,6 +165,9 @@ def doctor_report(build: Build, here: dict[str, Any]) -> Report:
         "processor": f"{here['processor']}, {here['cores']} cores",
         "instructions": here["instructions"] or "unknown, for nothing is built",
         "arithmetic": here["arithmetic"] or "unknown, for nothing is built",
+        "compiled torques": "{bytes} bytes in {folder}; compiler: {compiler}".format(
+            **here["leaves"]
+        ),
     }
     for name in REQUIRED:
         rows[name] = here["packages"][name] or f"missing: 'pip install {name}'"

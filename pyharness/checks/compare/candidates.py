@@ -88,14 +88,18 @@ def method_candidate(name: str, tolerance: float, effort: float = 1.0) -> Candid
 
 
 def prepared_candidate(
-    name: str, tolerance: float | None, primed: bool = False, attitude: bool = False
+    name: str,
+    tolerance: float | None,
+    primed: bool = False,
+    attitude: bool = False,
+    compiled: bool = False,
 ) -> Candidate:
     """Return a candidate that calls a solver made by `prepare` for the method `name`.
 
     If `primed`, the solver is first called with another omega, which must have no effect. Methods
     with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
     """
-    make: Any = partial(prepare, attitude=True) if attitude else prepare
+    make: Any = partial(prepare, attitude=attitude, compiled=compiled)
     read = _turned if attitude else _answered
 
     def ready(scene: Scene, time: float) -> Ready:

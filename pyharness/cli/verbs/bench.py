@@ -42,6 +42,8 @@ OPTIONS = {
     "column of the result; none: leave them out (default: all).",
     "--peers X,Y": "Measure only these third-party solvers, by the same names or by package "
     "(heyoka, numba, scipy); none: leave them out (default: all installed ones).",
+    "--compiled": "With --terms, have the C compiler translate Python functions first, as "
+    "prepare(..., compiled=True) does.",
     "--plan": "Measure instead how much time each computation that `pyharness plan` leaves out "
     "would take.",
     "--growth": "Measure instead how the error of the Taylor method grows with the integration "
@@ -50,7 +52,7 @@ OPTIONS = {
 }
 GROUPS = {
     "what is measured": "case horizon attitude draws ensemble terms bodies seed plan growth",
-    "which solvers": "method peers",
+    "which solvers": "method peers compiled",
 }
 EXAMPLE = "bench --case 5 --peers none"
 
@@ -63,6 +65,8 @@ def run(options: argparse.Namespace) -> int:
         return _terms(options)
     if options.bodies is not None:
         raise InputError("--bodies has no meaning without --ensemble or --terms")
+    if options.compiled:
+        raise InputError("--compiled has no meaning without --terms")
     if options.plan or options.growth:
         return _plan_or_growth(options)
     count = _count(options)
@@ -157,6 +161,7 @@ def _again(options: argparse.Namespace) -> str:
         value = getattr(options, name)
         command += f" --{name} {shlex.quote(value)}" if value is not None else ""
     command += " --attitude" if options.attitude else ""
+    command += " --compiled" if options.compiled else ""
     return command + " --format markdown"
 
 
@@ -182,7 +187,9 @@ def _ensemble(options: argparse.Namespace) -> int:
     from pyharness.bench.ensemble_peers import ensemble_peers
 
     shared.refuse(
-        options, "--ensemble", ["case", "horizon", "draws", "attitude", "plan", "growth", "terms"]
+        options,
+        "--ensemble",
+        ["case", "horizon", "draws", "attitude", "compiled", "plan", "growth", "terms"],
     )
     n = _choose_bodies(options, _BODIES)
     those = ensemble_peers()
@@ -213,12 +220,13 @@ def _terms(options: argparse.Namespace) -> int:
     scenes = term_loads.term_scenes()
     those = term_loads.term_peers(scenes)
     others = named(those, options.peers, "peer")
-    contenders, missing = _present(term_loads.term_methods(), others, bool(options.peers))
+    methods = term_loads.term_methods(options.compiled)
+    contenders, missing = _present(methods, others, bool(options.peers))
     shared.check_outputs(options)
     shared.progress(0, 1, "references")
     loads = term_loads.term_loads(scenes)
     # The first solver imports modules, whose time belongs to no preparation.
-    term_loads.term_methods()[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
+    methods[0].prepare(scenes[0].scene)(1.0, 1e-9).run()
     # All solvers run on one core, because other load hardly affects processor time.
     single = measure(loads, contenders, shared.progress, process_time)
     packages = {each.package for each in contenders}

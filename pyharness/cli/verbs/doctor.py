@@ -3,6 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
+from pyharness.engine.leaf_cache import about_leaves
 from pyharness.model.build import AS_WRITTEN, build, doctor_report, installation
 
 FORMATS = ("table", "json")
@@ -16,6 +17,6 @@ def run(options: argparse.Namespace) -> int:
     Return 3 if the extension is not built, 1 if its arithmetic is not as written.
     """
     shared.check_outputs(options)
-    found, here = build(), installation()
+    found, here = build(), installation() | {"leaves": about_leaves()}
     shared.show(doctor_report(found, here), options)
     return int(here["arithmetic"] != AS_WRITTEN) if found.extension else 3

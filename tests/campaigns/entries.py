@@ -117,7 +117,8 @@ def _rows(entry: str, scene: Scene, times: list[float], tolerance: float) -> Res
 
 def _prepared(entry: str, scene: Scene, times: list[float], tolerance: float) -> Result:
     turning = scene.attitude is not None
-    ready = _ready(scene, entry.split()[1], tolerance, attitude=turning)
+    compiled = entry.endswith("compiled")
+    ready = _ready(scene, entry.split()[1], tolerance, attitude=turning, compiled=compiled)
     start = [scene.omega, times[-1], *([scene.attitude] if turning else [])]
     omega, attitude = ready(*start) if turning else (ready(*start), None)
     return _row(entry, omega, attitude, ready.status, ready.error, ready.growth)
@@ -151,6 +152,6 @@ def _row(
 
 ENTRIES: dict[str, Callable[[str, Scene, list[float], float], Result]] = {
     **dict.fromkeys(("solve taylor", "solve auto", "trajectory"), _rows),
-    **dict.fromkeys(("prepare taylor", "prepare auto"), _prepared),
+    **dict.fromkeys(("prepare taylor", "prepare auto", "prepare auto compiled"), _prepared),
     **dict.fromkeys(("solve_many", "solve_many of scenes"), _many),
 }

@@ -172,13 +172,13 @@ subroutine tape_many(n_packed, packed, n, omega0, n_times, times, n_attitudes, a
   call watch(c_null_ptr)
 end subroutine tape_many
 
-subroutine ready_leaves(key, number)
+subroutine ready_number(key, number)
   ! Return the number of the compiled operations of a tape, by the key of its structure; 0 if there
   ! are none.
-  use levels, only: find => ready_leaves
+  use levels, only: ready_leaves
   implicit none
   integer(8), intent(in) :: key
   integer(8), intent(out) :: number
 
-  number = find(key)
-end subroutine ready_leaves
+  number = ready_leaves(key)
+end subroutine ready_number

@@ -27,9 +27,9 @@ from pyharness.model.values import Triple
 from pyharness.truth.reference import reference
 
 OURS, HEYOKA, DOP853 = "auto", "heyoka", "solve_ivp-dop853"
+VARIATIONAL = "heyoka-variational"
 MANY_OURS, MANY_HEYOKA = "taylor", "heyoka-batch"
-# The tolerance of DOP853, at which our solver is compared with it.
-DOP853_TOLERANCE = 1e-9
+ONE_TOLERANCE = 1e-9  # of solvers that are compared with ours at one tolerance alone
 # Coarser tolerances give errors above all target errors. The finest is the default of heyoka.
 _TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
@@ -228,19 +228,24 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
-    """Return heyoka and DOP853, installed or not.
+    """Return heyoka, also with variational equations, and DOP853, installed or not.
 
     heyoka computes a ready term's torque by its formula, and an expression's from its tape.
     """
     formulas = {each.scene.name: each.formula for each in scenes}
 
-    def prepare(scene: Scene) -> Maker:
-        return heyoka_maker(scene, formulas[scene.name])
+    def prepare(scene: Scene, variational: bool = False) -> Maker:
+        return heyoka_maker(scene, formulas[scene.name], variational=variational)
 
     known = {each.name: each for each in peers()}
     return [
         replace(known[HEYOKA], prepare=prepare, settings=_TOLERANCES),
-        replace(known[DOP853], settings=(DOP853_TOLERANCE,)),
+        replace(
+            known[VARIATIONAL],
+            prepare=partial(prepare, variational=True),
+            settings=(ONE_TOLERANCE,),
+        ),
+        replace(known[DOP853], settings=(ONE_TOLERANCE,)),
     ]
 
 

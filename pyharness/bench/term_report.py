@@ -25,17 +25,19 @@ from pyharness.bench.report import (
 from pyharness.bench.scores import geometric_mean, scores
 from pyharness.bench.term_loads import (
     DOP853,
-    DOP853_TOLERANCE,
     EXPRESSION,
     HEYOKA,
     HORIZONS,
     MANY_HEYOKA,
     MANY_OURS,
+    ONE_TOLERANCE,
     OURS,
     READY,
+    VARIATIONAL,
 )
 from pyharness.model.report import Column, Report, Table, digits, numbers
 
+_COMPARED = {DOP853: "DOP853", VARIATIONAL: "derivs"}  # heads of columns
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
 _TITLES = {READY: "Ready terms", EXPRESSION: "Traced expressions"}
 _WORTH = (
@@ -121,11 +123,11 @@ def _rows(finding: Finding, load: Workload, method: str) -> list[Row]:
     return [row for row in finding.rows if row.workload == load and row.method == method]
 
 
-def _over_dop853(finding: Finding, load: Workload) -> float | None:
-    """Return DOP853's run time divided by our run time at the same tolerance, or None."""
+def _over(finding: Finding, load: Workload, peer: str) -> float | None:
+    """Return a peer's run time divided by our run time at the same tolerance, or None."""
     times = []
-    for rows in (_rows(finding, load, name) for name in (DOP853, OURS)):
-        times.append(next((x.seconds for x in rows if x.setting == DOP853_TOLERANCE), None))
+    for rows in (_rows(finding, load, name) for name in (peer, OURS)):
+        times.append(next((x.seconds for x in rows if x.setting == ONE_TOLERANCE), None))
     by, own = times
     return by / own if by and own else None
 
@@ -161,14 +163,15 @@ def _make_tables(found: Terms) -> list[tuple[str, Table]]:
 
 
 def _single_table(found: Terms, loads: Sequence[Workload]) -> Table:
-    with_heyoka, with_dop853 = _has(found, HEYOKA), _has(found, DOP853)
+    with_heyoka = _has(found, HEYOKA)
+    peers = [name for name in _COMPARED if _has(found, name)]
     columns = [Column("us per solve to", left=True), Column("T", digits("g"))]
     for target in TARGETS:
         columns.append(Column(_target(target), microseconds, unit="s"))
         columns += [Column("ratio", ratio)] * with_heyoka
     columns.append(Column("prepare", _milliseconds, unit="s"))
     columns += [Column("compile", _milliseconds, unit="s")] * with_heyoka
-    columns += [Column("DOP853", ratio)] * with_dop853
+    columns += [Column(_COMPARED[name], ratio) for name in peers]
     rows = []
     for load in loads:
         times = {each.method: each.seconds for each in scores(found.single, load, TARGETS)}
@@ -178,7 +181,7 @@ def _single_table(found: Terms, loads: Sequence[Workload]) -> Table:
             row += [seconds, by] if with_heyoka else [seconds]
         row.append(_preparing(found.single, load, OURS))
         row += [_preparing(found.single, load, HEYOKA)] * with_heyoka
-        row += [_over_dop853(found.single, load)] * with_dop853
+        row += [_over(found.single, load, name) for name in peers]
         rows.append(row)
     return Table(columns, rows)
 
@@ -226,7 +229,12 @@ def _notes(found: Terms) -> list[str]:
     if _has(found, DOP853):
         lines.append(
             f"DOP853: time of SciPy's solve_ivp over ours, both with the tolerance "
-            f"{_target(DOP853_TOLERANCE)}."
+            f"{_target(ONE_TOLERANCE)}."
+        )
+    if _has(found, VARIATIONAL):
+        lines.append(
+            "derivs: the same for heyoka with the derivatives by the initial state, from which our "
+            "error amplification comes too."
         )
     if found.many.rows:
         lines.append(

@@ -169,7 +169,7 @@ def kernel_tape(tape: Tape, n_unknowns: int | None = None) -> Array:
     )
     shape = structure(listed)
     if shape is not None:
-        packed[_LEAVES : _LEAVES + 1].view(np.int64)[:] = extension().ready_leaves(key(shape))
+        packed[_LEAVES : _LEAVES + 1].view(np.int64)[:] = extension().ready_number(key(shape))
     packed.flags.writeable = False
     return packed
 

@@ -147,6 +147,7 @@ def _terms(with_heyoka: bool = True) -> Terms:
                 Row(load, "heyoka", "tolerance", 1e-7, factor * 2e-6, 1e-8, None, "", 0.03),
                 Row(load, "heyoka", "tolerance", 1e-9, factor * 2e-6, 1e-10, None, "", 0.05),
                 Row(load, "heyoka", "tolerance", 1e-16, factor * 4e-6, 1e-15, None, "", 0.04),
+                Row(load, "heyoka-variational", "tolerance", 1e-9, 3e-5, 1e-9, None, "", 1.0),
             ]
     for method, seconds, note in (("taylor", 1.0, ""), ("heyoka-batch", 2.0, "batches of 8"))[
         : 1 + with_heyoka
@@ -176,14 +177,24 @@ def test_the_report_has_times_ratios_and_preparation() -> None:
     shown = render(term_report(_terms(), ["heyoka"], "pyharness bench --terms"), "table")
     assert max(map(len, shown.splitlines())) <= 100
     line = next(line for line in shown.splitlines() if line.startswith("damping"))
-    # Times in microseconds and ratios, then ms to prepare and to compile, then DOP853.
+    # Times in microseconds and ratios, ms to prepare and to compile, DOP853, heyoka's derivatives.
     wanted = ["damping", "10", "2.00", "4.00", "2.00", "4.00", "4.00", "2.00", "4.00", "4.00"]
-    assert line.split() == [*wanted, "1", "40", "500"]
+    assert line.split() == [*wanted, "1", "40", "500", "15.0"]
     assert "Ready terms: 1000 bodies, T = 10 s" in shown
     assert "heyoka's fastest: batches of 8 (1 of 1)." in " ".join(shown.split())
     without = render(term_report(_terms(False), ["heyoka"], "pyharness bench --terms"), "table")
     assert "ratio" not in without.replace("Geometric", "")
     assert "compile" not in without
+
+
+def test_compiled_torques_are_measured() -> None:
+    (contender,) = term_methods(compiled=True)
+    ready = contender.prepare(SCENES[-1].scene)(1.0, 1e-9)
+    wanted = term_methods()[0].prepare(SCENES[-1].scene)(1.0, 1e-9)
+    found, interpreted = ready.run(), wanted.run()
+    assert np.hstack(found) == pytest.approx(np.hstack(interpreted), rel=0.0, abs=1e-12)
+    assert ready.run.func.leaves == "compiled"
+    assert wanted.run.func.leaves == "interpreter"
 
 
 @pytest.fixture
@@ -221,4 +232,4 @@ def test_missing_peer_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
     assert main([*COMMAND, "heyoka"]) == 2
     assert "heyoka" in capsys.readouterr().err
     assert main(COMMAND[:-1]) == 0
-    assert "heyoka, solve_ivp-dop853: not installed" in capsys.readouterr().out
+    assert "heyoka, heyoka-variational, solve_ivp-dop853: not installed" in capsys.readouterr().out

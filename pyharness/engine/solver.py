@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_call
 from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
-from pyharness.engine.recorded import has_ready_leaves, packed_scene, system
+from pyharness.engine.recorded import leaves_for, packed_scene
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -22,7 +22,6 @@ from pyharness.engine.sensitivity import judge_ending
 from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
-from pyharness.model.constant_body import with_constant_body
 from pyharness.model.effort import checked_effort
 from pyharness.model.errors import known
 from pyharness.model.extension import extension
@@ -88,9 +87,8 @@ class Solver(BoundKernel[Result]):
     status, error, growth, digits, steps, method
         Reports on this thread's last call, unless it raised an error.
     leaves : str or None
-        What computes the series of a recorded torque: code that was ``built`` with the package
-        (ready torques) or ``compiled``, or the ``interpreter``, with the reason where compilation
-        was requested; None for other torques.
+        What computes the series of a recorded torque: ``built`` (a ready torque's code),
+        ``compiled``, or ``interpreter``, with the reason if compilation was requested; else None.
     many : callable
         A function that solves from many initial states in one call.
 
@@ -111,7 +109,7 @@ class Solver(BoundKernel[Result]):
     _packed_with_gil: Array | None
     settings: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
     leaves: str | None
-    _compiled: bool
+    _compiled: bool  # whether compilation was requested
 
     # The base class binds a kernel to its data in C, because Python code in a call would take as
     # long as an easy solution.
@@ -127,8 +125,7 @@ class Solver(BoundKernel[Result]):
         packed = packed_scene(chosen.scene, code, tolerance, effort, address)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
-            # The call that keeps the GIL has no fallback, which may take long. If it fails, the
-            # kernel is called again without the GIL.
+            # It has no fallback, which may take long. Then the kernel is called without the GIL.
             packed_with_gil = packed.copy()
             is_sphere = chosen.closed_form == "sphere" and not with_attitude
             packed_with_gil[Places.METHOD] = CODES["sphere" if is_sphere else "closed-form"]
@@ -245,18 +242,6 @@ class Solver(BoundKernel[Result]):
             return "complete", None, None
         kind = "closed" if self.plan.closed_form else "gauss" * (self.plan.method in GAUSS)
         return judge_ending(self.plan.scene, kind, self.settings[0], self._ending)
-
-
-def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
-    tape = system(with_constant_body(scene))
-    if has_ready_leaves(tape):
-        return 0, "built"
-    if not compiled:
-        return 0, "interpreter"
-    from pyharness.engine.leaf_cache import leaves_of
-
-    return leaves_of(tape)
 
 
 def _code(chosen: Plan, with_attitude: bool) -> int:

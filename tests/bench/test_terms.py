@@ -189,8 +189,8 @@ def test_the_report_has_times_ratios_and_preparation() -> None:
 
 def test_compiled_torques_are_measured() -> None:
     (contender,) = term_methods(compiled=True)
-    ready = contender.prepare(SCENES[-1].scene)(1.0, 1e-9)
-    wanted = term_methods()[0].prepare(SCENES[-1].scene)(1.0, 1e-9)
+    ready: Any = contender.prepare(SCENES[-1].scene)(1.0, 1e-9)
+    wanted: Any = term_methods()[0].prepare(SCENES[-1].scene)(1.0, 1e-9)
     found, interpreted = ready.run(), wanted.run()
     assert np.hstack(found) == pytest.approx(np.hstack(interpreted), rel=0.0, abs=1e-12)
     assert ready.run.func.leaves == "compiled"

@@ -19,8 +19,8 @@ from pyharness.engine.many_scenes import (
     PARAMETER,
     TORQUES,
     checked_copies,
+    checked_rows,
     keep_with,
-    rows_of_bodies,
     scene_of_row,
 )
 from pyharness.engine.parameter_sensitivity import checked_names
@@ -94,7 +94,7 @@ def solve_one_by_one(
         raise InputError(NO_ATTITUDE)
     with_attitude = attitude0 is not None
     omega0 = scene.omega if arrays["omega"] is None else arrays["omega"]
-    rows = rows_of_bodies(arrays)
+    rows = checked_rows({**arrays, "omega": None, "attitude": None})
     starts, times = rows_of("omega", omega0, 3), rows_of("t_end", t_end)
     counted = {**rows, "omega": starts, "t_end": times}
     if with_attitude:

@@ -19,8 +19,8 @@ from pyharness.engine.many_scenes import (
     PARAMETER,
     TORQUES,
     checked_copies,
+    checked_rows,
     keep_with,
-    rows_of_bodies,
     scene_of_row,
 )
 from pyharness.engine.parameter_sensitivity import checked_names
@@ -94,22 +94,21 @@ def solve_one_by_one(
         raise InputError(NO_ATTITUDE)
     with_attitude = attitude0 is not None
     omega0 = scene.omega if arrays["omega"] is None else arrays["omega"]
-    rows = rows_of_bodies(arrays)
+    rows = checked_rows({**arrays, "omega": None, "attitude": None})
     starts, times = rows_of("omega", omega0, 3), rows_of("t_end", t_end)
     counted = {**rows, "omega": starts, "t_end": times}
     if with_attitude:
         counted["attitude"] = rows_of("attitude", attitude0, 4)
     n = count_bodies(counted)
-    at_rest = replace(scene, omega=_REST, attitude=None)
     found = place_for(out, n, with_attitude, estimates)
     if found.estimates is not None:
         found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
-    # Bodies that differ in their starts alone share one solver.
+    at_rest = partial(replace, scene, omega=_REST, attitude=None)
     shared = None
-    if not rows:  # preparation takes long
+    if not rows:  # bodies that differ in their starts alone share one solver
         key = method, tolerance, effort, with_attitude
-        shared = keep_with(scene, key, lambda: prepare(at_rest, method, tolerance, **settings))
+        shared = keep_with(scene, key, lambda: prepare(at_rest(), method, tolerance, **settings))
     lanes = _lanes(scene, rows, tolerance, effort, with_attitude) if rows else None
     # `omega` or `attitude` may share memory with `out`.
     attitudes = np.full((n, 4), np.nan) if with_attitude else None
@@ -124,11 +123,12 @@ def solve_one_by_one(
         left = list(range(piece.start, piece.stop))
         if lanes is not None:
             left = solve_lanes(*lanes, starts, times, turns, own, piece, given_up)
+        body = at_rest()
         for i in left:
             if given_up[0]:
                 return
             with suppress(InputError):
-                solver = prepare(scene_of_row(at_rest, rows, i), method, tolerance, **settings)
+                solver = prepare(scene_of_row(body, rows, i), method, tolerance, **settings)
                 solve_row(solver, i, starts, times, turns, own)
 
     for_each_piece(enter, n, threads)

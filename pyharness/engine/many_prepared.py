@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pyharness.engine.solver import Solver
 
 # The methods that the kernel for many bodies has.
-_NO_PARAMETERS = np.empty((0, 0))
+NO_PARAMETERS = np.empty((0, 0))
 _SIDE_BY_SIDE = (Methods.CLOSED_FORM, Methods.CLOSED_FORM_OR_TAYLOR, Methods.TAYLOR)
 
 
@@ -101,8 +101,16 @@ def solve_each(
     solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
     piece: slice, given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """Solve the bodies in `piece`, those of a recorded torque side by side; others by calls."""
-    for i in solve_side_by_side(solver, starts, times, turns, found, piece, given_up):
+    """Solve the bodies in `piece` side by side, or those that can't be by calls.
+
+    A body whose error can't be measured is solved by a call. All are if the torque is neither
+    recorded nor in space, or if the inertia matrix is full.
+    """
+    left = list(range(piece.start, piece.stop))
+    if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
+        own = times_within(solver.scene, times)
+        left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
+    for i in left:
         if given_up[0]:
             return
         solve_row(solver, i, starts, times, turns, found)
@@ -130,27 +138,14 @@ def solve_row(
             found.estimates[i] = np.nan
 
 
-def solve_side_by_side(
-    solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
-    piece: slice, given_up: NDArray[np.int32],
-) -> list[int]:  # fmt: skip
-    """Solve the bodies in `piece` side by side, and return the indices of the unsolved bodies.
-
-    A body remains unsolved if its error can't be measured. All do if the torque is neither recorded
-    nor in space, or if the inertia matrix is full.
-    """
-    packed = solver.packed
-    if packed[Places.METHOD] != Methods.TAPE or solver.scene.inertia is not None:
-        return list(range(piece.start, piece.stop))
-    times = times_within(solver.scene, times)
-    return solve_lanes(packed, _NO_PARAMETERS, starts, times, turns, found, piece, given_up)
-
-
 def solve_lanes(
     packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
     found: Ensemble, piece: slice, given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve bodies whose equations are a tape with `parameters`, (n, k) or (1, k), side by side."""
+    """Solve bodies whose equations are a tape with `parameters`, (n, k) or (1, k), side by side.
+
+    Return the indices of those that remain unsolved.
+    """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]
 

@@ -13,12 +13,12 @@ from pyharness.engine.registry import check_attitude
 from pyharness.model.arrays import (
     check_rows,
     count_bodies,
+    numbers_of,
     row_of,
     rows_of,
     spread,
     threads_of,
     unit_quaternions,
-    waves_of,
 )
 from pyharness.model.attitude import quaternions_of_axes, rotated, turned_back
 from pyharness.model.codes import Methods, Statuses
@@ -162,7 +162,8 @@ def checked_rows(given: Mapping[str, Any]) -> dict[str, Array]:
     for name in (*_SHAPES, *(each for each in given if each.startswith(PARAMETER))):
         values = given.get(name)
         if name in _WAVES and values is not None:
-            rows[name] = waves_of(name, values)
+            waves = numbers_of(name, values)
+            rows[name] = rows_of(name, waves, "k", 4) if waves.size else np.empty((1, 0, 4))
         elif values is not None or (name == "t_end" and name in given):
             rows[name] = rows_of(name, values, *_SHAPES.get(name, ()))
     return rows
@@ -202,15 +203,9 @@ def from_scenes(scenes: Sequence[Scene]) -> dict[str, Any]:
     return found
 
 
-def rows_of_bodies(arrays: dict[str, Any]) -> dict[str, Array]:
-    """Return the arrays of bodies and torques that are not None, with checked shapes."""
-    starts = ("omega", "attitude")
-    return checked_rows({name: each for name, each in arrays.items() if name not in starts})
-
-
 def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
     """Return copies of the arrays, with one row for each body or for all."""
-    rows = rows_of_bodies(arrays)
+    rows = checked_rows({**arrays, "omega": None, "attitude": None})
     for name in ("omega", "attitude"):
         rows |= checked_rows({name: arrays[name]})
     if "attitude" in rows:

@@ -20,7 +20,7 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
     """
     assert isinstance(scene.torque, StateTorque)
     assert scene.torque.tape is not None
-    body = scene.euler_coefficients, _divisors(scene)
+    body = scene.euler_coefficients, scene.moments or (1.0, 1.0, 1.0)
     return _system(scene.torque.tape, *body, attitude, len(scene.states))
 
 
@@ -60,7 +60,7 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
     torque = scene.torque
     assert isinstance(torque, StateTorque)
     a, b, c = scene.euler_coefficients
-    first, second, third = _divisors(scene)
+    first, second, third = scene.moments or (1.0, 1.0, 1.0)
 
     def slopes(time: float, state: Sequence[float]) -> list[float]:
         x, y, z = (float(w) for w in state[:3])
@@ -72,7 +72,3 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
         return found
 
     return slopes
-
-
-def _divisors(scene: Scene) -> Triple:
-    return scene.moments or (1.0, 1.0, 1.0)

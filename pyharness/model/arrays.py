@@ -70,12 +70,6 @@ def numbers_of(where: str, values: object) -> Array:
         return found.astype(np.float64, copy=False)
 
 
-def waves_of(where: str, values: object) -> Array:
-    """Return user values as k waves, three amplitudes and a frequency (rad/s), (n, k, 4)."""
-    found = numbers_of(where, values)
-    return rows_of(where, found, "k", 4) if found.size else np.empty((1, 0, 4))
-
-
 def count_bodies(rows: Mapping[str, Array]) -> int:
     """Return the number of bodies; raise InputError if the arrays disagree."""
     counts = {len(each) for each in rows.values()}

@@ -324,7 +324,19 @@ def has_switches(torque: object) -> bool:
 
 def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | StateTorque:
     """Return a user's torque, recorded if it is a function, or raise InputError."""
-    found = _torque(value, states)
+    found: TorqueLaw | StateTorque
+    if isinstance(value, (TorqueLaw, StateTorque)):
+        found = value
+    elif isinstance(value, (list, tuple, np.ndarray)):
+        found = TorqueLaw(three_floats("[torque]", value))
+    elif callable(value):
+        torque = recorded(value, states)
+        found = law_of(torque) or torque
+    else:
+        raise InputError(
+            f"[torque] is {kind_of(value)}; it must be three numbers, a TorqueLaw, or a function "
+            "of (t, omega) or (t, omega, attitude)"
+        )
     own = found.own if isinstance(found, StateTorque) else ()
     if own != states:
         raise InputError(
@@ -332,20 +344,6 @@ def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | S
             f"allowed: {_WITH_STATES}"
         )
     return found
-
-
-def _torque(value: object, states: tuple[str, ...]) -> TorqueLaw | StateTorque:
-    if isinstance(value, (TorqueLaw, StateTorque)):
-        return value
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return TorqueLaw(three_floats("[torque]", value))
-    if not callable(value):
-        raise InputError(
-            f"[torque] is {kind_of(value)}; it must be three numbers, a TorqueLaw, or a function "
-            "of (t, omega) or (t, omega, attitude)"
-        )
-    torque = recorded(value, states)
-    return law_of(torque) or torque
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:

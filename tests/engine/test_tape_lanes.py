@@ -9,7 +9,7 @@ import pytest
 
 from pyharness import Scene, TorqueLaw, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.many_prepared import solve_side_by_side
+from pyharness.engine.many_prepared import NO_PARAMETERS, solve_lanes
 from pyharness.model.arrays import unit_quaternions
 from pyharness.model.attitude import angle_between
 from pyharness.model.ensemble import Ensemble
@@ -32,9 +32,9 @@ def lanes(
         np.full((n, 3), np.nan), np.full(n, 99, np.int8),
         None if turns is None else np.full((n, 4), np.nan),
     )  # fmt: skip
-    left = solve_side_by_side(
-        solver, starts, np.atleast_1d(np.asarray(times, float)), turns, found, slice(0, n),
-        np.zeros(1, np.int32),
+    left = solve_lanes(
+        solver.packed, NO_PARAMETERS, starts, np.atleast_1d(np.asarray(times, float)), turns, found,
+        slice(0, n), np.zeros(1, np.int32),
     )  # fmt: skip
     return found, left
 

@@ -106,7 +106,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return a collocation step's weight of Q(F), the integral of s**2 / h**3; exact is 1/3."""
+    """Return the weight of h**3 Q(F) in a collocation step; the integral of s**2 gives 1/3."""
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 

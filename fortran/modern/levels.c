@@ -1,6 +1,7 @@
 /* The choice of the instruction set. The performance-critical modules are compiled once per
    instruction set, and the best one that this processor has is chosen when the library is loaded.
    Plain code runs on every processor. */
+#include <stddef.h>
 #include <stdint.h>
 
 #include "ready_keys.h"
@@ -24,8 +25,7 @@ typedef void runner(void *ensemble);
   runner solve_tape_bodies_##level;                                                            \
   solver solve_tape_##level;                                                                   \
   solver step_tape_##level;                                                                    \
-  solver vary_solution_##level;                                                                \
-  extern const struct leaves ready_leaves_##level[];
+  solver vary_solution_##level;
 #define TAKEN(level)                                                                           \
   {taylor_solve_##level,       quick_solve_##level,      solve_many_free_##level,              \
    solve_many_taylor_##level,  solve_many_fixed_##level, run_lanes_##level,                    \
@@ -36,6 +36,11 @@ DECLARED(plain)
 #ifdef WITH_LEVELS
 DECLARED(avx2)
 DECLARED(avx512)
+extern const struct leaves ready_leaves_avx2[], ready_leaves_avx512[];
+/* They would take 90 kB of a wheel, for x86-64 processors before 2013. */
+#define ready_leaves_plain NULL
+#else
+extern const struct leaves ready_leaves_plain[];
 #endif
 
 static struct {
@@ -130,7 +135,7 @@ enum { LEAST_ADDRESS = 4096 };
 /* Return the number, from 1, of the compiled operations of a ready torque; 0 for others. */
 int64_t ready_leaves(int64_t key)
 {
-  for (int64_t i = 0; i < (int64_t)(sizeof ready_keys / sizeof *ready_keys); i++)
+  for (int64_t i = 0; chosen.leaves && i < (int64_t)(sizeof ready_keys / sizeof *ready_keys); i++)
     if (ready_keys[i] == key) return i + 1;
   return 0;
 }
@@ -138,8 +143,8 @@ int64_t ready_leaves(int64_t key)
 /* Return the compiled operations of a ready torque, by its number, or at an address. */
 const void *leaves_at(int64_t number)
 {
-  return number > 0 && number < LEAST_ADDRESS ? chosen.leaves + number - 1
-                                              : (const void *)(intptr_t)number;
+  if (number <= 0 || number >= LEAST_ADDRESS) return (const void *)(intptr_t)number;
+  return chosen.leaves ? chosen.leaves + number - 1 : NULL;
 }
 
 void run_lanes(void *ensemble) { chosen.lanes(ensemble); }

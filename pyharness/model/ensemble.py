@@ -92,7 +92,7 @@ class Ensemble(BatchResult):
     def angular_momentum(
         self, frame: str = "body", *, moments: Any = None, inertia: Any = None
     ) -> Array:
-        """Return the angular momentum of each body, from what `solve_many` was given.
+        """Return the angular momentum of each body; give it the bodies of `solve_many`.
 
         Parameters
         ----------

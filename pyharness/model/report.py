@@ -121,7 +121,7 @@ class Line(str):
 
 
 class Field(NamedTuple):
-    """A paragraph of a report after its label."""
+    """A labelled paragraph."""
 
     label: str
     text: str

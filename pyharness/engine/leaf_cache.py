@@ -6,13 +6,7 @@ them, and its name ends in the hash of its content.
 
 import ctypes
 import os
-import platform
-import shlex
-import shutil
 import stat
-import subprocess
-import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from ctypes import CDLL as CDLL
@@ -22,7 +16,9 @@ from itertools import takewhile
 from pathlib import Path
 
 from pyharness.engine.leaves import Structure, source, structure
-from pyharness.engine.recorded import listing
+from pyharness.engine.recorded import has_ready_leaves, listing, system
+from pyharness.model.constant_body import with_constant_body
+from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
 
 MOST_BYTES = 20_000_000  # of all files; the oldest ones are deleted
@@ -54,6 +50,14 @@ def about_leaves() -> dict[str, str | int]:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except (LeavesError, RuntimeError) as error:
         return {"folder": "none", "bytes": 0, "compiler": str(error)}
+
+
+def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
+    """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
+    tape = system(with_constant_body(scene))
+    if has_ready_leaves(tape):
+        return 0, "built"
+    return leaves_of(tape) if compiled else (0, "interpreter")
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
@@ -89,9 +93,12 @@ def compiler() -> tuple[str, ...]:
 
     Raise LeavesError if none is found.
     """
+    import shlex
+    from shutil import which
+
     for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
         program, *arguments = shlex.split(command) or [""]
-        if found := shutil.which(program):
+        if found := which(program):
             return (found, *arguments)
     raise LeavesError("no C compiler is found: install one, or name it with CC=...")
 
@@ -99,6 +106,8 @@ def compiler() -> tuple[str, ...]:
 @cache
 def machine() -> str:
     """Return what else the code depends on: the compiler, its version and the processor."""
+    import platform
+
     file = os.stat(os.path.realpath(compiler()[0]))
     names = ("vendor_id", "model name", "flags", "CPU implementer", "CPU part", "Features")
     about = platform.platform() + platform.processor()
@@ -143,12 +152,14 @@ def _found(place: Path, key: str) -> Path | None:
 
 def compiled_file(place: Path, text: str) -> Path:
     """Compile leaves, and return their file, which appears in the folder as a whole."""
+    from tempfile import TemporaryDirectory
+
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
     info = place.lstat()
     if not stat.S_ISDIR(info.st_mode) or not _is_safe(info):
         raise LeavesError(f"{place} is not the user's own folder, or others may write it")
     _clean(place)
-    with tempfile.TemporaryDirectory(dir=place, prefix="new-") as new:
+    with TemporaryDirectory(dir=place, prefix="new-") as new:
         code, result = Path(new, "leaves.c"), Path(new, "leaves.so")
         code.write_text(text)
         command = [*compiler(), *_FLAGS, str(code), "-o", str(result)]
@@ -162,6 +173,8 @@ def compiled_file(place: Path, text: str) -> Path:
 
 def _run(command: list[str]) -> str:
     """Run a compiler, and return the first line of its complaint; empty if it succeeded."""
+    import subprocess
+
     try:
         run = subprocess.run(
             command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_MOST_SECONDS
@@ -176,11 +189,14 @@ def _run(command: list[str]) -> str:
 
 def _clean(place: Path) -> None:
     """Delete the oldest files beyond the limit of size, and what killed compilations left."""
+    import time
+    from shutil import rmtree
+
     room, now = MOST_BYTES, time.time()
     for path, info in sorted(_files(), key=lambda each: -each[1].st_mtime):
         if stat.S_ISDIR(info.st_mode):
             if path.name.startswith("new-") and now - info.st_mtime > _FORGOTTEN:
-                shutil.rmtree(path, ignore_errors=True)
+                rmtree(path, ignore_errors=True)
             continue
         room -= info.st_size
         if room < 0:

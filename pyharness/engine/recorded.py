@@ -181,16 +181,9 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
     return pairs.view(np.float64)
 
 
-def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
-    tape = system(with_constant_body(scene))
-    if kernel_tape(tape)[_LEAVES] != 0.0:
-        return 0, "built"
-    if not compiled:
-        return 0, "interpreter"
-    from pyharness.engine.leaf_cache import leaves_of
-
-    return leaves_of(tape)
+def has_ready_leaves(tape: Tape) -> bool:
+    """Return whether a tape is that of a ready torque, whose leaves were built."""
+    return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 
 def packed_scene(

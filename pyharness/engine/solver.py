@@ -7,9 +7,10 @@ from types import GenericAlias
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
 from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_call
+from pyharness.engine.leaf_cache import leaves_for
 from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
-from pyharness.engine.recorded import leaves_for, packed_scene
+from pyharness.engine.recorded import packed_scene
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -109,10 +110,9 @@ class Solver(BoundKernel[Result]):
     _packed_with_gil: Array | None
     settings: tuple[float, str, float]  # requested tolerance, method, and factor on the work limit
     leaves: str | None
-    _compiled: bool  # whether compilation was requested
+    _compiled: bool
 
-    # The base class binds a kernel to its data in C, because Python code in a call would take as
-    # long as an easy solution.
+    # The base class is in C, because Python code in a call would take as long as an easy solution.
     def __new__(
         cls, scene: Scene, chosen: Plan, tolerance: float, asked: str, effort: float,
         with_attitude: bool, compiled: bool = False,
@@ -140,8 +140,8 @@ class Solver(BoundKernel[Result]):
         )  # fmt: skip
         solver.scene, solver.plan, solver.with_attitude = scene, chosen, with_attitude
         solver.packed, solver._packed_with_gil = packed, packed_with_gil
-        solver.settings, solver.leaves = (tolerance, asked, effort), leaves
-        solver._compiled = compiled
+        solver.settings = tolerance, asked, effort
+        solver.leaves, solver._compiled = leaves, compiled
         return solver
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -47,7 +47,7 @@ int64_t OF_LEVEL(size_of_work, LEVEL)(int n_operations, int n_products, int n_sl
   return divide_work(&work, NULL, n_operations, n_products, n_slots, n_terms) / sizeof(double);
 }
 
-/* Divide the working storage, and find the groups of operations. */
+/* Divide the working storage, and find the groups of operations that are interpreted. */
 void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
 {
   struct work *work = tape->work;
@@ -59,6 +59,7 @@ void OF_LEVEL(begin_work, LEVEL)(const struct tape *tape, int n_slots)
               tape->starts[tape->n_combinations] - 1);
   work->n_items = work->n_products = work->n_pairs = work->n_groups = 0;
   work->n_slots = n_slots;
+  if (tape->leaves) return;
   work->combinations[0].slots = work->slots;
   work->combinations[0].coefficients = work->coefficients;
   order_operations(tape, work);

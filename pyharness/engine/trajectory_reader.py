@@ -26,6 +26,7 @@ from pyharness.model.trajectory_file import (
     EVENTS,
     KIND,
     MOST_FUNCTIONS,
+    NUMBERS,
     OWN,
     ROWS,
     SENSITIVITIES,
@@ -113,7 +114,9 @@ def _trajectory(arrays: dict[str, Any], header: dict[str, Any], where: str) -> T
         _require(stop.variable in STOP_VARIABLES and type(stop.quotient) is float)
         stop = replace(stop, step=_count(stop.step))
     rows["ended"] = header["ended"]
-    for name in ("error", "growth", "tolerance"):
+    rows["reason"] = header.get("reason")
+    _require(rows["reason"] is None or type(rows["reason"]) is str)
+    for name in NUMBERS:
         _require(header[name] is None or type(header[name]) is float)
         rows[name] = header[name]
     return Trajectory(

@@ -41,6 +41,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "attitude": ("f8", (4,)),
     "ier": ("i4", ()),
 }
+NUMBERS = ("error", "growth", "tolerance")  # of the header; None for unknown
 OWN = "own"  # an array of rows, whose width is the number of the scene's own states
 AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
@@ -73,7 +74,8 @@ def file_content(found: "Trajectory") -> bytes:
             "written to a file; allowed: a trajectory in binary64"
         )
     header: dict[str, Any] = {"kind": KIND, "schema": SCHEMAS["trajectory file"]}
-    header |= {name: getattr(found, name) for name in ("ended", "error", "growth", "tolerance")}
+    header |= {name: getattr(found, name) for name in NUMBERS}
+    header |= {"ended": found.ended, "reason": found.reason}
     header |= {name: int(getattr(found, name)) for name in ("steps", "evaluations")}
     header["stop"] = None if found.stop is None else asdict(found.stop)
     header["moments"] = _moments_record(found.moments)

@@ -94,6 +94,7 @@ FOUND: dict[str, Callable[[], Trajectory]] = {
     ),
     "principal scene": lambda: with_attitude(principal(scene_with(GENTLE, True))[0]),
     "case": lambda: solve(case_scene(5), [1.0]),
+    "sliding": lambda: solve(scene_with(lambda t, w: -np.sign(w)), [0.1, 5.0]),
     "coefficients": lambda: solve(
         Scene("c", (0.3, -0.0, 0.8), coefficients=(0.5, -0.5, 0.0), masses=(1, 2, 3),
               forces=(4.0, 5.0, 6.0), step_size=0.1 + 0.2, steps=7), [0.3], "rk4",
@@ -176,6 +177,7 @@ def check_same(found: Trajectory, saved: Trajectory) -> None:
 @pytest.mark.filterwarnings("error")
 def test_every_bit_returns(name: str, tmp_path: Path) -> None:
     saved = FOUND[name]()
+    assert (saved.reason is not None) == (name == "sliding")
     path = tmp_path / "found.npz"
     saved.save(path)
     found = load(str(path))
@@ -513,7 +515,8 @@ def _places(record: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("ended", "later"), ("ended", 0), ("steps", -1), ("steps", True), ("evaluations", 2.0),
+        ("ended", "later"), ("ended", 0), ("reason", 1), ("steps", -1), ("steps", True),
+        ("evaluations", 2.0),
         ("error", 1), ("growth", "1.0"), ("tolerance", []), ("moments", [1.0, 2.0]),
         ("moments", {"masses": [1.0]}), ("stop", {"step": 1}), ("scene", []),
         ("stop", {"step": 1, "variable": "W", "quotient": 1.0}),

@@ -11,13 +11,14 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from pyharness import Scene, read_scene, solve, torques
+from pyharness import Scene, TorqueLaw, read_scene, solve, torques
 from pyharness.checks import scene_trials as room
 from pyharness.checks.check import Check
 from pyharness.checks.scenes.random_scenes import random_scene
 from pyharness.checks.stress import SCENE_TRIALS, TRIALS, stress
 from pyharness.cli.main import main
 from pyharness.engine.registry import METHODS
+from pyharness.engine.rotated import restarted_at
 from pyharness.model.scene_file import scene_text
 
 DAMPED = "docs/damped.toml"
@@ -81,6 +82,17 @@ def test_fault_is_seen(trial: str) -> None:
         found = [each for each in checks_of(scene, trial) if each.name.quantity != "angle"]
     assert found
     assert not any(check.passed for check in found)
+
+
+def test_a_restarted_scene_has_the_torque_of_later_times() -> None:
+    sines, cosines = [((1.0, 2.0, 3.0), 1.5)], [((0.3, -0.2, 0.5), 0.7)]
+    law = TorqueLaw((0.1, 0.2, 0.3), (0.4, -0.5, 0.6), sines, cosines)
+    scene = Scene("", (0.2, 1.0, -0.3), moments=MOMENTS, torque=law)
+    later = restarted_at(scene, np.ones(3), 2.0)
+    moved: Any = later.torque
+    assert (later.omega, later.moments) == ((1.0, 1.0, 1.0), MOMENTS)
+    for time in (0.0, 0.7, -1.3):
+        assert moved.at(time) == pytest.approx(law.at(time + 2.0), rel=1e-13)
 
 
 def test_wrong_order_and_other_bits_are_seen() -> None:

@@ -96,6 +96,14 @@ def test_sequences_of_scenes() -> None:
         assert np.array_equal(found.sensitivities["omega"][i], alone.sensitivities["omega"][0])
 
 
+def test_a_refused_sequence_of_scenes_leaves_out_as_it_was() -> None:
+    scenes = [TOP, replace(TOP, torque=replace(LAW, frame="space"))]
+    out = np.zeros((2, 3))
+    with pytest.raises(InputError, match="the torque needs the initial attitude"):
+        MANY(scenes, 1.0, out=out)
+    assert not out.any()
+
+
 def test_a_body_without_result_has_no_details() -> None:
     moments = np.array([[4.0, 3.0, 2.0], [4.0, -3.0, 2.0], [4.0, 3.0, 2.0]])
     starts = [STARTS[0], STARTS[1], (np.inf, 0.0, 0.0)]

@@ -332,6 +332,12 @@ def test_plan_says_what_is_skipped_and_why(capsys: pytest.CaptureFixture[str]) -
         assert "torque of time" in capsys.readouterr().out
 
 
+def test_plan_refuses_a_tolerance_out_of_range() -> None:
+    for method, tolerance in (("taylor", 2.0), ("quick", 1e-13)):
+        with pytest.raises(InputError, match=r"tolerance is .*; allowed"):
+            plan(PUSHED, method, tolerance)
+
+
 @pytest.mark.parametrize("case", [1, 3, 7])
 def test_everyone_does_what_the_plan_says(case: int) -> None:
     """Both entry points follow a changed plan."""

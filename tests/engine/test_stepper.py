@@ -118,6 +118,18 @@ def test_errors_from_rest_are_relative_to_the_omega_that_is_reached(size: float)
         assert abs(stepper.omega[0] - truth) <= 1e-8 * stepper.steps * largest
 
 
+@pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
+def test_errors_of_own_states_are_relative_to_their_sizes(size: float) -> None:
+    scene = Scene(
+        "wave", (1.0, 0.0, 0.0), moments=(1.0, 1.0, 1.0), states={"x": size, "v": 0.0},
+        torque=lambda t, omega, s: ([0.0, 0.0, 0.0], {"x": s["v"], "v": -s["x"]}),
+    )  # fmt: skip
+    stepper = Stepper(scene, 1e-10)
+    stepper.until(10.0)
+    assert abs(stepper.states["x"] / size - math.cos(10.0)) <= 1e-10 * stepper.steps
+    assert stepper.steps <= 20
+
+
 def test_the_least_omega_is_stepped() -> None:
     for omega in ((0.0, 0.0, 1e-300), (1e-300, 2e-300, 3e-300)):
         stepper = Stepper(Scene("", omega, moments=(1.0, 1.0, 1.0)), 1e-14)

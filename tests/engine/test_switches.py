@@ -247,9 +247,10 @@ def test_dense_output_and_events_read_the_steps() -> None:
         assert found.sol(each)[:3] == pytest.approx(solve(scene, [each]).omega[0], abs=1e-11)
 
 
-def test_event_whose_record_differs_is_called_with_numbers() -> None:
+@pytest.mark.parametrize("size", [1e-9, 1.0])
+def test_event_whose_record_differs_is_called_with_numbers(size: float) -> None:
     def event(t: Any, omega: Any) -> Any:
-        return omega[0] - (0.25 if isinstance(t, float) else 0.2)
+        return size * (omega[0] - (0.25 if isinstance(t, float) else 0.2))
 
     found: Any = solve(_ball(lambda t, omega: [-0.1, 0.0, 0.0]), [2.0], events=event)
     assert found.t_events[0] == pytest.approx([0.5])
@@ -631,3 +632,13 @@ def test_sliding_and_touches_tell_time_and_function() -> None:
     )
     far = solve(top, 60.0, tolerance=1e-12)
     assert (far.ended, far.reason) == ("sensitive", None)
+
+
+def test_the_touch_that_changes_most_is_told() -> None:
+    def touched(t: Any, w: Any) -> Any:
+        first = np.where(np.sin(t) > 1.0 + 1e-13, 0.1, 0.0)
+        return [first, 0.0, np.where(-np.sin(t) > 1.0 + 1e-13, 5.0, 0.0)]
+
+    found = solve(_ball(touched), 6.0, tolerance=1e-10)
+    assert found.ended == "sensitive"
+    assert "touched at t = 4.71239 s" in str(found.reason)

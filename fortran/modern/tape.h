@@ -18,7 +18,7 @@ enum { IN_REGISTER = 2 };
 typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
 typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
 
-enum { WITH_ATTITUDE = 7 };  /* number of unknowns */
+enum { WITH_ATTITUDE = 7 }; /* number of unknowns */
 enum { FIRST_UNKNOWN = 1 }; /* the slot of omega's first component, from 0 */
 enum { N_INPUTS = 8 };      /* time, omega and attitude; parameters follow */
 

@@ -33,14 +33,18 @@ class LeavesError(Exception):
     """Why leaves can't be compiled or loaded, in one line."""
 
 
+# The last two: no home folder is known; CC has an open quotation.
+_FAILURES = (LeavesError, RuntimeError, ValueError)
+
+
 def folder() -> Path:
-    """Return the folder of compiled leaves, which may be missing."""
+    """Return the folder, which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
 
 def size() -> int:
-    """Return the size of the folder's files in bytes."""
+    """Return the size of the folder in bytes."""
     return sum(info.st_size for _, info in _files())
 
 
@@ -48,7 +52,7 @@ def about_leaves() -> dict[str, str | int]:
     """Return the folder of compiled leaves, its size in bytes, and the compiler, or why not."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
-    except (LeavesError, RuntimeError) as error:
+    except _FAILURES as error:
         return {"folder": "none", "bytes": 0, "compiler": str(error)}
 
 
@@ -70,7 +74,7 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
         return 0, "interpreter: switches and torques of 500 operations are not compiled"
     try:
         return ctypes.addressof(loaded(shape, str(folder()))), "compiled"
-    except (LeavesError, RuntimeError) as error:  # no home folder is known
+    except _FAILURES as error:
         return 0, f"interpreter: {error}"
 
 
@@ -89,10 +93,7 @@ def loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
 
 @cache
 def compiler() -> tuple[str, ...]:
-    """Return the command of the C compiler: CC, cc, gcc or clang.
-
-    Raise LeavesError if none is found.
-    """
+    """Return the command of the C compiler: CC, cc, gcc or clang; raise LeavesError without one."""
     import shlex
     from shutil import which
 

@@ -61,7 +61,7 @@ class Operation(NamedTuple):
     pairs: tuple[str, ...] = ()
     value: str = ""  # of slot o at a node; without it the series is summed
     slopes: tuple[str, ...] = ()  # of slot o by x and by y
-    second: str = ""  # slope of slot p by x
+    second: str = ""  # slope of slot p by x, if another operation may read that slot
 
 
 _OF_ANGLE = Operation(("t_p = k*t_x", "t_o = i*(s0 + t_p*z_y)"), ("py",), slopes=("m_y",))
@@ -87,7 +87,7 @@ OPERATIONS = {
     ),
     Operations.TANH: Operation(
         ("t_q = k*t_x", "t_o = i*(s0 + t_q*z_p)", "t_p = -s1 - 2.0*t_o*z_o"), ("qp", "oo"),
-        slopes=("m_p",), second="-2.0*m_o*m_p",
+        slopes=("m_p",),
     ),
     Operations.SINE_COSINE: _SINE,
     _WAVE: _SINE._replace(
@@ -149,7 +149,7 @@ def _place(slot: int, k: str) -> str:
 
 
 def _written(text: str, operation: _Listed) -> str:
-    """Return C with the slots of an operation in the place of letters."""
+    """Return C with slots in the place of letters."""
     slots = _slots(operation)
 
     def name(match: re.Match[str]) -> str:
@@ -168,13 +168,12 @@ def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str
 
 
 def _terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    """Yield the index of the coefficient, and the slot, of each term of a combination."""
+    """Yield the index of the coefficient, and the slot, of each term."""
     begin = sum(map(len, tape.combinations[: number - 1]))
     yield from enumerate(tape.combinations[number - 1], begin)
 
 
 def _rates(tape: Structure) -> range:
-    """Return the numbers of the combinations that are the derivatives of the unknowns."""
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 
@@ -243,7 +242,7 @@ def _vector(names: list[str]) -> str:
 
 
 def _kept(unknowns: range, k: str) -> Iterator[str]:
-    """Yield the statements that store term k of the unknowns, one by one and in groups."""
+    """Yield the statements that store term k, one by one and in groups."""
     yield from (f"  {_place(slot, k)} = t{slot};" for slot in unknowns)
     for begin in unknowns[::_ABREAST]:
         at = (begin - _FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
@@ -269,7 +268,7 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
             rule = _of(operation)
             value = _written(rule.value, operation)
             yield f"  const abreast m{out} = {value};" if value else _summed(out)
-            if rule.second:
+            if "m_p" in rule.slopes:
                 yield _summed(out + 1)
             slopes = {out: _products(zip((x, y), rule.slopes, strict=False), operation, by)}
             if rule.second:
@@ -288,7 +287,6 @@ def _set_jacobian(tape: Structure) -> Iterator[str]:
 
 
 def _summed(slot: int) -> str:
-    """Return the statement that sums a series at the nodes."""
     sum_of = _place(slot, str(_TERMS_AMID - 1))
     for k in reversed(range(_TERMS_AMID - 1)):
         sum_of = f"({_place(slot, str(k))} + u*{sum_of})"
@@ -298,7 +296,6 @@ def _summed(slot: int) -> str:
 def _slopes_of_combination(
     tape: Structure, number: int, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return the derivatives of a linear combination by unknowns, as C."""
     parts = [
         (unknown, f"c[{i}]*{name}")
         for i, slot in _terms(tape, number)
@@ -310,7 +307,7 @@ def _slopes_of_combination(
 def _products(
     slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return the derivatives of an operation by unknowns, from those by its operands."""
+    """Return derivatives by unknowns from those by the operands."""
     parts = [
         (unknown, f"({_written(slope, operation)})*{name}")
         for slot, slope in slopes

@@ -32,7 +32,7 @@ def every_function(t: Any, w: Any) -> Any:
     return [
         np.exp(-x) * np.sin(2.0 * x) - w[0] / (2.0 + w[1] * w[1]),
         np.sqrt(1.0 + x * x) * np.log(2.0 + x * x) + np.tanh(w[1]) * np.cos(0.7 * t),
-        np.arctan(w[2]) + 0.2 * np.arcsin(0.1 * x) - w[2] * np.sqrt(w @ w),
+        np.arctan(w[2]) + 0.2 * np.arcsin(0.1 * x) - w[2] * np.sqrt(w @ w) + np.cos(2.0 * w[2]),
     ]
 
 
@@ -76,7 +76,11 @@ def scenes(number: int) -> Scene:
     """Return a random scene without switches, about principal axes."""
     source_ = Random(f"leaves {number}")
     drawn = draw_ready(source_, READY) if number % 2 else draw(source_, ("mixed", "decay", "drag"))
-    return principal(drawn[0])[0] if number else scene_of(attitude=(1.0, 0.2, 0.3, 0.4))
+    if number:
+        return principal(drawn[0])[0]
+    table = torques.table([0.0, 0.3, 1.0, 2.0], np.arange(12.0).reshape(4, 3) ** 2, "cubic")
+    torque = torques.recorded(every_function) + table
+    return scene_of(torque, attitude=(1.0, 0.2, 0.3, 0.4))
 
 
 @pytest.mark.parametrize("number", range(5))
@@ -279,6 +283,7 @@ def script(folder: Path, text: str) -> str:
 
 COMPILERS = {
     "missing": "/nonexistent/cc",
+    "with an open quotation": 'cc "',
     "failing": "echo 'no room on the disk' >&2; exit 1",
     "silent": "exit 3",
     "killed": "kill -9 $$",
@@ -296,9 +301,10 @@ def test_without_a_working_compiler_the_interpreter_solves(
     command = COMPILERS[name]
     if name == "missing":
         monkeypatch.setenv("PATH", "")
-    else:
+    elif name != "with an open quotation":
         command = script(folder, command)
     monkeypatch.setenv("CC", command)
+    assert leaf_cache.about_leaves()["bytes"] == 0
     solver = prepare(scene_of(simple), compiled=True)
     assert str(solver.leaves).startswith("interpreter: ")
     assert "\n" not in str(solver.leaves)

@@ -645,6 +645,16 @@ def test_terms_that_cancel_shorten_the_step() -> None:
     assert found.states["x"] == pytest.approx([1.0, 2.0], rel=4e-13)
 
 
+def test_terms_that_cancel_and_are_rounded_shorten_the_step() -> None:
+    def law(t: Any, omega: Any, states: Any) -> Any:
+        return [0.0, 0.0, 0.0], {"x": 21.0 * (1.1 - t) ** 20}
+
+    scene = Scene("cancels", (0.0, 0.0, 0.01), MOMENTS, torque=law, states={"x": 1.0})
+    found = solve(scene, [1.1, 2.2], tolerance=1e-13)
+    wanted = [1.0 + 1.1**21, 1.0 + 2.0 * 1.1**21]
+    assert found.states["x"] == pytest.approx(wanted, rel=4e-13)
+
+
 def test_a_file_without_its_states_is_refused(tmp_path: Any) -> None:
     scene = Scene("spring", (0.0, 0.0, 1.0), MOMENTS, torque=integral, states={"turned": 0.0})
     solve(scene, [1.0, 2.0]).save(tmp_path / "whole.npz")

@@ -16,8 +16,8 @@ module tape_march
   use tape_series, only: derivatives_at, expand, MOST_BLOCKS, noise_of, PADDED, perturb_tape, &
                          series_t, SIDE_BY_SIDE, slot_gradient, sum_perturbations, sum_terms, &
                          VARIATION_TOLERANCE
-  use tape_switches, only: CROSSES, follow, IS_CHANGED, next_crossing, operand_error, &
-                           resolve_switches, SLIDES, STAYS, switches_t
+  use tape_switches, only: CROSSES, follow, IS_CHANGED, jump_at, next_crossing, &
+                           operand_error, resolve_switches, SLIDES, STAYS, switches_t
   use two_words, only: two_sum
   implicit none(type, external)
   private
@@ -27,6 +27,9 @@ module tape_march
   ! Least factor on the first step that was tried, from rest and otherwise.
   real(dp), parameter :: SHORTER = 0.5_dp, MUCH_SHORTER = 0.05_dp
   real(dp), parameter :: GUESSED = 0.85_dp
+  ! Largest of the last terms of an own state, relative to its guessed size.
+  real(dp), parameter :: CONVERGED = 0.01_dp
+  integer, parameter :: PARTS = 4 ! of a step, at whose ends the size of an own state is guessed
   real(dp), parameter :: MUCH_LESS = 0.5_dp ! change of a local tolerance that changes the order
   real(dp), parameter :: FEW_STEPS = 32.0_dp ! for which perturbations may be inaccurate
   real(dp), parameter :: RIDGE = 1.001_dp  ! makes the fit work for one pole or none
@@ -110,7 +113,7 @@ contains
     logical :: is_compared                    ! whether terms 0 are those of a touch
     logical :: is_low                         ! whether the order must be raised
     logical :: is_guessed                     ! whether the size of an own state is
-    logical :: diverges                       ! whether the guess is one of its last terms
+    logical :: diverges                       ! whether its terms do, as far as they are known
     real(dp) :: rates(tape%n_unknowns)        ! at the end of the step
     real(dp) :: whole_step                    ! s: h without switches
     real(dp) :: nearly                        ! relative distance from a switch that is a touch
@@ -166,7 +169,7 @@ contains
       break_time = next_break(tape, t(1), t_end)
       to_stop = (break_time - t(1)) - t(2)
       ! The scale of a body at rest is the omega that it is about to reach.
-      if (from_rest) scale = largest_terms(1, 3, 4)
+      if (from_rest) scale = largest_terms(1, 3, 1, 4)
       call weigh()
       factor = fitting(tape, s%order, local_tolerance, weights, s%a)
       if (.not. factor > 0.0_dp) then
@@ -175,8 +178,8 @@ contains
         cycle
       end if
       if ((found%steps == 0 .or. from_rest .or. diverges) .and. tries < MOST_TRIES) then
-        ! The omega that a body at rest is about to reach is a guess too. If the last term is the
-        ! largest, it is also the guessed size of an own state, and the series may diverge.
+        ! The omega that a body at rest is about to reach is a guess too, and so is the size of an
+        ! own state, whose series may diverge.
         if (factor < merge(GUESSED, merge(SHORTER, MUCH_SHORTER, from_rest), diverges)) then
           tries = tries + 1
           s%h = factor*s%h
@@ -219,7 +222,7 @@ contains
         call next_crossing(nearly, switches, s, factor, verdict)
         if (verdict == SLIDES) then
           found%switches_at = t(1)
-          found%switch = switches%touching
+          found%switch = switches%sliding
           solution%status = SLIDING
           exit
         end if
@@ -252,7 +255,7 @@ contains
       if (associated(solution%nodes)) call add_nodes()
       call add_noise((noise*factor*s%h)**2)
       is_compared = .false.
-      if (switches%n > 0) call check_touch()
+      if (switches%n > 0) call check_touches()
       call take_step()
       if (switches%n > 0) call cross()
       found%steps = found%steps + 1
@@ -436,26 +439,44 @@ contains
       end if
     end function fitting_lanes
 
-    real(dp) function largest_terms(first, last, n_terms)
-      !! Return the largest of the first terms of unknowns for a step that ends at the next
-      !! breakpoint.
-      integer, intent(in) :: first, last, n_terms
+    real(dp) function largest_terms(first, last, first_term, last_term)
+      !! Return the largest of some terms of unknowns for a step that ends at the next breakpoint.
+      integer, intent(in) :: first, last, first_term, last_term
       real(dp) :: part
       integer :: k
 
       part = min(1.0_dp, abs(to_stop/s%h))
       largest_terms = 0.0_dp
-      do k = 1, n_terms
+      do k = first_term, last_term
         largest_terms = max(largest_terms, part**k*maxval(abs(s%a(k, FIRST_UNKNOWN - 1 + first: &
                                                                   FIRST_UNKNOWN - 1 + last))))
       end do
       largest_terms = min(huge(s%h), largest_terms)
     end function largest_terms
 
+    real(dp) function reached_size(number)
+      !! Return the largest value of an own state, which begins at 0, in a step that ends at the
+      !! next breakpoint. Its terms may be much larger, and cancel.
+      integer, intent(in) :: number
+      real(dp) :: part, total
+      integer :: i, k
+
+      reached_size = 0.0_dp
+      do i = 1, PARTS
+        part = i*min(1.0_dp, abs(to_stop/s%h))/PARTS
+        total = 0.0_dp
+        do k = s%order, 1, -1
+          total = part*(total + s%a(k, FIRST_UNKNOWN - 1 + number))
+        end do
+        reached_size = max(reached_size, abs(total))
+      end do
+      reached_size = min(huge(s%h), reached_size)
+    end function reached_size
+
     subroutine weigh()
       !! Make errors of omega relative to the scale, those of the quaternion angles, and those of
       !! own states relative to their sizes, or to the sizes that they are about to reach.
-      real(dp) :: own_size, before
+      real(dp) :: own_size, before, last
       integer :: i
 
       weights(:3) = 1.0_dp/max(scale, LEAST_SCALE)
@@ -465,10 +486,11 @@ contains
       do i = first_own, n
         own_size = own_sizes(i)
         if (.not. own_size > 0.0_dp) then
-          own_size = largest_terms(i, i, s%order)
+          own_size = reached_size(i)
           is_guessed = is_guessed .or. own_size > 0.0_dp
-          before = largest_terms(i, i, s%order - 2)
-          diverges = diverges .or. (before > 0.0_dp .and. own_size > before)
+          before = largest_terms(i, i, 1, s%order - 2)
+          last = largest_terms(i, i, s%order - 1, s%order)
+          diverges = diverges .or. (before > 0.0_dp .and. last > CONVERGED*own_size)
         end if
         weights(i) = 0.0_dp
         if (own_size > 0.0_dp) weights(i) = 1.0_dp/max(own_size, LEAST_OWN)
@@ -606,7 +628,8 @@ contains
         is_continued_to_switch = is_continued()
         ! The root of a touch can't be corrected.
         if (verdict /= CROSSES) return
-        if (arrives .or. switches%touches >= 0.0_dp .or. .not. is_continued_to_switch) return
+        if (arrives .or. any(switches%touches >= 0.0_dp)) return
+        if (.not. is_continued_to_switch) return
         correction = -operand_error(switches%first, switches, s)/switches%slope
         if (abs(correction*s%h) <= 2.0_dp*epsilon(factor)*abs(whole_step)) return
         ! Another switch at the same time, but for rounding.
@@ -620,23 +643,35 @@ contains
       end do
     end function is_continued_to_switch
 
-    subroutine check_touch()
-      !! Where an operand nearly crosses a level, an error decides whether the rates jump: add what
-      !! the other rates would change.
+    subroutine check_touches()
+      !! Where operands nearly cross levels, errors decide whether the rates jump.
+      integer :: i, level
+
+      if (.not. any(switches%touches >= 0.0_dp)) return
+      is_compared = .true.
+      do i = 1, switches%n
+        do level = 1, size(switches%touches, 1)
+          if (switches%touches(level, i) >= 0.0_dp) call compare_touch(i, level)
+        end do
+      end do
+      call derivatives_at(live, t_next, y + (change(:n) + y_low), -s%h, s, rates)
+    end subroutine check_touches
+
+    subroutine compare_touch(i, level)
+      !! Add what the rates beyond a level would change.
+      integer, intent(in) :: i, level
       real(dp) :: other(tape%n_unknowns), here(tape%n_unknowns), zero(tape%n_unknowns)
       real(dp) :: at(tape%n_unknowns), at_time(2), slots(size(switches%slots))
       integer :: on_level(size(switches%slots))
       logical :: is_changed
 
-      if (switches%touches < 0.0_dp) return
-      is_compared = .true.
       slots = s%a(0, switches%slots)
-      call evaluate(switches%touches, at, zero)
+      call evaluate(switches%touches(level, i), at, zero)
       at = y + (at + y_low)
-      call two_sum(t(1), switches%touches*s%h + t(2), at_time(1), at_time(2))
+      call two_sum(t(1), switches%touches(level, i)*s%h + t(2), at_time(1), at_time(2))
       call derivatives_at(live, at_time, at, s%h, s, here)
-      associate (value => s%a(0, switches%slots(switches%touching)))
-        value = value + switches%touched
+      associate (value => s%a(0, switches%slots(i)))
+        value = value + jump_at(level)
       end associate
       on_level = switches%on_level
       is_changed = .true.
@@ -648,16 +683,15 @@ contains
       switches%on_level = on_level
       s%a(0, switches%slots) = slots
       call keep_live(tape, switches, s, live)
-      call derivatives_at(live, t_next, y + (change(:n) + y_low), -s%h, s, rates)
       ! As far as it is known, the operand may be beyond the level during this part of the step.
       other = min(LARGEST_JUMP, abs(other - here)*abs(factor*s%h)*sqrt(nearly))
       call add_noise(merge((other/ROUNDING)**2, 0.0_dp, other >= 0.0_dp))
       if (maxval(weights*other) > found%touched) then
         found%touched = maxval(weights*other)
-        found%switch = switches%touching
+        found%switch = i
         found%switches_at = at_time(1)
       end if
-    end subroutine check_touch
+    end subroutine compare_touch
 
     subroutine cross()
       !! Change the switches at the end of the step. A perturbation changes the time at which the

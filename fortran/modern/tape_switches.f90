@@ -35,14 +35,14 @@ module tape_switches
     integer :: first
     real(dp) :: slope
     real(dp) :: part      !! factor on the step that ended; 0 at the beginning, where omega is exact
-    real(dp) :: touches   !! part of the step at which an operand nearly crosses a level; or -1
-    integer :: touching   !! its switch
-    real(dp) :: touched   !! what crossing the level would add to the result
+    ! Part of the step at which each operand nearly crosses each level; or -1.
+    real(dp), allocatable :: touches(:, :)
+    integer :: sliding    !! the switch along which the solution slides
     logical, allocatable :: follows(:) !! whether the operand depends on other switches alone
   end type switches_t
 
-  public :: begin_switches, change, find_switches, follow, next_crossing, operand_error, &
-            resolve_switches, update
+  public :: begin_switches, change, find_switches, follow, jump_at, next_crossing, &
+            operand_error, resolve_switches, update
 
 contains
 
@@ -62,6 +62,7 @@ contains
     if (failed == 0) allocate (switches%is_turned(switches%n), stat=failed)
     if (failed == 0) allocate (switches%on_level(switches%n), stat=failed)
     if (failed == 0) allocate (switches%crosses(switches%n), stat=failed)
+    if (failed == 0) allocate (switches%touches(2, switches%n), stat=failed)
     if (failed == 0) allocate (switches%is_live(switches%n), stat=failed)
     if (failed == 0) allocate (switches%is_new(switches%n), stat=failed)
     if (failed == 0) allocate (switches%operations(4, tape%n_operations), stat=failed)
@@ -251,11 +252,7 @@ contains
         end if
         call first_root(terms, degree, factor, nearly, root, touch)
         roots(level, i) = root
-        if (touch >= 0.0_dp .and. root > factor) then
-          switches%touches = touch
-          switches%touching = i
-          switches%touched = -sign_of_level
-        end if
+        if (root > factor) switches%touches(level, i) = touch
       end do
     end do
     switches%is_turned = .false.
@@ -270,15 +267,13 @@ contains
         end if
       end do
     end do
-    if (switches%touches > root) switches%touches = -1.0_dp
+    where (switches%touches > root) switches%touches = -1.0_dp
     factor = root
     switches%slope = slope_at(switches%first, factor)
     ! Two roots that nearly coincide are a touch.
     if (abs(switches%slope)*factor <= sqrt(nearly) &
         *size_of(s%a(:s%order - 1, switches%operands(switches%first)), factor)) then
-      switches%touches = factor
-      switches%touching = switches%first
-      switches%touched = merge(-1.0_dp, 1.0_dp, switches%crosses(switches%first) == LOWER)
+      switches%touches(switches%crosses(switches%first), switches%first) = factor
     end if
 
   contains
@@ -349,7 +344,7 @@ contains
 
     if (switches%is_turned(i)) then
       verdict = SLIDES
-      switches%touching = i
+      switches%sliding = i
       return
     end if
     verdict = IS_CHANGED
@@ -414,10 +409,17 @@ contains
     type(series_t), intent(inout) :: s
 
     associate (value => s%a(0, switches%slots(i)))
-      value = value + merge(-1.0_dp, 1.0_dp, level == LOWER)
+      value = value + jump_at(level)
       switches%on_level(i) = merge(UPPER, LOWER, level == LOWER)
     end associate
   end subroutine change
+
+  pure real(dp) function jump_at(level)
+    !! Return what crossing a level adds to the result of a switch.
+    integer, intent(in) :: level
+
+    jump_at = merge(-1.0_dp, 1.0_dp, level == LOWER)
+  end function jump_at
 
   pure real(dp) function operand_error(i, switches, s)
     !! Return the distance of an operand's term 0 from the level that it crosses.

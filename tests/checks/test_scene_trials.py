@@ -95,6 +95,15 @@ def test_a_restarted_scene_has_the_torque_of_later_times() -> None:
         assert moved.at(time) == pytest.approx(law.at(time + 2.0), rel=1e-13)
 
 
+def test_a_restarted_scene_has_the_terms_of_later_times() -> None:
+    scene: Any = SCENES["terms"]()
+    later: Any = restarted_at(scene, np.ones(3), 0.9, scene.attitude)
+    for time in (-0.5, 0.1, 0.3):
+        given = (0.3, 0.2, 0.1), scene.attitude
+        wanted = scene.torque.at(time + 0.9, *given)
+        assert later.torque.at(time, *given) == pytest.approx(wanted, rel=1e-13)
+
+
 def test_wrong_order_and_other_bits_are_seen() -> None:
     scene = SCENES["law"]()
     with patch.object(room, "FIXED_STEP", ("improved-euler",)), patch.dict(

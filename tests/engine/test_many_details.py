@@ -104,6 +104,14 @@ def test_a_refused_sequence_of_scenes_leaves_out_as_it_was() -> None:
     assert not out.any()
 
 
+def test_events_without_sensitivities() -> None:
+    found = MANY(TOP, 5.0, omega=STARTS, events=small)
+    assert (found.refusals, found.sensitivities) == ({}, None)
+    for start, times in zip(STARTS, found.t_events[0], strict=True):
+        alone: Any = solve(replace(TOP, omega=tuple(start)), 5.0, events=small)
+        assert np.array_equal(times, alone.t_events[0])
+
+
 def test_a_body_without_result_has_no_details() -> None:
     moments = np.array([[4.0, 3.0, 2.0], [4.0, -3.0, 2.0], [4.0, 3.0, 2.0]])
     starts = [STARTS[0], STARTS[1], (np.inf, 0.0, 0.0)]

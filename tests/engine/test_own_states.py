@@ -288,6 +288,32 @@ def test_a_guessed_size_does_not_shrink_with_rejected_steps() -> None:
         assert solve(scene, 5.559, tolerance=tolerance).ended in ("complete", "sensitive")
 
 
+@pytest.mark.parametrize("omega", [0.01, 1.0, 30.0])
+def test_the_terms_of_a_state_that_begins_at_zero_cancel(omega: float) -> None:
+    """They are up to 1e30 times as large as its values in the first step that is tried."""
+    shapes: list[tuple[Any, Any]] = [
+        (lambda t: 25.0 * np.sin(25.0 * t), lambda t: 1.0 - np.cos(25.0 * t)),
+        (lambda t: 400.0 * np.sin(400.0 * t), lambda t: 1.0 - np.cos(400.0 * t)),
+        (lambda t: 31.0 * (1.0 - t) ** 30, lambda t: 1.0 - (1.0 - t) ** 31),
+        (lambda t: np.exp(-90.0 * t), lambda t: -np.expm1(-90.0 * t) / 90.0),
+    ]
+    times = np.array([1.0, 2.0])
+
+    def driven(rate: Any) -> Scene:
+        def law(t: Any, omega: Any, states: Any) -> Any:
+            return [0.0, 0.0, 0.0], {"x": rate(t)}
+
+        return Scene("", (0.0, 0.0, omega), MOMENTS, torque=law, states={"x": 0.0})
+
+    for rate, value in shapes:
+        scene = driven(rate)
+        for tolerance in (1e-6, 1e-9, 1e-12):
+            found: Any = solve(scene, times, tolerance=tolerance)
+            assert found.ended == "complete"
+            assert found.states["x"] == pytest.approx(value(times), rel=tolerance)
+            assert found.error < 0.1 * max(tolerance, 1e-12)
+
+
 @pytest.mark.parametrize("power", [25, 26, 27])
 def test_a_state_whose_first_terms_vanish_takes_few_steps(power: int) -> None:
     def law(t: Any, omega: Any, states: Any) -> Any:

@@ -634,6 +634,18 @@ def test_sliding_and_touches_tell_time_and_function() -> None:
     assert (far.ended, far.reason) == ("sensitive", None)
 
 
+@pytest.mark.parametrize(("first", "second"), [(5.0, 1e-9), (1e-9, 5.0), (5.0, 0.0), (5.0, 5.0)])
+def test_two_touches_in_one_step_are_both_seen(first: float, second: float) -> None:
+    def touched(t: Any, w: Any) -> Any:
+        sine, cosine = np.sin(t) > 1.0 + 1e-13, -np.cos(t) > 1.0 + 1e-13
+        return [np.where(sine, first, 0.0), 0.0, np.where(cosine, second, 0.0)]
+
+    found = solve(_ball(touched), 4.0, tolerance=1e-10)
+    assert found.ended == "sensitive"
+    at = "1.5708" if first == 5.0 else "3.14159"
+    assert f"touched at t = {at} s" in str(found.reason)
+
+
 def test_the_touch_that_changes_most_is_told() -> None:
     def touched(t: Any, w: Any) -> Any:
         first = np.where(np.sin(t) > 1.0 + 1e-13, 0.1, 0.0)

@@ -16,7 +16,7 @@ def main(root: str, target: str, header: str) -> None:
     sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
     from pyharness import Scene, TorqueLaw, torques
     from pyharness.engine.leaves import key, source, structure
-    from pyharness.engine.recorded import listing, system
+    from pyharness.engine.recorded import listing, system_of
     from pyharness.model.constant_body import with_constant_body
 
     three = (0.1, 0.2, 0.3)
@@ -43,7 +43,7 @@ def main(root: str, target: str, header: str) -> None:
         for attitude in (None, (1.0, 0.0, 0.0, 0.0)):
             scene = Scene("ready", (1.0, 2.0, 3.0), (1.0, 1.2, 1.5), torque=term, attitude=attitude)
             if attitude or not scene.torque.needs_attitude:
-                shape = structure(listing(system(with_constant_body(scene))))
+                shape = structure(listing(system_of(with_constant_body(scene))))
                 assert shape is not None
                 structures[key(shape)] = shape
     texts = ['#include "tape.h"']

@@ -19,7 +19,7 @@ from pyharness.checks.theory.conditioning import FLOW, conditioning_at
 from pyharness.checks.tolerances import MIDDLING
 from pyharness.checks.trials.threads import BOUND, THREADS, TITLE, Job, different
 from pyharness.engine.problem import closed_form
-from pyharness.engine.recorded import system
+from pyharness.engine.recorded import system_of
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -55,7 +55,7 @@ def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
     Raise InputError if the torque is opaque, or needs an attitude that the scene does not have.
     """
     if isinstance(scene.torque, StateTorque):
-        system(scene)  # raises InputError for an opaque torque
+        system_of(scene)  # raises InputError for an opaque torque
         if scene.torque.needs_attitude and scene.attitude is None:
             raise InputError(
                 "the torque depends on the attitude, and the scene has none; give [initial] "

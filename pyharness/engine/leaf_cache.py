@@ -16,7 +16,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from pyharness.engine.leaves import Structure, source, structure
-from pyharness.engine.recorded import has_ready_leaves, listing, system
+from pyharness.engine.recorded import has_ready_leaves, listing, system_of
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.scene import Scene
 from pyharness.model.tape import Tape
@@ -58,7 +58,7 @@ def about_leaves() -> dict[str, str | int]:
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
     """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
-    tape = system(with_constant_body(scene))
+    tape = system_of(with_constant_body(scene))
     if has_ready_leaves(tape):
         return 0, "built"
     return leaves_of(tape) if compiled else (0, "interpreter")

@@ -36,7 +36,6 @@ from pyharness.engine.solver import CODES, PREPARED
 from pyharness.model.arrays import check_rows, count_bodies, only_one, rows_of, spread, threads_of
 from pyharness.model.attitude import rotated, scalar_first, turned_back
 from pyharness.model.codes import Methods
-from pyharness.model.effort import checked_effort
 from pyharness.model.ensemble import Ensemble, place_for
 from pyharness.model.errors import InputError, kind_of, known
 from pyharness.model.keywords import with_hints
@@ -44,7 +43,7 @@ from pyharness.model.principal import in_double
 from pyharness.model.progress import bar_of_bodies, expect_bodies
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import ROUNDING, Array
-from pyharness.model.values import Number, Numbers, boolean, finite
+from pyharness.model.values import Number, Numbers, boolean, checked_effort, finite
 
 _PLAIN, _TILTED = -2, -1  # kinds of scenes about principal axes, and with an inertia matrix
 _NO_DETAILS: dict[str, Any] = dict.fromkeys(("t_events", "y_events", "sensitivities", "refusals"))

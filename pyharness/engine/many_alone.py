@@ -81,8 +81,6 @@ def solve_one_by_one(
     Raise InputError if the torque needs an attitude and there is none, if the method can't solve
     the scene, or if a torque in space acts on bodies given by coefficients.
     """
-    check_prepared(scene, method)
-    check_torque(scene, method, attitude=True)
     by_coefficients = arrays["coefficients"] is not None or scene.coefficients is not None
     if by_coefficients and not isinstance(scene.torque, StateTorque):
         raise InputError(
@@ -94,47 +92,52 @@ def solve_one_by_one(
         raise InputError(NO_ATTITUDE)
     with_attitude = attitude0 is not None
     omega0 = scene.omega if arrays["omega"] is None else arrays["omega"]
-    rows = checked_rows({**arrays, "omega": None, "attitude": None})
+    own = {name: each for name, each in arrays.items() if name not in ("omega", "attitude")}
+    differ = any(each is not None for each in own.values())
+    rows = checked_rows(own) if differ else {}
     starts, times = rows_of("omega", omega0, 3), rows_of("t_end", t_end)
     counted = {**rows, "omega": starts, "t_end": times}
     if with_attitude:
         counted["attitude"] = rows_of("attitude", attitude0, 4)
     n = count_bodies(counted)
-    found = place_for(out, n, with_attitude, estimates)
-    if found.estimates is not None:
-        found.estimates[:] = np.nan
     settings: Any = {"effort": effort, "attitude": with_attitude}
     at_rest = partial(replace, scene, omega=_REST, attitude=None)
-    shared = None
+    shared = lanes = None
     if not rows:  # bodies that differ in their starts alone share one solver
         key = method, tolerance, effort, with_attitude
         shared = keep_with(scene, key, lambda: prepare(at_rest(), method, tolerance, **settings))
-    lanes = _lanes(scene, rows, tolerance, effort, with_attitude) if rows else None
+    else:
+        check_prepared(scene, method)
+        check_torque(scene, method, attitude=True)
+        lanes = _lanes(scene, rows, tolerance, effort, with_attitude)
+    found = place_for(out, n, with_attitude, estimates)
+    if found.estimates is not None:
+        found.estimates[:] = np.nan
     # `omega` or `attitude` may share memory with `out`.
     attitudes = np.full((n, 4), np.nan) if with_attitude else None
-    own = Ensemble(np.full((n, 3), np.nan), found.status, attitudes, found.estimates)
+    result = Ensemble(np.full((n, 3), np.nan), found.status, attitudes, found.estimates)
     found.status[:] = Statuses.REFUSED
     turns = counted.get("attitude")
 
     def enter(piece: slice, given_up: NDArray[np.int32]) -> None:
         if shared is not None:
-            solve_each(shared, starts, times, turns, own, piece, given_up)
+            solve_each(shared, starts, times, turns, result, piece, given_up)
             return
         left = list(range(piece.start, piece.stop))
         if lanes is not None:
-            left = solve_lanes(*lanes, starts, times, turns, own, piece, given_up)
+            left = solve_lanes(*lanes, starts, times, turns, result, piece, given_up)
         body = at_rest()
         for i in left:
             if given_up[0]:
                 return
             with suppress(InputError):
                 solver = prepare(scene_of_row(body, rows, i), method, tolerance, **settings)
-                solve_row(solver, i, starts, times, turns, own)
+                solve_row(solver, i, starts, times, turns, result)
 
     for_each_piece(enter, n, threads)
-    found.omega[:] = own.omega
+    found.omega[:] = result.omega
     if found.attitude is not None:
-        found.attitude[:] = own.attitude
+        found.attitude[:] = result.attitude
         # At time 0 it is normalised as those with which the kernel of many bodies begins.
         at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
         found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])

@@ -12,7 +12,7 @@ from pyharness.model.arrays import (
     check_rows,
     row_of,
     rows_of,
-    spread,
+    rows_within,
     threads_of,
     unit_quaternions,
 )
@@ -108,7 +108,7 @@ def solve_each(
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
-        own = times_within(solver.scene, times)
+        own = times if solver.scene.changing is None else times_within(solver.scene, times)
         left = solve_lanes(solver.packed, NO_PARAMETERS, starts, own, turns, found, piece, given_up)
     for i in left:
         if given_up[0]:
@@ -148,16 +148,13 @@ def solve_lanes(
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]
-
-    def part(rows: Array) -> Array:
-        return spread(rows if len(rows) == 1 else rows[piece], n)
-
     first = last = np.empty((0, 4))
     if turns is not None:
-        first, last = unit_quaternions(part(turns)), np.empty((n, 4))
+        first, last = unit_quaternions(rows_within(turns, piece)), np.empty((n, 4))
     omega, status = np.empty((n, 3)), np.empty(n, np.int8)
     extension().tape_many(
-        packed, part(starts).T, part(times), first.T, sets.T, given_up, omega.T, last.T, status,
+        packed, rows_within(starts, piece).T, rows_within(times, piece), first.T, sets.T, given_up,
+        omega.T, last.T, status,
         found.estimates_of(piece),
     )  # fmt: skip
     taken = status == Statuses.COMPLETE

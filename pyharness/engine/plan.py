@@ -1,6 +1,6 @@
 """The choice of the method and of the computed quantities."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -12,6 +12,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.trajectory import Trajectory
 
 FINEST = REGISTRY["auto"].finest
 # Under a torque with fast waves, Runge-Kutta, which averages them, may need fewer operations than
@@ -74,22 +75,49 @@ def plan(
     check_torque(scene, method, attitude=True)
     fallback = None
     if method == "auto":
-        few_digits = (
-            isinstance(scene.torque, TorqueLaw)
-            and scene.changing is None
-            and not scene.torque.in_space
-            and waves(scene) > 0
-            and tolerance >= _FEW_DIGITS
-        )
-        # Runge-Kutta has no intermediate output.
-        method = "closed-form" if form else RK4_OR_TAYLOR if few_digits and not rows else "taylor"
-        # A perturbation of a rotation about the middle axis may be so small that its square, which
-        # the closed form needs, underflows. The Taylor series can propagate it.
-        fallback = "taylor" if form else None
+        method, fallback = chosen_method(scene, form, tolerance, rows)
     elif method == "closed-form" and form is None:
         raise InputError(f"closed-form can't take this scene: {_why_no_form(scene)}")
     form = form if method == "closed-form" else None
     return Plan(scene, method, form, fallback, velocity, rows)
+
+
+def chosen_method(
+    scene: Scene, form: str | None, tolerance: float, rows: bool
+) -> tuple[str, str | None]:
+    """Return the method for a scene with a closed form or None, and its fallback."""
+    # A perturbation of a rotation about the middle axis may be so small that its square, which
+    # the closed form needs, underflows. The Taylor series can propagate it.
+    if form:
+        return "closed-form", "taylor"
+    few_digits = (
+        not rows  # Runge-Kutta has no intermediate output
+        and isinstance(scene.torque, TorqueLaw)
+        and scene.changing is None
+        and not scene.torque.in_space
+        and waves(scene) > 0
+        and tolerance >= _FEW_DIGITS
+    )
+    return RK4_OR_TAYLOR if few_digits else "taylor", None
+
+
+def by_plan(
+    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
+) -> Trajectory:
+    """Return the trajectory at `times` (s) by the chosen method, or else by its fallback."""
+    name, fallback = chosen_method(scene, closed_form(scene), tolerance, rows=True)
+    method = REGISTRY[name]
+    more = more if method.gives_steps else ()
+    try:
+        # A closed form, which has only rounding errors, is used below its smallest tolerance too.
+        return method.solve(scene, times, tolerance, effort, *more)
+    except InputError as refusal:
+        if not fallback:
+            raise
+        try:
+            return REGISTRY[fallback].solve(scene, times, tolerance, effort)
+        except InputError:
+            raise refusal from None
 
 
 def _decisions(chosen: Plan) -> Iterator[Decision]:

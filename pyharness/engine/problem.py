@@ -73,10 +73,15 @@ def trajectory_of(
 ) -> Trajectory:
     """Return the trajectory from the first `n_rows` columns of a kernel's omega and attitudes.
 
-    It has no `error` and `growth` if the last time was not reached.
+    It has no `error` and `growth` if they are negative, or if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
-    more = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
+    estimates = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
+    more = {
+        name: float(value)
+        for name, value in estimates.items()
+        if value is not None and value >= 0.0
+    }
     attitude = None if attitudes is None else attitudes.T[:n_rows]
     return rows_trajectory(
         times[:n_rows], rows.T[:n_rows], evaluations, steps, ended, attitude=attitude, **more

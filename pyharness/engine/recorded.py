@@ -1,6 +1,6 @@
-"""Scenes, and the equations of motion with a recorded torque, as the kernels read them."""
+"""The equations of motion with a recorded torque, and scenes, as the kernels read them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -10,17 +10,19 @@ from numpy.typing import NDArray
 
 from pyharness.engine.leaves import key, structure
 from pyharness.engine.problem import normalized, remainders
-from pyharness.engine.system import system_of
+from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.codes import Methods, Operations, Places, Statuses, Storage
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.errors import SLIDING, InputError, TimedError
 from pyharness.model.extension import COMPLETE, extension
 from pyharness.model.principal import PrincipalScene
 from pyharness.model.scene import Scene
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, torque_of
+from pyharness.model.symbols import MOST_OPERATIONS, Recorder
 from pyharness.model.tape import N_INPUTS, TIME, Linear, Table, Tape, evaluate, float_outputs
 from pyharness.model.tape_arrays import ARRAYS
 from pyharness.model.trajectory import Array
+from pyharness.model.values import Triple
 
 _KINDS = {
     "linear": (Operations.LINEAR, 1),
@@ -62,15 +64,73 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
     return outputs
 
 
-def system(scene: Scene) -> Tape:
-    """Return the equations of motion as a tape; raise InputError for an opaque torque."""
+def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
+    """Return the equations of motion of a scene with principal axes as a tape.
+
+    They are equations 16-18 of the thesis and, if `attitude`, by default if the scene has one,
+    q' = q (0, omega)/2; then the rates of the scene's own states. The inputs are the time and the
+    unknowns in this order. Raise InputError for an opaque torque.
+    """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
         raise InputError(
             "an opaque torque can't be solved by series; allowed: the methods dop853, rk45, "
             "radau, lsoda, or a torque that can be recorded"
         )
-    return system_of(scene, scene.attitude is not None)
+    if attitude is None:
+        attitude = scene.attitude is not None
+    body = scene.euler_coefficients, scene.moments or (1.0, 1.0, 1.0)
+    return _system(torque.tape, *body, attitude, len(scene.states))
+
+
+# Recording takes longer than most solutions; a loop over initial states has one system.
+@lru_cache(maxsize=64)
+def _system(
+    tape: Tape, coefficients: Triple, divisors: Triple, attitude: bool, n_states: int
+) -> Tape:
+    own = 7 if attitude else 3
+    most = 2 * len(tape.operations) + MOST_OPERATIONS
+    recorder = Recorder(most, max(N_INPUTS, 1 + own + n_states))
+    time, *unknowns = recorder.inputs()
+    x, y, z, *q = unknowns[: own if n_states else 7]
+    states = unknowns[own : own + n_states]
+    torque = torque_of(tape, time, (x, y, z), q or IDENTITY, *states)
+    rates: list[Any] = [
+        coefficient * product + component / moment
+        for coefficient, product, component, moment in zip(
+            coefficients, (y * z, z * x, x * y), torque[:3], divisors, strict=True
+        )
+    ]
+    if attitude:
+        rates += quaternion_rates((x, y, z), q)
+    return recorder.tape([*rates, *torque[3:]])
+
+
+def is_recorded(scene: Scene) -> bool:
+    """Return whether the torque depends on the state, or the inertia changes."""
+    return isinstance(scene.torque, StateTorque) or scene.changing is not None
+
+
+def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
+    """Return the right-hand side f(t, state) under a torque of the state; NaN where singular.
+
+    The state is omega (rad/s), with or without the quaternion.
+    """
+    torque = scene.torque
+    assert isinstance(torque, StateTorque)
+    a, b, c = scene.euler_coefficients
+    first, second, third = scene.moments or (1.0, 1.0, 1.0)
+
+    def slopes(time: float, state: Sequence[float]) -> list[float]:
+        x, y, z = (float(w) for w in state[:3])
+        q = [float(w) for w in state[3:]] or IDENTITY
+        n1, n2, n3 = torque.at(float(time), (x, y, z), q)
+        found = [n1 / first + a * y * z, n2 / second + b * x * z, n3 / third + c * x * y]
+        if len(state) > 3:
+            found += quaternion_rates((x, y, z), q)
+        return found
+
+    return slopes
 
 
 class Listing(NamedTuple):
@@ -195,7 +255,7 @@ def packed_scene(
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:
-        packed = np.concatenate([packed, kernel_tape(system(with_constant_body(scene)))])
+        packed = np.concatenate([packed, kernel_tape(system_of(with_constant_body(scene)))])
         if leaves:
             packed[Places.WAVES + _LEAVES : Places.WAVES + _LEAVES + 1].view(np.int64)[:] = leaves
         return packed

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from pyharness.engine.problem import rows_trajectory
+from pyharness.engine.recorded import is_recorded
 from pyharness.engine.scipy_ivp import FINEST, scipy_method
-from pyharness.engine.system import is_recorded
 from pyharness.model.effort import Integrator
 from pyharness.model.errors import InputError
 from pyharness.model.principal import PrincipalScene
@@ -55,11 +55,7 @@ class Method:
     # Takes only weak torques, recorded ones of time and omega among them; computes no attitude.
     weak_torque: bool = False
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
-
-    @property
-    def is_fixed_step(self) -> bool:
-        """Return whether the method uses the scene's step size."""
-        return self.finest == 1.0
+    is_fixed_step: bool = False  # uses the scene's step size, and takes no tolerance
 
 
 def _reference(
@@ -126,7 +122,10 @@ def _gauss(stages: int) -> Method:
 def _fixed_step(name: str, title: str, source: str, order: int, evaluations: int) -> Method:
     title, source = f"{title} in the scene's steps", f"fortran/modern/fixed_step.f90; {source}"
     solve = _from("gauss", "fixed_step", name)
-    return Method(name, title, source, 1.0, solve, 1.0, order=order, evaluations=evaluations)
+    return Method(
+        name, title, source, 1.0, solve, 1.0, order=order, evaluations=evaluations,
+        is_fixed_step=True,
+    )  # fmt: skip
 
 
 _SERIES: Any = dict.fromkeys(("gives_steps", "attitude", "space_torque", "state_torque"), True)
@@ -138,7 +137,7 @@ REGISTRY = {
             "closed form where there is one, else Taylor series",
             "pyharness.engine.plan",
             1e-15,
-            _from("solve", "by_plan"),
+            _from("plan", "by_plan"),
             **_SERIES,
         ),
         _scipy("DOP853", "Runge-Kutta 8(5,3)", "Hairer, Norsett and Wanner 1993, II.5"),

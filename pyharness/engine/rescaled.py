@@ -74,7 +74,9 @@ def integrate(
     method: "Method", scene: Scene, times: list[float], tolerance: float, effort: float, *more: bool
 ) -> Trajectory:
     """Return the trajectory on one side of 0, computed in a suitable unit of time."""
-    if not method.is_fixed_step and not is_ordinary(scene.omega):
+    if is_ordinary(scene.omega):
+        return method.solve(scene, times, tolerance, effort, *more)
+    if not method.is_fixed_step:
         # The method does not use the step size, but in the new unit it might not be finite.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if method.any_scale or scene.states else rescaling_factor(scene, times[-1])

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyharness.engine.recorded import slopes_of
 from pyharness.engine.scipy_run import (
     FINEST_STEP,
     NoNumberError,
@@ -24,7 +25,6 @@ from pyharness.engine.scipy_run import (
     series_beside,
 )
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
-from pyharness.engine.system import slopes_of
 from pyharness.model.dense_output import DenseOutput, Pieces
 from pyharness.model.errors import InputError, TimedError, printable
 from pyharness.model.scene import Scene

@@ -6,7 +6,7 @@ of omega neither overflow nor underflow.
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,6 @@ import numpy as np
 from pyharness.engine.continuous import solution_of, with_events, with_events_reversed
 from pyharness.engine.event_functions import event_functions
 from pyharness.engine.parameter_sensitivity import checked_names, sensitivities_at
-from pyharness.engine.plan import plan
 from pyharness.engine.registry import (
     METHODS,
     SCIPY_METHODS,
@@ -33,7 +32,6 @@ from pyharness.engine.switch_text import with_text
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.constant_body import with_constant_body
-from pyharness.model.effort import checked_effort
 from pyharness.model.errors import InputError, known
 from pyharness.model.keywords import with_hints
 from pyharness.model.principal import in_scene_axes, principal, states_in_scene_axes
@@ -41,7 +39,15 @@ from pyharness.model.scene import Scene, checked_scene, most_steps
 from pyharness.model.state_torque import is_opaque
 from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, Numbers, boolean, number, number_list, unit_of
+from pyharness.model.values import (
+    Number,
+    Numbers,
+    boolean,
+    checked_effort,
+    number,
+    number_list,
+    unit_of,
+)
 from pyharness.model.waves import with_merged_waves
 
 _OF_DIFFERENCES = 1e-13  # tolerance of solutions whose differences are derivatives
@@ -167,10 +173,10 @@ def solve(
     # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
     more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
+    parts = [integrate(chosen, scene, each, tolerance, effort, *more) for each in sides if each]
     parts = [
-        with_reason(scene, integrate(chosen, scene, each, tolerance, effort, *more), each[-1])
-        for each in sides
-        if each
+        with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
+        for part, each in zip(parts, filter(None, sides), strict=True)
     ]
     if below:
         parts[0] = in_reverse(parts[0])
@@ -237,25 +243,6 @@ def finest(method: str, scene: Scene, time: float) -> float:
     factor = rescaling_factor(scene, time)
     met = finest_tolerance(SCIPY_METHODS[method], scaled(scene, factor), time / factor)
     return max(claimed, met)
-
-
-def by_plan(
-    scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
-) -> Trajectory:
-    """Return the trajectory at `times` (s) by the method of the plan, or else by its fallback."""
-    chosen = plan(scene, "auto", tolerance, rows=True)
-    method = METHODS[chosen.method]
-    more = more if method.gives_steps else ()
-    try:
-        # A closed form, which has only rounding errors, is used below its smallest tolerance too.
-        return method.solve(scene, times, tolerance, effort, *more)
-    except InputError as refusal:
-        if not chosen.fallback:
-            raise
-        try:
-            return METHODS[chosen.fallback].solve(scene, times, tolerance, effort)
-        except InputError:
-            raise refusal from None
 
 
 def ascending_times(times: object) -> tuple[list[float], bool]:

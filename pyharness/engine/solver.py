@@ -10,7 +10,7 @@ from pyharness.engine.compiled_call import CompiledCall, check_call, compiled_ca
 from pyharness.engine.leaf_cache import leaves_for
 from pyharness.engine.many_prepared import many_starts, many_states
 from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
-from pyharness.engine.recorded import packed_scene
+from pyharness.engine.recorded import is_recorded, packed_scene
 from pyharness.engine.registry import (
     FIXED_STEP,
     GAUSS,
@@ -20,17 +20,15 @@ from pyharness.engine.registry import (
     requested_tolerance,
 )
 from pyharness.engine.sensitivity import judge_ending
-from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY
 from pyharness.model.codes import Methods, Places
-from pyharness.model.effort import checked_effort
 from pyharness.model.errors import known
 from pyharness.model.extension import extension
 from pyharness.model.keywords import with_hints
 from pyharness.model.principal import axes_and_turn, principal
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.model.trajectory import Array, Trajectory, digits_left
-from pyharness.model.values import Number, Numbers, boolean, three
+from pyharness.model.values import Number, Numbers, boolean, checked_effort, three
 from pyharness.model.waves import with_merged_waves
 
 if TYPE_CHECKING:

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from pyharness.engine.recorded import LONGEST_TRIAL, Step, kernel_tape, taylor_step
+from pyharness.engine.recorded import LONGEST_TRIAL, Step, is_recorded, kernel_tape, taylor_step
 from pyharness.engine.singular import SingularError, undefined_operation
-from pyharness.engine.system import is_recorded
 from pyharness.model.attitude import IDENTITY, quaternion_rates, unit_quaternion
 from pyharness.model.changing import rates_of_changing
 from pyharness.model.constant_body import with_constant_body
@@ -335,8 +334,8 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return the trajectory, marked ``singular`` with a reason if its torque becomes undefined."""
-    if found.ended != "overflow" or not is_recorded(scene):
+    """Return a trajectory that ends early, ``singular`` if its torque becomes undefined."""
+    if not is_recorded(scene):
         return found
     try:
         stepper = Stepper(with_constant_body(scene), attitude=scene.attitude is not None)

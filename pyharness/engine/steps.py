@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from pyharness.engine.recorded import outputs_at
-from pyharness.engine.system import slopes_of, system_of
+from pyharness.engine.recorded import outputs_at, slopes_of, system_of
 from pyharness.model.array_type import Array
 from pyharness.model.attitude import product, quaternion_of_axes, quaternion_rates
 from pyharness.model.constant_body import with_constant_body

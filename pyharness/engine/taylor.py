@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyharness.engine.problem import estimate_or_none, normalized, trajectory_of
-from pyharness.engine.recorded import kernel_tape, system
+from pyharness.engine.problem import normalized, trajectory_of
+from pyharness.engine.recorded import kernel_tape, system_of
 from pyharness.engine.steps import MOST_STEPS, STEP_NODES, steps_output
 from pyharness.engine.switch_text import reason_of
 from pyharness.model.attitude import IDENTITY
@@ -18,7 +18,7 @@ from pyharness.model.errors import TimedError
 from pyharness.model.extension import GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.trajectory import Array, Trajectory
+from pyharness.model.trajectory import Trajectory
 
 
 def taylor(
@@ -39,14 +39,18 @@ def taylor(
     joint = np.empty((4, n_attitudes + 1), order="F")
     joint[:, 0] = scene.attitude or IDENTITY
     n_own = len(scene.states)
-    kernel, given = series_kernel(scene)
+    if scene.torque.in_space or scene.changing is not None:
+        scene = with_constant_body(scene)
+    is_tape = isinstance(scene.torque, StateTorque)
+    kernel = "tape_rows" if is_tape else "taylor_rows"
+    given = (kernel_tape(system_of(scene)),) if is_tape else normalized(scene)
     work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
     most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
     room: dict[str, Any] = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
     room |= {"at_nodes": at_nodes, "n_nodes": NODES}
-    if kernel == "tape_rows":
+    if is_tape:
         work = np.append(work, 0.0)
         own = np.zeros((n_own + 1, (len(times) if n_own else 0) + 1), order="F")
         own[:n_own, 0] = [each.start for each in scene.states]
@@ -64,14 +68,13 @@ def taylor(
             + advice("use a shorter time or a larger tolerance", effort, work[1]),
             times[n_rows],
         )
-    error, growth = map(estimate_or_none, work[2:4])
     attitudes = joint[:, 1:] if n_attitudes else None
     found = trajectory_of(
-        times, rows, n_rows, status, steps, int(work[4]), error, growth, attitudes
+        times, rows, n_rows, status, steps, int(work[4]), work[2], work[3], attitudes
     )
     if n_own:
         found = replace(found, own=own[:n_own, 1 : 1 + len(found.time)].T)
-    if kernel == "tape_rows" and found.ended in ("sliding", "sensitive"):
+    if is_tape and found.ended in ("sliding", "sensitive"):
         found = replace(found, reason=reason_of(found.ended, work[1], int(work[5])))
     if not 0 < kept <= most or not found.has_all_rows:
         return found
@@ -79,11 +82,3 @@ def taylor(
     if times[-1] < 0.0:
         edges, values = edges[::-1], values[::-1, ::-1]
     return replace(found, sol=steps_output(scene, Pieces(edges, values)))
-
-
-def series_kernel(scene: Scene) -> tuple[str, tuple[Array, ...]]:
-    """Return the kernel's name and first arguments; raise InputError for an opaque torque."""
-    scene = with_constant_body(scene)
-    if isinstance(scene.torque, StateTorque):
-        return "tape_rows", (kernel_tape(system(scene)),)
-    return "taylor_rows", normalized(scene)

@@ -49,7 +49,7 @@ def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = N
 
 def numbers_of(where: str, values: object) -> Array:
     """Return real numbers of any type and shape as float64, or raise InputError."""
-    if unit_of(values):  # NumPy would drop it
+    if type(values) is not np.ndarray and unit_of(values):  # NumPy would drop it
         number(where, values)
     try:
         found = np.asarray(values)
@@ -133,6 +133,13 @@ def spread(rows: Array, n: int) -> Array:
     if len(rows) == n:
         return rows
     return np.ascontiguousarray(np.broadcast_to(rows, (n, *rows.shape[1:])))
+
+
+def rows_within(rows: Array, piece: slice) -> Array:
+    """Return the rows of the bodies in `piece`; a single row is repeated."""
+    if len(rows) > 1:
+        return rows[piece]
+    return np.ascontiguousarray(np.broadcast_to(rows, (piece.stop - piece.start, *rows.shape[1:])))
 
 
 def unit_quaternions(rows: Array) -> Array:

@@ -8,7 +8,7 @@ from pyharness.model.errors import InputError, unknown
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
-from pyharness.model.values import Number, number
+from pyharness.model.values import Number, checked_effort
 
 _SLACK = 2.0  # safety factor on the estimated effort, which may be too low
 _ROUNDING = 1.0 + 1e-9  # tolerates the rounding of an effort that a message suggested
@@ -34,14 +34,6 @@ class Integrator(Protocol):
         self, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, /
     ) -> Trajectory:
         """Return the trajectory at `times` (s) on one side of 0, in order away from 0."""
-
-
-def checked_effort(effort: Number) -> float:
-    """Return `effort` as a float above 0, or raise InputError."""
-    value = number("effort", effort)
-    if not 0.0 < value < math.inf:
-        raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
-    return value
 
 
 def advice(instead: str, effort: float, needed: float | None = None) -> str:

@@ -80,26 +80,36 @@ def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
             yield show
 
 
-def share(
-    work: Callable[[slice], None],
-    pieces: Sequence[slice],
+def for_each_piece(
+    work: Callable[[slice, NDArray[np.int32]], None],
+    n: int,
     threads: int,
-    given_up: NDArray[np.int32],
+    pieces: Sequence[slice] | None = None,
 ) -> None:
-    """Call `work` for each of `pieces`, ranges of bodies, in at most `threads` threads.
+    """Call ``work(piece, given_up)`` in threads for ranges of n bodies, by default of equal size.
 
     After an exception, as by Ctrl-C, `given_up[0]` is 1; kernels poll it and return.
     """
+    if not n:
+        return
+    given_up = np.zeros(1, dtype=np.int32)
+    if pieces is None:
+        count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
+        if _bar.get() is not None:
+            expect_bodies(n)
+            count = max(count, min(_REPORTS, n))
+        ends = [n * piece // count for piece in range(count + 1)]
+        pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
     if threads == 1 or len(pieces) < 2:
         # Only the main thread receives signals; this is usually the calling one.
         for piece in pieces:
-            work(piece)
+            work(piece, given_up)
             count_done(piece.stop - piece.start)
         return
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(min(threads, len(pieces))) as pool:
-        jobs = [pool.submit(work, piece) for piece in pieces]
+        jobs = [pool.submit(work, piece, given_up) for piece in pieces]
         try:
             for job, piece in zip(jobs, pieces, strict=True):
                 job.result()
@@ -109,17 +119,3 @@ def share(
             given_up[0] = 1
             pool.shutdown(cancel_futures=True)
             raise
-
-
-def for_each_piece(work: Callable[[slice, NDArray[np.int32]], None], n: int, threads: int) -> None:
-    """Call `work` in threads for pieces of nearly equal size, with `given_up` of `share`."""
-    if not n:
-        return
-    given_up = np.zeros(1, dtype=np.int32)
-    count = max(1, -(-n // _PIECE), min(threads, n // _SMALL))
-    if _bar.get() is not None:
-        expect_bodies(n)
-        count = max(count, min(_REPORTS, n))
-    ends = [n * piece // count for piece in range(count + 1)]
-    pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
-    share(lambda piece: work(piece, given_up), pieces, threads, given_up)

@@ -151,3 +151,11 @@ def tolerance_of(value: object, finest: float) -> float:
     if isinstance(found, float):
         return found
     raise InputError(f"tolerance is {found}; allowed: a number from {finest:.2g} to 1")
+
+
+def checked_effort(effort: Number) -> float:
+    """Return `effort` as a float above 0, or raise InputError."""
+    value = number("effort", effort)
+    if not 0.0 < value < math.inf:
+        raise InputError(f"effort: {value:g}; allowed: a finite number above 0")
+    return value

@@ -22,7 +22,7 @@ from pyharness.model.effort import check_bodies
 from pyharness.model.errors import InputError
 from pyharness.model.extension import columns, extension
 from pyharness.model.listing import PROGRAMS, Listing, checked_listing
-from pyharness.model.progress import bar_of_bodies, expect_bodies, share
+from pyharness.model.progress import bar_of_bodies, expect_bodies, for_each_piece
 from pyharness.model.scene import SPACE_TORQUE, Scene, checked_scene, most_steps
 from pyharness.model.trajectory import Array, BatchResult
 from pyharness.model.values import Number, boolean, integer, number_list
@@ -222,11 +222,10 @@ def _run(
     ier = np.full((n * prints_ier, at.size), _NOT_REACHED, dtype=np.int32)
     n_rows, status, stop_variable = (np.zeros(n, dtype=np.int32) for _ in range(3))
     quotient = np.full(n, np.nan)
-    given_up = np.zeros(1, dtype=np.int32)
     law = scene.law
     waves = columns(law.sines), columns(law.cosines)
 
-    def some(part: slice) -> None:
+    def some(part: slice, given_up: NDArray[np.int32]) -> None:
         program(
             PROGRAMS.index(listing.program) + 1, listing.flags, by_moments, body[part].T,
             omega[part].T, scene.masses, scene.forces, constant[part].T, law.rate, first[part].T,
@@ -238,7 +237,7 @@ def _run(
             stop_variable[part], quotient[part],
         )  # fmt: skip
 
-    share(some, list(_pieces(n, scene.steps, threads)), threads, given_up)
+    for_each_piece(some, n, threads, list(_pieces(n, scene.steps, threads)))
     return ProgramEnsemble(
         at=wanted,
         omega=omega_rows[:, back],

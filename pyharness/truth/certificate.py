@@ -12,11 +12,12 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from pyharness.model.effort import advice, checked_effort
+from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import checked_effort
 from pyharness.truth.certificate_checker import (
     FORMAT,
     MOST_BITS,

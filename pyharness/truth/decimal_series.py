@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from decimal import Decimal, getcontext
 from fractions import Fraction
 
-from pyharness.model.effort import advice, checked_effort
+from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import checked_effort
 from pyharness.truth.decimal_functions import Row, product, sine_cosine, to_decimal, value_at
 from pyharness.truth.decimal_switches import Switches
 from pyharness.truth.tape_series import TapeSeries, series_products

@@ -23,13 +23,14 @@ from flint import acb, arb, arb_mat, arb_series, ctx
 from pyharness.model.attitude import IDENTITY, quaternion_rates
 from pyharness.model.changing import rates_of_inertia
 from pyharness.model.dual import Dual
-from pyharness.model.effort import advice, checked_effort
+from pyharness.model.effort import advice
 from pyharness.model.errors import InputError
 from pyharness.model.progress import Progress, no_progress
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import of_law
 from pyharness.model.tape import Tape, evaluate
 from pyharness.model.torque_law import TorqueLaw
+from pyharness.model.values import checked_effort
 from pyharness.truth.balls import ball, balls, functions_at
 from pyharness.truth.decimal_functions import value_at
 from pyharness.truth.enclosed import Balls, Enclosure, largest_radius, scales_of

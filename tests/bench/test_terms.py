@@ -29,7 +29,7 @@ from pyharness.bench.term_loads import (
 )
 from pyharness.bench.term_report import Terms, summaries, term_report
 from pyharness.cli.main import main
-from pyharness.engine.system import slopes_of
+from pyharness.engine.recorded import slopes_of
 from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import opaque

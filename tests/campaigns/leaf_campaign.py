@@ -20,7 +20,7 @@ from pyharness.checks.scenes.state_scenes import (
     draw_ready,
 )
 from pyharness.engine.leaf_cache import leaves_of
-from pyharness.engine.recorded import Step, inputs_of, kernel_tape, system, taylor_step
+from pyharness.engine.recorded import Step, inputs_of, kernel_tape, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.tape import Tape, slot_values
 from pyharness.model.tape_arrays import ARRAYS
@@ -47,7 +47,7 @@ def try_torque(tally: Tally) -> None:
         scene, time = draw_ready(source, READY + TIMED)
     else:
         scene, time = draw(source, STEADY + TURNING + SUDDEN)
-    tape = system(with_constant_body(scene))
+    tape = system_of(with_constant_body(scene))
     address, leaves = leaves_of(tape)
     if not address:
         tally.counts[leaves] += 1

@@ -14,7 +14,7 @@ from pyharness.checks import random_methods as room
 from pyharness.checks.check import Check, Selection, make_checks
 from pyharness.checks.compare import candidates
 from pyharness.checks.random_methods import random_torques
-from pyharness.engine import many_prepared, recorded, solve, system
+from pyharness.engine import many_prepared, recorded, solve, taylor
 from pyharness.model import arrays
 from pyharness.model.tape import Linear, Tape
 from pyharness.model.trajectory import Trajectory
@@ -48,8 +48,8 @@ def test_only_requested_checks_are_made() -> None:
     assert same.value == found[0].value
 
 
-def _off(scene: Any, attitude: bool, real: Callable[..., Tape] = system.system_of) -> Tape:
-    tape = real(scene, attitude)
+def _off(scene: Any, real: Callable[..., Tape] = recorded.system_of) -> Tape:
+    tape = real(scene)
     first, *rest = tape.outputs
     terms = tuple((slot, x * (1.0 + 1e-6)) for slot, x in first.terms)
     return replace(tape, outputs=(Linear(first.constant, terms), *rest))
@@ -61,7 +61,7 @@ def _moved(real: Callable[..., Trajectory], *given: Any, **more: Any) -> Traject
 
 
 FAULTS: dict[str, tuple[Any, str, Any, str]] = {
-    "equations of motion": (recorded, "system_of", _off, "torque-solve-taylor"),
+    "equations of motion": (taylor, "system_of", _off, "torque-solve-taylor"),
     "prepared": (recorded, "system_of", _off, "torque-prepare-taylor"),
     "many": (recorded, "system_of", _off, "torque-solve-many"),
     "solve": (candidates, "solve", partial(_moved, solve.solve), "torque-solve-auto"),

@@ -18,7 +18,7 @@ from pyharness import Scene, TorqueLaw, prepare, solve, torques
 from pyharness.checks.scenes.state_scenes import READY, draw, draw_ready
 from pyharness.engine import leaf_cache
 from pyharness.engine.leaves import source, structure
-from pyharness.engine.recorded import kernel_tape, listing, system, taylor_step
+from pyharness.engine.recorded import kernel_tape, listing, system_of, taylor_step
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.principal import principal
 from pyharness.truth.reference import reference
@@ -65,7 +65,7 @@ def fresh() -> Iterator[None]:
 
 def terms(scene: Scene, address: int, h: float) -> Any:
     """Return the terms of a step `h` (s), interpreted, or by the leaves at an address."""
-    array = kernel_tape(system(with_constant_body(scene))).copy()
+    array = kernel_tape(system_of(with_constant_body(scene))).copy()
     array[7:8].view(np.int64)[:] = address
     state = np.array([*scene.omega, *(scene.attitude or ())])
     allowed = np.full(len(state), 1e-9)
@@ -86,7 +86,7 @@ def scenes(number: int) -> Scene:
 @pytest.mark.parametrize("number", range(5))
 def test_terms_are_those_of_the_interpreter(number: int) -> None:
     scene = scenes(number)
-    address, leaves = leaf_cache.leaves_of(system(with_constant_body(scene)))
+    address, leaves = leaf_cache.leaves_of(system_of(with_constant_body(scene)))
     assert leaves == "compiled"
     h = 1e-2 / max(map(abs, scene.omega))
     interpreted, compiled = terms(scene, 0, h), terms(scene, address, h)
@@ -129,7 +129,7 @@ def test_ready_torques_have_leaves_that_were_built() -> None:
         assert prepare(scene, attitude=True).leaves == "built"
         if not scene.torque.needs_attitude:
             assert prepare(scene).leaves == "built"
-    assert kernel_tape(system(scene_of()))[7] == 0.0
+    assert kernel_tape(system_of(scene_of()))[7] == 0.0
 
 
 def test_switches_are_interpreted() -> None:
@@ -204,7 +204,7 @@ def of_another_processor(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def of_another_version(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shape = structure(listing(system(scene_of(simple))))
+    shape = structure(listing(system_of(scene_of(simple))))
     assert shape is not None
     text = source(shape) + "/* newer */"
     monkeypatch.setattr(leaf_cache, "source", lambda _: text)

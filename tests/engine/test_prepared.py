@@ -22,6 +22,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+import pyharness.engine.plan as planning
 import pyharness.engine.solve as solving
 import pyharness.engine.solver as solver_module
 from pyharness import InputError, Scene, TorqueLaw, case_scene, prepare, solve
@@ -29,7 +30,7 @@ from pyharness.bench.growth import growth
 from pyharness.bench.savings import measured_saving
 from pyharness.cli.main import main
 from pyharness.engine.compiled_call import check_call
-from pyharness.engine.plan import RK4_OR_TAYLOR, Plan, plan
+from pyharness.engine.plan import RK4_OR_TAYLOR, plan
 from pyharness.engine.problem import closed_form
 from pyharness.engine.solver import Solver
 from pyharness.model.trajectory import Array
@@ -340,13 +341,9 @@ def test_plan_refuses_a_tolerance_out_of_range() -> None:
 
 @pytest.mark.parametrize("case", [1, 3, 7])
 def test_everyone_does_what_the_plan_says(case: int) -> None:
-    """Both entry points follow a changed plan."""
+    """Both entry points follow another choice."""
     scene = case_scene(case)
-
-    def other(scene: Scene, method: str = "auto", *rest: Any, **named: Any) -> Plan:
-        return plan(scene, "taylor" if method == "auto" else method, *rest, **named)
-
-    with patch.object(solving, "plan", other), patch.object(solver_module, "plan", other):
+    with patch.object(planning, "chosen_method", lambda *given, **named: ("taylor", None)):
         found, solver = solve(scene, [1.0], tolerance=1e-6), prepare(scene, tolerance=1e-6)
     solver(_omega(scene), 1.0)
     assert found.steps == solve(scene, [1.0], "taylor", 1e-6).steps > 0

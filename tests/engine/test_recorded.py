@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import pyharness.engine.system as system_module
+import pyharness.engine.recorded as recorded_module
 from pyharness import Scene, TorqueLaw, case_scene, prepare, solve, solve_many, torques
 from pyharness.checks.scenes.random_scenes import draw as draw_law
 from pyharness.checks.scenes.state_scenes import draw
-from pyharness.engine.recorded import kernel_tape, system
+from pyharness.engine.recorded import kernel_tape, system_of
 from pyharness.engine.taylor import taylor
 from pyharness.model.codes import Operations
 from pyharness.model.state_torque import recorded, replayed
@@ -286,7 +286,7 @@ def test_many_bodies_do_not_depend_on_each_other() -> None:
 
 def test_sine_and_cosine_of_one_angle_are_one_operation() -> None:
     scene = scene_of(lambda t, omega: [np.sin(omega[0]), np.cos(omega[0]), np.cos(3.0 * t)])
-    numbers = kernel_tape(system(scene))
+    numbers = kernel_tape(system_of(scene))
     count = int(numbers[2])
     operations = numbers[8 : 8 + 2 * count].view(np.int32).reshape(count, 4)
     waves = operations[operations[:, 0] == Operations.SINE_COSINE]
@@ -311,7 +311,7 @@ def test_a_loop_over_starts_records_the_equations_once(monkeypatch: pytest.Monke
     scene = Scene("", (0.1, 1.0, 0.3), (3.0, 2.0, 1.0), torque=lambda t, w: -0.1 * w)
     first = solve(scene, 5.0)
     calls: list[object] = []
-    monkeypatch.setattr(system_module, "torque_of", lambda *given: calls.append(given))
+    monkeypatch.setattr(recorded_module, "torque_of", lambda *given: calls.append(given))
     assert (solve(scene, 5.0).omega == first.omega).all()
     solve(replace(scene, omega=(1.0, 0.2, 0.1)), 5.0)
     assert not calls

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pyharness import Scene, StateTorque, TorqueLaw, principal, torques
 from pyharness.engine import field_terms, table_terms, terms
-from pyharness.engine.system import slopes_of
+from pyharness.engine.recorded import slopes_of
 from pyharness.model.trajectory import Array
 from pyharness.torques import (
     attitude_control,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pyharness.checks.scenes.state_scenes import READY, STEADY, TURNING, draw, ready
-from pyharness.engine.system import system_of
+from pyharness.engine.recorded import system_of
 from pyharness.model.dual import with_derivatives
 from pyharness.model.state_torque import StateTorque, recorded, replayed
 from pyharness.model.tape import ATTITUDE, FLOATS, OMEGA, TIME, Functions, Table, evaluate

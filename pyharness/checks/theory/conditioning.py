@@ -16,7 +16,7 @@ import numpy as np
 
 from pyharness.engine.linearised import growth, jacobians, propagators, transitions
 from pyharness.engine.problem import closed_form
-from pyharness.engine.recorded import inputs_of, outputs_at, system
+from pyharness.engine.recorded import inputs_of, outputs_at, system_of
 from pyharness.engine.solve import solve
 from pyharness.model.basis import Basis
 from pyharness.model.dual import with_derivatives
@@ -207,7 +207,7 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
 
 
 def _of_state(scene: Scene, time: float) -> Conditioning:
-    tape = system(scene)
+    tape = system_of(scene)
     slots = OMEGA if scene.attitude is None else (*OMEGA, *_ATTITUDE_SLOTS)
     slopes = with_derivatives(tape, slots)
 

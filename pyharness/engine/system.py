@@ -1,4 +1,4 @@
-"""The equations of motion of a scene with a recorded torque, as one tape."""
+"""The equations of motion of a scene with a recorded torque, as one tape of operations."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -24,7 +24,7 @@ def system_of(scene: Scene, attitude: bool) -> Tape:
     return _system(scene.torque.tape, *body, attitude, len(scene.states))
 
 
-# Recording takes longer than most solutions; a loop over initial states has one system.
+# Recording takes longer than most solutions; many initial states share one system.
 @lru_cache(maxsize=64)
 def _system(
     tape: Tape, coefficients: Triple, divisors: Triple, attitude: bool, n_states: int

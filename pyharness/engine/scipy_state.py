@@ -199,7 +199,7 @@ def _differences(before: _Rows, after: _Rows, n: int) -> Array:
     if before.is_complete and after.is_complete:
         largest = min(before.largest, after.largest)
     else:
-        # Omega becomes infinite: only the common rows have a scale.
+        # Omega becomes infinite at the end; only its rows give a finite scale.
         largest = _largest_of(second)
     apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
     found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)

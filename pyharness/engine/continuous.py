@@ -73,7 +73,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return the trajectory, limited to three periods (s) on each side of 0, if over six."""
+    """Return the trajectory; a side of 0 of more than six periods (s) is shortened to three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

@@ -172,7 +172,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return polynomials, with noise where it matters, and roots at the ends."""
+    """Return polynomials, with noise where they may be 0, and roots at the ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends

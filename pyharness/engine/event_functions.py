@@ -143,7 +143,6 @@ class EventFunction:
             return None
 
     def _of_each(self, times: Array, states: Array, rates: Array | None) -> list[float]:
-        """Return the values by single calls."""
         each_rate = [None] * len(times) if rates is None else rates.copy()
         values = []
         with np.errstate(all="ignore"):

@@ -130,9 +130,9 @@ _kept: dict[tuple[Any, ...], tuple[Scene, Any]] = {}
 
 
 def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-    """Return `make()`, kept for this scene and `key`."""
-    # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
-    # its scene alive, so that no other object gets its identity.
+    """Return `make()`, cached for this scene and `key`."""
+    # By identity, because equal scenes may differ in the signs of zeros. An entry keeps its scene
+    # alive, so that no other object gets its identity.
     full = id(scene), *key
     found = _kept.get(full)
     if found is None:

@@ -72,7 +72,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless `names` are numbers of the scene's recorded torque."""
+    """Raise InputError unless `names` are parameters of the torque with one value."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()

@@ -42,7 +42,7 @@ def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array
     `times` (s) are the events of the first PERIODS periods. Raise InputError for more than
     5 000 000 events.
     """
-    # An event at the end of a period may be found on either side of it, and is not lost here.
+    # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period
     inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
     if not inner.size:

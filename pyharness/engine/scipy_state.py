@@ -273,7 +273,6 @@ class _StateRun(Run):
         return between if self.is_smooth else guarded
 
     def _rates(self, time: float, state: Sequence[float]) -> Array:
-        """Return the right-hand side without warnings."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return np.array(self.slopes(time, state))

@@ -35,7 +35,7 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return `checked_path`; raise InputError if it can't be written, or ends as a text file."""
+    """Return `checked_path`; raise InputError for an unwritable path or a text file's ending."""
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:

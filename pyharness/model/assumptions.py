@@ -23,7 +23,7 @@ def assumptions() -> list[dict[str, Any]]:
 
 
 def open_starts() -> dict[int, str]:
-    """Return the cases for which the thesis gives no omega(0), each with the source of our value."""
+    """Return the cases for which the thesis gives no omega(0), with the source of our value."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 

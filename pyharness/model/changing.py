@@ -257,7 +257,6 @@ def _polynomial(where: str, values: object) -> Polynomial:
 
 
 def _value(polynomial: Polynomial, time_powers: Sequence[Any]) -> Any:
-    """Return the value of a polynomial from the powers of the time."""
     total: Any = 0.0
     for coefficient, power in zip(polynomial, time_powers, strict=False):
         if coefficient:

@@ -271,7 +271,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the number of arguments of a function that reads states, 3 or 4."""
+    """Return the number of arguments of a function of own states: 3, or 4 with the attitude."""
     parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
@@ -347,7 +347,7 @@ def checked_torque(value: object, states: tuple[str, ...] = ()) -> TorqueLaw | S
 
 
 def law_of(torque: StateTorque) -> TorqueLaw | None:
-    """Return the torque law, with its faster methods, that equals a recorded torque, or None."""
+    """Return the torque law that equals a recorded torque, or None; laws have faster methods."""
     tape = torque.tape
     if tape is None or torque.own or tape.inputs - {TIME}:
         return None

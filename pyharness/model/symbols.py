@@ -68,7 +68,7 @@ class Recorder:
         self.most, self._n_inputs, self._instead = most, n_inputs, instead
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
-        self.was_converted = False  # whether a symbol was to become a float
+        self.was_converted = False  # whether the function tried to make a symbol a float
 
     def inputs(self) -> list["Symbol"]:
         """Return a symbol for each input: time, omega, attitude, and any parameters."""
@@ -440,7 +440,7 @@ class Condition(Symbol):
         return _condition(select(self, other, False))
 
     def __or__(self, other: Any) -> Any:
-        """Return the condition that one holds at least."""
+        """Return the condition that at least one holds."""
         return _condition(select(self, True, other))
 
     def __xor__(self, other: Any) -> Any:

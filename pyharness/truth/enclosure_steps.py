@@ -350,7 +350,7 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds on the sum of the rates' terms from number `count` on, along polynomials.
+        """Return bounds on the rates' Taylor terms from number `count` on, summed, along p.
 
         If the rates are at most M on a disc whose radius is c steps, term number k is at most
         M c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.

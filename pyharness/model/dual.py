@@ -10,7 +10,7 @@ from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
 # Factors on the limit of operations of a recorded torque: for a tape that no kernel reads, and for
-# one that takes a kernel's memory in proportion.
+# one that a kernel reads, with memory in proportion.
 _MORE, _FEWER = 100, 10
 
 

@@ -1,9 +1,9 @@
 """Principal moments and principal axes of full inertia matrices.
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
-few correct digits. The elements are integer multiples of a power of 2, the unit. The determinant of
-a regular matrix is therefore at least the cube of the unit. This bounds its smallest eigenvalue
-from below, and so determines the number of bits.
+few correct digits. The elements are integer multiples of a power of 2, the unit. The absolute
+determinant of a regular matrix is therefore at least the cube of the unit. This bounds its smallest
+absolute eigenvalue from below, and so determines the number of bits.
 """
 
 import math
@@ -33,8 +33,8 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 class PrincipalFrame:
     """The principal moments (kg m2) and axes of one body, rounded, and to at least 30 digits.
 
-    The columns of `axes` are right-handed, each near the body's own axis of the same number.
-    `moments_low` is the exact minus the rounded moments.
+    The columns of `axes` form a right-handed frame, each near the body's own axis of the same
+    number. `moments_low` is the exact minus the rounded moments.
     """
 
     moments: Triple

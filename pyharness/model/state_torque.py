@@ -1,4 +1,4 @@
-"""Torques that depend on the state, recorded or opaque."""
+"""Torques that depend on the state: recorded as operations, or opaque (called at each time)."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence

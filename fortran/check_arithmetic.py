@@ -1,6 +1,6 @@
 """Refuse flags that change the arithmetic: check_arithmetic.py SOURCE COMPILER FLAG...
 
-Meson can't run a test with flang, to which it gives options for C.
+Meson can't run this test with flang, to which it passes options for C.
 """
 
 import subprocess

@@ -1,4 +1,4 @@
-"""Write the compiled leaves of the ready torques: make_leaves.py ROOT SOURCE HEADER.
+"""Write leaves (C code of the Taylor series) of ready torques: make_leaves.py ROOT SOURCE HEADER.
 
 The body has three different moments. The torques have as many numbers as they can have.
 """
@@ -12,7 +12,7 @@ def main(root: str, target: str, header: str) -> None:
     """Write the C source of all leaves, which has tables of them, and the header of their keys."""
     sys.dont_write_bytecode = True
     sys.path.insert(0, root)
-    # The finder of an editable installation, an instance, would build the package first.
+    # The finder of an editable installation, an instance, would start a build.
     sys.meta_path[:] = [each for each in sys.meta_path if isinstance(each, type)]
     from pyharness import Scene, TorqueLaw, torques
     from pyharness.engine.leaves import key, source, structure
@@ -49,7 +49,7 @@ def main(root: str, target: str, header: str) -> None:
     texts = ['#include "tape.h"']
     for number, shape in enumerate(structures.values()):
         text = source(shape, f"_{number}")
-        # One definition of what all have.
+        # Common definitions are written once.
         texts.append(text if number == 0 else text[text.index("static void expand") :])
     names = [f"{{expand_{number}, set_jacobian_{number}}}" for number in range(len(structures))]
     texts.append(f"const struct leaves OF_LEVEL(ready_leaves, LEVEL)[] = {{{', '.join(names)}}};")

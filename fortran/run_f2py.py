@@ -1,4 +1,4 @@
-"""Run f2py, and fail if it guesses a kind: it maps every kind that it does not know to C float."""
+"""Run f2py, and fail if it meets an unknown kind, which it would map to C float."""
 
 import subprocess
 import sys

@@ -1,11 +1,11 @@
 """Rigid-body rotation: a fast engine, checks, and three FORTRAN programs of a thesis.
 
-The engine estimates the error of each result. The package has the programs as printed and as
-corrected. The checks are also for ports of them, and for other integrators.
+The engine estimates the error of each result. The programs run as printed or as corrected. The
+checks also accept ports of them, and other integrators.
 """
 
-# The public names by module, which type checkers read in `__init__.pyi`. Modules are imported at
-# their first use, so that a program loads only those that it needs, and Ctrl-C is handled before.
+# The public names by module; type checkers read `__init__.pyi`. A module is imported at its first
+# use, so that a program loads only what it needs, after it has begun to handle Ctrl-C.
 _SUBMODULES = {
     "checks.compare.comparison": ("compare_methods", "compare_programs"),
     "checks.compare.findings": ("Comparison",),

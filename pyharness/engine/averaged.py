@@ -1,9 +1,10 @@
 """The method `averaged`: weak torques over very many revolutions, by two-scale averaging.
 
 A weak torque changes the periodic torque-free motion slowly. One macro-step computes the change
-over very many revolutions. The stroboscopic solution, the state once in each revolution, is that of
-Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging for ODEs and DAEs,
-Applied Numerical Mathematics 61; the two scales are those of Chartier, Crouseilles, Lemou and
+over very many revolutions, from the stroboscopic solution: the state once in each revolution.
+
+Stroboscopic averaging: Calvo, Chartier, Murua and Sanz-Serna 2011, Numerical stroboscopic averaging
+for ODEs and DAEs, Applied Numerical Mathematics 61. Two scales: Chartier, Crouseilles, Lemou and
 Mehats 2015, Uniformly accurate numerical schemes for highly oscillatory Klein-Gordon and nonlinear
 Schroedinger equations, Numerische Mathematik 129.
 """
@@ -24,7 +25,7 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Cosines and sines of the angles psi, in a revolution, of initial perturbations.
+# Cosines and sines of the angles psi at which the initial omega is perturbed.
 _PSI = np.cos(0.25 * math.pi * np.arange(8)), np.sin(0.25 * math.pi * np.arange(8))
 _MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
 
@@ -32,23 +33,22 @@ NODES = 20  # in a macro-step
 _TURN = 2.0 * math.pi
 _FEWEST = 100  # revolutions in a macro-step
 _MOST_STEPS = 3000  # some ten seconds
-# The last macro-step exceeds the rest by this fraction and these revolutions, because the time at
-# its end is only estimated.
+# The last macro-step is longer than the rest of the motion by this fraction and these revolutions,
+# because the time at its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
 # Factors on the length of a macro-step after a failure, and on the length of the next one after a
 # success at the first and at a later attempt.
 _SHORTER, _LONGER, _HARDLY_LONGER = 0.5, 4.0, 1.2
-# First length of a macro-step, relative to the angle over which the motion changes.
-_RELATIVE = 1.3
+_RELATIVE = 1.3  # first length of a macro-step over the angle in which the motion changes
 _APPROACH = 2.0  # the length is divided by this if the motion approaches the separatrix
 _WAVE = 4.0  # phase of a wave (rad) that counts as a relative change of 1
-# With enough angles, the oscillation has the relative error exp(-_DIGITS / 2), means exp(-_DIGITS).
+# The number of angles gives oscillations the relative error exp(-_DIGITS/2), means exp(-_DIGITS).
 _DIGITS = 56.0
 _FEWEST_ANGLES, _MOST_ANGLES = 16, 512
 # Highest frequency of a torque wave, relative to the frequency of the motion.
 _FASTEST = 0.02
-# Largest relative error of a macro-step: _SHARE of the tolerance, but at least _FLOOR, because of
-# rounding errors.
+# Largest relative error of a macro-step: this fraction of the tolerance, but at least _FLOOR, to
+# which rounding errors limit it.
 _SHARE, _FLOOR = 0.05, 1e-15
 _ROWS_AT_ONCE = 1000
 _LARGEST_PHASE = 1e15  # rad
@@ -66,7 +66,7 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest error of omega (rad/s) and amplification, at up to five ends of steps."""
+    """Return the largest error of omega (rad/s) and amplification at up to five ends of steps."""
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
     for n in (count, *range(1, count, -(-count // _MOST_ENDS))):
@@ -96,10 +96,10 @@ def averaged(
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
     `steps` of the result counts macro-steps; `error` is measured with more nodes and a higher order
-    of averaging. Raise InputError for a torque that is opaque, depends on the attitude, is not
-    weak, or may be in resonance. Raise it too if omega without torque would not circle a principal
-    axis, as for a sphere, or is near the separatrix, and if the work limit is exceeded. A recorded
-    torque must be a polynomial in omega and time, times waves; any other may change within a
+    of averaging. Raise InputError if the torque is opaque, depends on the attitude, is not weak, or
+    may be in resonance; if omega without torque would not circle a principal axis, as for a sphere,
+    or is near the separatrix; and if the work limit is exceeded. A recorded torque must be a
+    polynomial in omega and time, times waves, because changes of any other might be missed within a
     macro-step.
     """
     # The next macro-step refuses a point that is not finite.
@@ -269,7 +269,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return how many angles a squared modulus requires; raise TimedError near 1."""
+        """Return the number of angles for a squared modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

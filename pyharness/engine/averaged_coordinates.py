@@ -9,8 +9,8 @@ exactly 2 pi-periodic in psi:
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
 Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
-torque changes slowly. These coordinates need no elliptic function, and are regular where the body
-rotates exactly about axis a. They end at the separatrix, where w_a reaches 0.
+torque changes slowly. These coordinates need no elliptic function, and are regular at a rotation
+about axis a. They end at the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -72,7 +72,7 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the squared modulus of the orbit: 0 about axis a, 1 on the separatrix, or inf."""
+        """Return the squared elliptic modulus: 0 about axis a, 1 on the separatrix, inf beyond."""
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
         low, high = np.minimum(one, other), np.maximum(one, other)
@@ -80,12 +80,12 @@ class Coordinates(NamedTuple):
         return found
 
     def scale(self, point: Array) -> Array:
-        """Return the magnitudes of a point's components, to which errors are relative."""
+        """Return the sizes of a point's components, to which errors are relative."""
         size = math.sqrt(abs(point[2]) + point[0] * point[0] + point[1] * point[1])
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return an upper bound of the components of omega (rad/s) on the orbits of points."""
+        """Return a bound of the components of omega (rad/s) on the orbits of points."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
@@ -166,7 +166,7 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 class _Slot(NamedTuple):
     """The dependence of a slot of a tape on omega and time."""
 
-    degree: float = 0.0  # of the polynomial; infinite for operations other than polynomials, waves
+    degree: float = 0.0  # of the polynomial factor; infinite if there is another than waves
     fastest: float = 0.0  # highest frequency of the waves, rad/s
     rate: float | None = None  # 1/s, of a slot that is linear in time alone
 
@@ -174,8 +174,8 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError if the degree of a recorded torque exceeds 8 or is infinite, because a
-    macro-step may miss a pulse, or an effect in a narrow range of omega.
+    Raise InputError if a recorded torque is no polynomial of degree 8 at most times waves, because
+    a macro-step may then miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -12,8 +12,8 @@ over psi. The equation is equivalent to
     W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
 
 Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one.
-Newton's method solves the first equation at all Chebyshev points together. Two sweeps with more
-points and angles measure the error.
+Newton's method solves the first equation at all Chebyshev points (nodes) together. Two sweeps with
+more nodes and angles measure the error.
 """
 
 from functools import lru_cache
@@ -27,11 +27,11 @@ from pyharness.model.dense_output import points, to_coefficients
 
 MOST_SWEEPS = 12
 _LEAST_SWEEPS = 3
-_MORE_NODES, _MORE_ANGLES = 4, 8  # additional ones of the sweeps that measure the error
+_MORE_NODES, _MORE_ANGLES = 4, 8  # added to measure the error
 _FEWEST_ANGLES = 16
 _DIFFERENCE = 1e-5  # relative perturbation for the Jacobian matrices
-# Relative change of a sweep at which the iteration has converged; and the largest change that
-# rounding errors may cause.
+# Relative change by a sweep at which the iteration has converged; largest change that may be due
+# to rounding errors.
 _CONVERGED, _ROUNDED = 1e-15, 1e-12
 _MOST_NEWTON = 10
 _CLOSE = 1e-7  # rad; the error of the last Newton step is about its square
@@ -53,7 +53,7 @@ class Fast(NamedTuple):
     cosine: Array
     sine: Array
     mean: Array  # weights of the mean; a product is faster than a sum along rows
-    integral: Array  # from values, less their mean, to their integral from 0; from the right
+    integral: Array  # right factor, from values to the integral from 0 of values minus mean
 
 
 @lru_cache(maxsize=16)
@@ -89,7 +89,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the matrix of barycentric interpolation from `count` nodes to `at`, from 0 to 1."""
+    """Return the barycentric interpolation matrix from `count` nodes to `at`, from 0 to 1."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -119,8 +119,8 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), is the point at psi = 0, and `error` its measured error. Its
-    time lacks a part proportional to psi. `modulus` is the largest squared modulus.
+    `stroboscopic`, shape (4, nodes), is the point at psi = 0, its time without the part that is
+    proportional to psi. `error` is its measured error, `modulus` the largest squared modulus.
     """
 
     def __init__(
@@ -135,8 +135,8 @@ class MacroStep:
     ) -> None:
         """Solve over the angle `length` (rad), a multiple of 2 pi, or raise NotResolvedError.
 
-        `sizes` are the numbers of nodes and angles, both even; `start_time` is in s. `varies` says
-        whether the torque depends on time.
+        `sizes` are the even numbers of nodes and angles, `start_time` is in s, and `varies` is true
+        if the torque depends on time.
         """
         self.coordinates, self._torque, self._start_time = coordinates, torque, start_time
         self._start, self.length, self._sizes = start[:, None], length, sizes
@@ -169,7 +169,7 @@ class MacroStep:
             mean = mean + correction
             change, last = float((np.abs(correction).max(axis=1) / sizes).max()), change
             stalls = sweep >= _LEAST_SWEEPS and not change < 0.5 * last
-            # The first sweep lacks the oscillation, and may change nothing for this reason.
+            # The first sweep has no oscillation yet, and may change nothing for this reason.
             if (sweep > 1 and change <= _CONVERGED) or stalls:
                 break
         self._check(mean)

@@ -18,7 +18,7 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_CALM = 1e3  # an amplification below it grows with time, so that the last is the largest
+_CALM = 1e3  # a smaller amplification is largest at the last time
 _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time or, if large, their maxima over 16 rows."""
+    """Return error and amplification at the last time, or if large, the maxima over 16 rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -49,8 +49,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    Its ending is ``sensitive`` if amplified rounding errors exceed the tolerance. Raise InputError
-    if there is no closed form, the work limit is exceeded, or the phase is above 1e15 rad.
+    Raise InputError if there is no closed form, the work limit is exceeded, or the phase is above
+    1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

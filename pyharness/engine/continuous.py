@@ -39,8 +39,7 @@ def with_events(
 ) -> Trajectory:
     """Return a trajectory with its events, and without rows beyond a terminal event.
 
-    `sol` is the solution as a function of time, `ends` are the first and last requested times (s),
-    and `rows` computes further rows.
+    `ends` are the first and last requested times (s); `rows` computes further rows.
     """
     events = no_events(len(functions), len(found.y))
     if sol.t_min < sol.t_max:
@@ -74,7 +73,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return the trajectory; a side of 0 that exceeds six periods (s) is limited to three."""
+    """Return the trajectory; a side of 0 of more than six periods (s) is shortened to three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

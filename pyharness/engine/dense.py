@@ -29,22 +29,22 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Trajectory
 
-# Tolerance of the results at the nodes, over the requested one, because a polynomial may have
-# larger errors than its nodes; the second holds if the method can't meet the first.
+# Tolerance of the results at the nodes, over the requested one. It is below 1 because a polynomial
+# may have larger errors between its nodes. The second is for methods that can't meet the first.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
 # Bound of the last coefficients of a polynomial, in tolerances, and relative to the state.
 _LAST = 0.02
-# Rounding errors of a method, over the error amplification, which are not smooth.
+# Rounding errors of a method, over the error amplification. They are not smooth in time.
 _OWN_ROUNDING = 4e-15
 _ROUNDING = 4e-16
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
-# Errors of the method are not smooth if division of an interval does not reduce the tail by this
-# factor, although the polynomial on the whole interval was accurate.
+# If halving an interval does not reduce the tail by this factor, the tail is due to errors of the
+# method, and the longer polynomial was accurate.
 _DIVIDED = 8.0
 _MOST_PARTS = 64  # into which an interval is divided at once
 _MOST_PIECES = 200_000
-_RADIANS = 2.0  # rotation in an interval; first guess
+_RADIANS = 2.0  # first guess of the rotation in an interval
 _SHORT = 0.25  # a change in a shorter part of an interval might be hidden between nodes
 
 
@@ -54,8 +54,8 @@ class _Open:
 
     low: float
     high: float
-    tail: float = math.inf  # of the polynomial of the longer interval
-    whole: Pieces | None = None  # that polynomial
+    tail: float = math.inf  # last coefficients of the polynomial on the longer interval
+    whole: Pieces | None = None  # this polynomial
 
     def is_rough(
         self, tail: float, times: Array, values: Array, sizes: Array, rough: float
@@ -87,7 +87,7 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time, between 0 and the rows of `found`.
+    """Return the solution as a function of time from 0 to the rows of `found`.
 
     `rows` computes further rows; the tolerance 1 stands for a fixed step. Raise InputError if more
     than 200 000 polynomials are needed.
@@ -132,7 +132,7 @@ def _first_edges(
     edges.append(bounds[-1])
     if tape is None and scene.changing is None:
         return edges
-    # Short steps of a Taylor series show a short change of the torque, which few nodes may miss.
+    # Few nodes may miss a short change of the torque; short steps of a Taylor series show it.
     attitude = found.attitude is not None or scene.torque.needs_attitude
     steps: dict[float, float] = {}
     for end in ends:

@@ -1,4 +1,4 @@
-"""Polynomials through the values of an event's function, and the errors of these values.
+"""Polynomials through the values of an event's function, and the errors (noise) of these values.
 
 In a zero interval, a function is 0 to within its error. The interval is a root if the function
 reaches it by a kink or a jump, but not if it decays to 0.
@@ -19,14 +19,13 @@ from pyharness.model.dense_output import DenseOutput, Pieces, nodes, sizes_of
 # Largest of the last coefficients of a polynomial that has converged, relative to its values.
 _LAST = 2e-14
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
-# Halvings of an interval after which a function is taken not to be smooth.
-_MOST_DIVISIONS = 44
-# At a kink or a jump to 0, the function exceeds _SUDDEN times its error at the distance _BEFORE,
-# relative to the interval of a polynomial of the solution.
+_MOST_DIVISIONS = 44  # halvings of an interval after which a function counts as not smooth
+# A function reaches 0 by a kink or a jump, not by decay, if it exceeds _SUDDEN times its error at
+# the distance _BEFORE, relative to an interval of the solution.
 _SUDDEN, _BEFORE = 1e3, 0.01
 _MOST_PIECES = 100_000  # intervals that are divided at the same time
-_SHIFT = 2.0**-26  # relative difference of an argument for a numerical derivative
-ROUNDING = 2.0**-50  # relative, of the arguments of a function
+_SHIFT = 2.0**-26  # relative change of an argument for a numerical derivative
+ROUNDING = 2.0**-50  # relative rounding error of the arguments of a function
 # A double root is known at best to the error of omega, relative to omega.
 _COARSEST = 1e-10
 _SOME = slice(5, None, 11)  # three nodes at which noise is computed
@@ -36,10 +35,10 @@ _REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINT
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The solution of a scene in which events are searched.
+    """The solution of a scene whose events are searched.
 
-    `pieces` are its polynomials, and `sol` is its dense output. `tolerance` is that of omega; 0 for
-    a fixed step.
+    `pieces` are its polynomials, `sol` its dense output, and `tolerance` is that of omega, 0 for a
+    fixed step.
     """
 
     pieces: Pieces
@@ -85,8 +84,8 @@ class Solution:
         """Return values, their `noise`, and its part by rounding errors."""
         states = self.states(times) if states is None else states
         n, width = states.shape
-        # All arguments in one call: the state at a later time, the state, and with each component
-        # changed; then the state with each rate changed.
+        # One call with all arguments: the state at a later time, the state itself, and the state
+        # with each component or rate changed.
         count = width + (5 if g.event.needs_rates else 2)
         every = np.full((count, n), times)
         every[0] += _SHIFT * np.abs(times)
@@ -107,7 +106,7 @@ class Solution:
 
     @property
     def state_error(self) -> float:
-        """The error of the state, relative to its size; a larger one would hide pairs of roots."""
+        """The error of the state, relative to its size, limited so that pairs of roots are seen."""
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
@@ -121,7 +120,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return converged polynomials through a function's values; elsewhere, its sign changes."""
+    """Return polynomials through a function's values; where they do not converge, sign changes."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -173,7 +172,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return polynomials, with noise where it matters, and roots at the ends."""
+    """Return polynomials, with noise where they may be 0, and roots at the ends."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -188,7 +187,7 @@ def with_noise(
         g, np.concatenate([times.ravel(), ends]), np.concatenate([inner.reshape(n, -1), states])
     )
     fits.noise[which] = noise[:n].reshape(times.shape).max(axis=1)
-    # A function that is not 0 to rounding at an end is on one side of 0 there.
+    # At an end, a value that exceeds its rounding error is no root.
     is_root = np.abs(values[n:]) <= 4.0 * rounding[n:]
     return fits, Roots.bare(ends[is_root], 0, 4.0 * rounding[n:][is_root])
 
@@ -206,9 +205,8 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
 class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
-    `noise` is the magnitude below which a value beside an interval can't be distinguished from 0.
-    `before` and `after` are the signs of the function beside it; 0 where the function decays, and
-    at the ends of the solution.
+    Beside an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
+    the signs there; 0 where the function decays, and at the ends of the solution.
     """
 
     low: Array
@@ -218,7 +216,7 @@ class ZeroIntervals:
     after: Array
 
     def roots(self, counts_touches: bool) -> Roots:
-        """Return for each interval a root at the end that the integration from 0 reaches first.
+        """Return a root for each interval, at the end that the integration from 0 reaches first.
 
         Without `counts_touches`, only intervals with opposite signs on both sides have a root.
         """
@@ -242,7 +240,7 @@ class ZeroIntervals:
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
         found: Index = roots.time <= before
-        # Sign changes of a function that is not smooth are known to so many rounding errors.
+        # Times of sign changes of a function that is not smooth have so many rounding errors.
         longest = np.diff(solution.pieces.edges).max()
         apart = np.minimum(roots.time - before, after - roots.time)
         found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))
@@ -296,7 +294,7 @@ def _refined(
     g: EventFunction, solution: Solution, ends: Array, others: Array, level: Array
 ) -> Array:
     """Return the times, from `ends` toward `others`, up to which a function is below `level`."""
-    # A polynomial of the function may extend beyond a kink; kinks of the solution are at its edges.
+    # A polynomial may extend beyond a kink of the function; kinks of the solution are at edges.
     inner, outer = ends.copy(), others.copy()
     k = np.flatnonzero(~np.isin(inner, solution.pieces.edges))
     k = k[np.abs(solution.values(g, outer[k])) > level[k]]

@@ -37,8 +37,8 @@ class Event:
     """An event of `pyharness.events`.
 
     `function` takes time, omega, attitude (perhaps followed by own states) and the derivative of
-    omega. `terminal` and `direction` are as in `crosses`; `counts_touches` says whether roots
-    without a sign change are events.
+    omega. `terminal` and `direction` are as in `crosses`. With `counts_touches`, roots without a
+    sign change are events.
     """
 
     name: str
@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event number `limit` ends the integration; infinite if none does. `is_vectorized` says
-    whether the function accepts arrays; None if not yet known.
+    Event number `limit` ends the integration, none if infinite. `is_vectorized` is true if the
+    function accepts arrays, None if not yet known.
     """
 
     name: str
@@ -143,7 +143,6 @@ class EventFunction:
             return None
 
     def _of_each(self, times: Array, states: Array, rates: Array | None) -> list[float]:
-        """Return the values by single calls."""
         each_rate = [None] * len(times) if rates is None else rates.copy()
         values = []
         with np.errstate(all="ignore"):
@@ -212,7 +211,7 @@ def _without_attitude(given: Callable[..., Any]) -> Callable[[Any, Any, Any, Any
 def _with_own(
     given: Callable[..., Any], own: Sequence[str], n_attitude: int, needs_attitude: bool
 ) -> Callable[..., Any]:
-    """Return an event's function, which gets the own states behind the attitude."""
+    """Return a user's function with the signature of `Event.function`."""
 
     def function(t: Any, omega: Any, rest: Any, rates: Any) -> Any:
         states = dict(zip(own, rest[n_attitude:], strict=True))
@@ -223,7 +222,7 @@ def _with_own(
 
 
 def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> int:
-    """Return the number of arguments that a function accepts, 2 or 3, beside own states."""
+    """Return the number of a function's arguments, 2 or 3, without own states."""
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own

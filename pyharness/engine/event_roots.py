@@ -23,8 +23,8 @@ POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
 # Halvings of an interval after which a root is as exact as the coefficients.
 _MOST_DIVISIONS = 50
-# A derivative must exceed its bound by this factor to have no root, so that an extremum at the end
-# of an interval is never lost to rounding.
+# The first coefficient must exceed the bound by this factor, so that rounding never loses an
+# extremum at the end of an interval.
 _MARGIN = 1.001
 _SHORT = 1e-11  # length of the last Newton step
 # Largest error of a polynomial, relative to its largest value on the interval.
@@ -32,7 +32,7 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices from coefficients to those of the derivative, left half and right half."""
+    """Return matrices for the coefficients of the derivative, of the left and of the right half."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -46,7 +46,7 @@ _ORDERS = np.arange(NODES)
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Rows whose columns are the attributes."""
+    """A table whose columns are the attributes."""
 
     def only(self, kept: Index) -> Self:
         """Return the rows that an index or a mask selects."""
@@ -89,10 +89,10 @@ class Fits(_Columns):
 class Roots(_Columns):
     """Candidates for roots at n times (s).
 
-    `change` is the sign change in the order of time: 1 to positive, -1 to negative, 0 for a touch.
-    `slope` (1/s) and `curvature` (1/s2) are derivatives of the polynomial. Below `noise` the
-    function can't be distinguished from 0, nor the polynomial below `near`. The function remains 0
-    for `lasting` (s), negative before time 0.
+    `change` is 1 for a sign change to positive in the order of time, -1 to negative, 0 for a touch.
+    `slope` (1/s) and `curvature` (1/s2) are derivatives of the polynomial. Values of the function
+    below `noise`, and of the polynomial below `near`, can't be distinguished from 0. The function
+    remains 0 for `lasting` (s), negative before time 0.
     """
 
     time: Array
@@ -230,7 +230,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return the extrema that are roots, their rows, and parts with one root."""
+    """Return extrema that are roots, their rows, and parts with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

@@ -20,7 +20,7 @@ from pyharness.model.dense_output import sizes_of
 _BLOCK = 4_000  # polynomials whose roots are isolated together
 _STATE_ROUNDING = 2.0**-46  # error of the state's polynomials, relative to their largest values
 _POLISHES = 3
-# A time is exact if the sign changes within so many of its rounding errors.
+# A time counts as exact if the sign changes within so many of its rounding errors.
 _EXACT = 8.0
 _WIDER = 16.0  # factor on the half width of an interval, until the sign changes in it
 
@@ -114,7 +114,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
-    """Return which adjacent roots may be one."""
+    """Return which adjacent roots may be the same root."""
     time = roots.time
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
@@ -153,7 +153,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
     """Return which adjacent roots are around an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
-    # A far root is not beside the extremum, however flat the function is there.
+    # A distant root belongs to another extremum, however flat the function is here.
     is_close = np.diff(roots.time) <= np.minimum(widest[:-1], widest[1:])
     for k in (slice(None, -1), slice(1, None)):
         step = -roots.slope[k] / roots.curvature[k]
@@ -182,7 +182,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of the root that replaces a group: an end, or else the middle one."""
+    """Return the index of the root that replaces a group: at an end, or else in the middle."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -194,8 +194,7 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
     """Return the times of events after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a root at time 0 is a sign change from the value 0, and one at the end a sign
-    change to the value 0.
+    As in SciPy, a root at time 0 counts as a sign change from 0, and one at the end as one to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:
@@ -244,7 +243,7 @@ class FoundEvents:
 
 
 def no_events(count: int, columns: int) -> FoundEvents:
-    """Return no events, of `count` functions, with states of so many columns."""
+    """Return no events for `count` functions, with states of `columns` columns."""
     states = [np.zeros((0, columns)) for _ in range(count)]
     return FoundEvents([np.zeros(0) for _ in range(count)], states, -math.inf, math.inf)
 

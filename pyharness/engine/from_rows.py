@@ -8,8 +8,8 @@ from pyharness.model.attitude import IDENTITY, Quaternion, product
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# The Gauss points are at the fractions _EARLY and 1 - _EARLY of a step. The omegas there have the
-# weights _MORE and _LESS in each exponential.
+# Two Gauss points, at the fractions _EARLY and 1 - _EARLY of a step; weights of omega at these
+# points in each exponential.
 _EARLY = 0.5 - math.sqrt(3.0) / 6.0
 _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 
@@ -18,9 +18,9 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
 
-    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003). Omega at
-    the Gauss points is from the cubic Hermite polynomial between two rows. All attitudes after a
-    rotation that overflows are NaN.
+    Each row is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003), with
+    omega at the Gauss points by cubic Hermite interpolation. After a rotation that overflows, all
+    attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])
     rows = np.vstack([scene.omega, omega])

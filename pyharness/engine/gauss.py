@@ -16,8 +16,8 @@ from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, ext
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 
-# Work limit: right-hand sides of all trial integrations together, some ten seconds. A wave of
-# the torque costs half as much as a right-hand side.
+# Work limit, some ten seconds: right-hand sides of all trial integrations. A wave of the torque
+# counts as half of one.
 _MOST_EVALUATIONS = 200_000_000
 _ORDER_THAT_SHOWS = 8  # highest order that the error estimate assumes
 # Shorter steps do not reduce a relative difference of two solutions below this limit.
@@ -37,11 +37,11 @@ class _Solution(NamedTuple):
 def gauss(
     stages: int, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory by Gauss collocation with 1 to 8 `stages`; steps are halved.
+    """Return the trajectory by Gauss collocation with 1 to 8 `stages`, halving steps as needed.
 
-    The order is twice the number of stages. The estimated error of the finer of two solutions is 2
-    d / (r**p - 1), with a safety factor of 2. Here d is their largest difference of omega, r <= 2
-    is the ratio of their steps, and p is the order, but at most 8. Beyond 8, steps are longer, and
+    The order is twice the number of stages. The estimated error of the finer of two solutions is
+    2 d / (r**p - 1), with a safety factor of 2. Here d is their largest difference of omega, r <= 2
+    the ratio of their steps, and p the order, but at most 8: with the long steps of higher orders,
     the error does not yet fall at the full order.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
@@ -127,7 +127,7 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
     """Return whether two solutions end because omega grows without bound.
 
     Both then end before the last time, nearly together. Let m be |omega| at the end. Either m
-    exceeds 1e300 rad/s in both; or the finer m exceeds 1.5 times the coarser m, and this product
+    exceeds 1e300 rad/s in both; or the finer m exceeds 1.5 times the coarser, and this product
     exceeds 1000 times `start` (rad/s) and every |omega| at a requested time.
     """
     if COMPLETE in (finer.status, coarser.status):
@@ -141,7 +141,7 @@ def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
 
 
 def _step_counts(lengths: Array, step: float) -> Array:
-    """Return the number of steps in each interval; one may exceed `step` (s) by 1e-6 of it."""
+    """Return the number of steps in each interval; a step is at most 1e-6 longer than `step`."""
     with np.errstate(over="ignore", divide="ignore"):
         return np.maximum(1.0, np.floor(np.minimum(lengths / step, 1e18) + (1.0 - 1e-6)))
 

@@ -1,7 +1,7 @@
-"""The compiler of leaves, and the folder in which it keeps them.
+"""Compilation of leaves (C code for the Taylor series of a recorded torque), and their folder.
 
-A file of the folder is loaded only if it and the folder belong to the user, nobody else may write
-them, and its name ends in the hash of its content.
+A file is loaded only if it and the folder belong to the user, nobody else may write them, and its
+name ends in the hash of its content.
 """
 
 import ctypes
@@ -23,17 +23,17 @@ from pyharness.model.tape import Tape
 
 MOST_BYTES = 20_000_000  # of all files; the oldest ones are deleted
 _MOST_SECONDS = 60.0  # of a compilation
-_FORGOTTEN = 3600.0  # age (s) of what a killed compilation has left
+_FORGOTTEN = 3600.0  # age (s) from which files of a killed compilation are deleted
 _FLAGS = ("-O2", "-ffp-contract=fast", "-fPIC", "-shared")
 _NATIVE = "-march=native"
 _FUNCTIONS = ("expand", "set_jacobian")  # the order of struct leaves in fortran/modern/tape.h
 
 
 class LeavesError(Exception):
-    """Why leaves can't be compiled or loaded, in one line."""
+    """The reason why leaves can't be compiled or loaded, in one line."""
 
 
-# The last two: no home folder is known; CC has an open quotation.
+# The second: no home folder is known; the third: CC has an open quotation.
 _FAILURES = (LeavesError, RuntimeError, ValueError)
 
 
@@ -57,7 +57,7 @@ def about_leaves() -> dict[str, str | int]:
 
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of leaves that are compiled where asked, or 0, and which leaves run."""
+    """Return the address of the scene's compiled leaves, or 0, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
     if has_ready_leaves(tape):
         return 0, "built"
@@ -65,9 +65,9 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of the compiled leaves of a tape, and ``compiled``.
+    """Return the address of the compiled leaves of a tape, and ``compiled``; or 0, and why not.
 
-    They are compiled if the folder has none. Where that fails, return 0 and why.
+    They are compiled if the folder has none.
     """
     shape = structure(listing(tape))
     if shape is None:
@@ -106,7 +106,7 @@ def compiler() -> tuple[str, ...]:
 
 @cache
 def machine() -> str:
-    """Return what else the code depends on: the compiler, its version and the processor."""
+    """Return the compiler, its version and the processor, on which compiled code depends."""
     import platform
 
     file = os.stat(os.path.realpath(compiler()[0]))
@@ -152,7 +152,7 @@ def _found(place: Path, key: str) -> Path | None:
 
 
 def compiled_file(place: Path, text: str) -> Path:
-    """Compile leaves, and return their file, which appears in the folder as a whole."""
+    """Compile leaves, and return their file, which is moved to the folder when complete."""
     from tempfile import TemporaryDirectory
 
     place.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -173,7 +173,7 @@ def compiled_file(place: Path, text: str) -> Path:
 
 
 def _run(command: list[str]) -> str:
-    """Run a compiler, and return the first line of its complaint; empty if it succeeded."""
+    """Run a compiler, and return the first line of its error message; empty if it succeeded."""
     import subprocess
 
     try:
@@ -189,7 +189,7 @@ def _run(command: list[str]) -> str:
 
 
 def _clean(place: Path) -> None:
-    """Delete the oldest files beyond the limit of size, and what killed compilations left."""
+    """Delete the oldest files beyond the size limit, and those of killed compilations."""
     import time
     from shutil import rmtree
 

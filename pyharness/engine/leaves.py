@@ -1,7 +1,7 @@
-"""Compiled leaves: C of the series and of the Jacobian of a tape, instead of the interpreter's.
+"""Compiled leaves: C code for the Taylor series and the Jacobian of a tape (recorded operations).
 
-The interpreter is fortran/modern/tape_terms.c. Numbers are read from memory, so that tapes of one
-structure share their leaves.
+They replace the interpreter, fortran/modern/tape_terms.c. Numbers are read from memory, so that
+tapes of one structure share their leaves.
 """
 
 import re
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pyharness.engine.recorded import Listing
 
 _ABREAST = 4  # products side by side, and nodes of the Jacobian
-_CHUNK = 8  # groups of products that are summed together, as many as there are registers for
+_CHUNK = 8  # groups of products that are summed together; the registers suffice for 8
 _BLOCK = 8  # columns of the Jacobian in a row of its storage
 _NODES = 3  # of the Jacobian
 _TERMS_AMID = 8  # terms of a series at a node
@@ -52,9 +52,9 @@ _Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an 
 class Operation(NamedTuple):
     """The recurrence and the slopes of an operation, as C.
 
-    Its slots are o, p and q, its operands x and y. Of slot o, t_o is term k, or l_o if it is known;
-    b_o is term k - 1, z_o term 0, f_o term 1, and m_o the value at a node; i is 1/k. The sums s0
-    and s1 are those of the products of terms 1 to k - 1 of the slots in `pairs`.
+    Its slots are o, p and q, its operands x and y. Of slot o, t_o is term k (l_o if it is known
+    before), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node; i is 1/k. s0 and
+    s1 are sums of products of terms 1 to k - 1 of the slots in `pairs`.
     """
 
     series: tuple[str, ...]
@@ -109,7 +109,7 @@ class Structure(NamedTuple):
 
 
 def structure(tape: "Listing") -> Structure | None:
-    """Return the structure of a tape, or None if its operations stay interpreted."""
+    """Return the structure of a tape, or None if it can't be compiled."""
     kinds = {operation[0] for operation in tape.operations}
     if not kinds <= {*OPERATIONS, Operations.LINEAR} or len(tape.operations) > _MOST_OPERATIONS:
         return None
@@ -161,7 +161,7 @@ def _written(text: str, operation: _Listed) -> str:
 
 
 def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
-    """Return a linear combination of the numbers `name` of slots; a value has a constant."""
+    """Return a linear combination of C variables, such as "t4" for slot 4 and the `name` "t"."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in _terms(tape, number)]
     return " + ".join(parts) or "0.0"
@@ -222,7 +222,7 @@ def _expand(tape: Structure) -> Iterator[str]:
     for begin in range(0, len(groups), _CHUNK):
         chunk = range(begin, min(len(groups), begin + _CHUNK))
         yield from (f"    abreast s{g} = {{0.0}};" for g in chunk)
-        # The newest terms come last, so that the others need not wait for them.
+        # The newest terms come last, so that the processor need not wait for them.
         yield "    for (int j = 2; j < k - 1; j++) {"
         yield from (f"      s{g} += x[{g}][j]*y[{g}][k - j];" for g in chunk)
         yield "    }"
@@ -252,7 +252,7 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
     """Yield the function that computes the derivatives of the rates at the nodes."""
-    # Of each slot: the names of its derivatives, by the unknowns on which it depends.
+    # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in _unknowns(tape)}
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"
     yield "                  const double *restrict d, const double *restrict parts, double h,"
@@ -307,7 +307,7 @@ def _slopes_of_combination(
 def _products(
     slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return derivatives by unknowns from those by the operands."""
+    """Return derivatives of an operation by unknowns, from its slopes by the operands."""
     parts = [
         (unknown, f"({_written(slope, operation)})*{name}")
         for slot, slope in slopes

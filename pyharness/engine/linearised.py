@@ -15,8 +15,8 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 
 def transitions(times: Array, slopes: Array) -> Array:
     """Return transition matrices from n times (s) to the last, (n, m, m), from Jacobians (1/s)."""
-    # The Jacobian hardly changes in an interval. Therefore the exponential of Jacobian times
-    # interval is the state-transition matrix.
+    # The Jacobian hardly changes in an interval, so that exp(interval * Jacobian) is the
+    # state-transition matrix.
     pieces = exponentials(np.diff(times)[:, None, None] * slopes)
     size = slopes.shape[-1]
     found = np.empty((len(times), size, size))

@@ -87,7 +87,7 @@ def solve_many(
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
         Times (s) in order for all bodies, instead of `t_end`. The result has a further axis of
-        length m after that of the bodies; each row has the bits of a call with this final time.
+        length m after that of the bodies; each row is bit for bit that of a call with this `t_end`.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
@@ -285,7 +285,7 @@ def _solve(
 
 
 def _kind_of(scene: Scene, row: int) -> int:
-    """Return a number that scenes for one kernel call share."""
+    """Return a number that is the same for all scenes of one kernel call."""
     checked_scene(scene, any_axes=True, any_torque=True, any_state=True, changing=True)
     return row if is_solved_alone(scene, {}) else _PLAIN if scene.inertia is None else _TILTED
 
@@ -308,8 +308,7 @@ def _solve_groups(
         groups.setdefault(kind, []).append(row)
     for kind, rows in groups.items():
         own: Any = scenes[rows[0]] if kind >= 0 else [scenes[row] for row in rows]
-        # One scene is not worth the preparation of a vector kernel. An array of the torque, even of
-        # the same torque, avoids it.
+        # Preparing a kernel takes longer than solving one scene; a torque given as array avoids it.
         alone = {"torque_constant": own.law.constant} if kind >= 0 and own.torque.in_space else {}
         part = solve_many(own, times[rows], step=step, **alone, **settings)
         found.omega[rows], found.status[rows] = part.omega, part.status

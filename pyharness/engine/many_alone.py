@@ -1,6 +1,6 @@
-"""Bodies one by one: events, sensitivities, and what the vector kernel can't take.
+"""Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-That kernel takes no torque of the state or about the axes of space, and no changing inertia.
+The vector kernel has no torque of the state or about the axes of space, and no changing inertia.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -55,7 +55,7 @@ NO_ATTITUDE = "the torque needs the initial attitude; give attitude, or scenes w
 
 
 def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
-    """Return whether the general kernel for many bodies can't take the scene.
+    """Return whether the vector kernel refuses the scene.
 
     Raise InputError if its torque depends on the state, and `arrays` has torques too.
     """
@@ -68,7 +68,7 @@ def is_solved_alone(scene: Scene, arrays: Mapping[str, object]) -> bool:
             )
         return True
     is_in_space = scene.torque.in_space or (scene.torque.frame == "space" and bool(named))
-    # The kernel's moments are in double precision, those of a PrincipalScene in double-double.
+    # The vector kernel has moments in double precision; a PrincipalScene has double-double.
     return is_in_space or scene.changing is not None or isinstance(scene, PrincipalScene)
 
 
@@ -138,7 +138,7 @@ def solve_one_by_one(
     found.omega[:] = result.omega
     if found.attitude is not None:
         found.attitude[:] = result.attitude
-        # At time 0 it is normalised as those with which the kernel of many bodies begins.
+        # At time 0 it is normalised in the same way as by the vector kernel.
         at_start = (spread(times, n) == 0.0) & (found.status == Statuses.COMPLETE)
         found.attitude[at_start] = unit_quaternions(spread(counted["attitude"], n)[at_start])
     return found
@@ -147,7 +147,7 @@ def solve_one_by_one(
 def _lanes(
     scene: Scene, rows: Mapping[str, Array], tolerance: float, effort: float, attitude: bool
 ) -> tuple[Array, Array] | None:
-    """Return the packed equations and parameters of bodies that one kernel call can solve, or None.
+    """Return packed equations and parameters of bodies, or None if one kernel call can't solve all.
 
     Parameters of an invalid body are NaN, which the kernel refuses.
     """

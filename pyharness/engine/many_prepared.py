@@ -101,10 +101,10 @@ def solve_each(
     solver: "Solver[Any]", starts: Array, times: Array, turns: Array | None, found: Ensemble,
     piece: slice, given_up: NDArray[np.int32],
 ) -> None:  # fmt: skip
-    """Solve the bodies in `piece` side by side, or those that can't be by calls.
+    """Solve the bodies in `piece` side by side, or else by single calls.
 
-    A body whose error can't be measured is solved by a call. All are if the torque is neither
-    recorded nor in space, or if the inertia matrix is full.
+    Single calls are for bodies whose error can't be measured; for all bodies, if the torque is
+    neither recorded nor in space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -120,7 +120,7 @@ def solve_row(
     solver: "Solver[Any]", i: int, starts: Array, times: Array, turns: Array | None,
     found: Ensemble,
 ) -> None:  # fmt: skip
-    """Solve body `i` by a call; a body with invalid numbers is REFUSED."""
+    """Solve body `i` by a single call; a body with invalid numbers is REFUSED."""
     start, time = row_of(starts, i), float(row_of(times, i))
     try:
         if turns is None or found.attitude is None:

@@ -49,11 +49,11 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
-    """Return arrays of bodies with inertia matrices as arrays about principal axes, and these.
+    """Return arrays of bodies with inertia matrices as arrays about principal axes, and the axes.
 
-    The arrays have A, B, C, because rounded moments would be less accurate. They are NaN for a
-    matrix that is not symmetric and positive definite. The axes are columns, (n, 3, 3), and
-    quaternions, (n, 4), if there are attitudes.
+    The arrays have A, B, C, because rounded moments would be less accurate; NaN for a matrix that
+    is not symmetric and positive definite. The axes are columns, (n, 3, 3), and also quaternions,
+    (n, 4), if there are attitudes.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -130,9 +130,9 @@ _kept: dict[tuple[Any, ...], tuple[Scene, Any]] = {}
 
 
 def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-    """Return `make()`, kept for this scene and `key`."""
-    # The key is the identity, because equal scenes may differ in the signs of zeros. An entry keeps
-    # its scene alive, so that no other object gets its identity.
+    """Return `make()`, cached for this scene and `key`."""
+    # By identity, because equal scenes may differ in the signs of zeros. An entry keeps its scene
+    # alive, so that no other object gets its identity.
     full = id(scene), *key
     found = _kept.get(full)
     if found is None:
@@ -244,8 +244,8 @@ def solve_bodies(
 ) -> tuple[Ensemble, Array, Array]:  # fmt: skip
     """Return the final states, and the initial omegas and times, by one call of the kernel.
 
-    The bodies have arrays `own`, and for others a scene's `ready` rows; `settings` are the method's
-    code, tolerance, step and effort.
+    The arrays in `own` replace those of a scene in `ready`; `settings` are the method's code,
+    tolerance, step and effort.
     """
     code, tolerance, step, effort = settings
     given = checked_rows(own)

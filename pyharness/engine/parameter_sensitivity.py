@@ -1,8 +1,8 @@
 """Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series.
 
 For scenes whose rates jump, or that have states of their own, they are central differences with
-decreasing steps, extrapolated (Ridders 1982): a perturbation moves the time of a switch, which the
-linearised equations of a smooth torque leave out.
+decreasing steps, extrapolated (Ridders 1982). A perturbation then moves the time of a switch, which
+linearised equations leave out.
 """
 
 import itertools
@@ -35,24 +35,24 @@ from pyharness.model.state_torque import has_switches, is_opaque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import triple
 
-# Largest tolerance of the derivatives of one period, and smallest tolerance of any.
+# Largest tolerance of the derivatives over one period; smallest tolerance of all derivatives.
 _OF_PERIOD, _FINEST = 1e-13, 1e-15
-# Smallest relative change of omega in a period at which the derivatives of one period are used.
+# Smallest relative change of omega in a period for which one period is extrapolated.
 _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
 _THREE = (0.0, 0.0, 0.0)  # stands for omega and attitude, which have three columns
-# The parameters whose equations are periodic for a body without torque. All but the torque change
-# the period once; a torque changes it with time.
+# The parameters for which one period of a body without torque is extrapolated. A torque changes the
+# period with time, the others once.
 _CONSTANT = "torque.constant"
 _PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
 
-_FIRST = 0.02  # first difference, relative to the parameter
+_FIRST = 0.02  # first change of a parameter for a difference, relative to the parameter
 _LEVELS, _RATIO = 13, 2.0
 _ENOUGH = 1e-11  # estimated error, relative, at which no smaller differences are tried
 # Largest estimated error, relative to the largest derivative by a parameter.
 _ALLOWED = 1e-7
-_SMALL = 1e-10  # or so large a change of the state, relative, by that of the parameter
+_SMALL = 1e-10  # allowed too: this relative change of the state by a change of the parameter
 
 # A function that returns the states at the times, shape (n, m), of a scene.
 States = Callable[[Scene], Array]
@@ -122,12 +122,12 @@ def sensitivities_at(
     # Closed forms alone take no evaluations.
     is_closed = not found.evaluations and not attitude and set(names) <= _PERIODIC
     period = 0.0
-    # The derivatives of a function that is 0 by its parameters may depend on time.
+    # A function of time that is 0 for these parameters may have derivatives that depend on time.
     if is_closed and not getattr(scene.torque, "named", None):
         period = period_of(scene)
         if not period * np.abs(_slope(scene)).max() > _VARIES * math.hypot(*scene.omega):
             period = 0.0
-    # The calculation from one period takes as long as an integration over two.
+    # Extrapolating one period takes as long as an integration over two.
     if 0.0 < 2.0 * period < np.abs(times).max(initial=0.0):
         columns, rows = _by_periods(scene, names, times, period, tolerance, effort)
     else:
@@ -143,7 +143,7 @@ def _by_series(
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))
-    # The forcings are numbers of combinations, which end with the outputs; the array counts them.
+    # Forcings become numbers of linear combinations, of which the outputs are the last.
     first = int(packed[3]) - len(equations.tape.outputs)
     forcings = np.where(equations.forcings > 0, equations.forcings + first, 0).astype(np.int32)
     rows = np.empty((len(times), *starts.shape))
@@ -245,7 +245,7 @@ def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states
 
 
 def _moves(scene: Scene, name: str) -> Iterator[tuple[Callable[[float], Scene], float]]:
-    """Yield a function of a change that returns the changed scene, and the size of changes."""
+    """Yield, for each value of a parameter, a function that changes it, and the size of changes."""
     if name == ATTITUDE:
         for axis in np.eye(3):
             yield lambda h, axis=axis: _turned(scene, h * axis), 1.0  # type: ignore[misc]

@@ -23,7 +23,7 @@ from pyharness.model.torque_law import TorqueLaw, body_torque
 from pyharness.model.values import Triple
 
 OMEGA, ATTITUDE = "omega", "attitude"
-TORQUE = "torque."  # before the names of its parameters
+TORQUE = "torque."  # prefix of the names of its parameters
 # The elements of an inertia matrix that are parameters, in this order.
 INERTIA_ELEMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -36,8 +36,8 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
     The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
-    parameter has a column; `columns` has those of each name. `forcings`, shape (n, m), are the
-    numbers, from 1, of the outputs for n rates and m columns; 0 for a derivative of 0.
+    parameter has a column; `columns` has the columns by name. `forcings`, shape (n, m), has for n
+    rates and m columns the number of the output, from 1, or 0 for a derivative of 0.
     """
 
     tape: Tape
@@ -72,7 +72,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless `names` are numbers of the scene's recorded torque."""
+    """Raise InputError unless `names` are parameters of the torque with one value."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
@@ -88,7 +88,7 @@ def check_values(scene: Scene, names: Iterable[str]) -> None:
 
 
 def torque_with_values(torque: StateTorque | TorqueLaw, values: Mapping[str, float]) -> StateTorque:
-    """Return a recorded torque with other numbers, by name of a parameter, which remain its own."""
+    """Return a recorded torque with other `values` of its parameters."""
     try:
         parts = [_with_values(each, values) for each in _list_summands(torque)]
     except ArithmeticError as error:
@@ -118,10 +118,10 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return the equations of motion of bodies that differ in parameters, as further inputs.
+    """Return the equations of motion of bodies that differ in parameters, which are further inputs.
 
-    These are A, B, C and the reciprocal moments, unless `body` has them for all, and the `names` of
-    numbers of the torque.
+    These are A, B, C and the reciprocal moments, unless `body` has them for all bodies, and the
+    torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
@@ -164,7 +164,7 @@ def _equations(
     attitude: bool,
 ) -> VariedEquations:
     """Return the equations; `values` are pairs of names and values, in the order of columns."""
-    # Names of the initial state have no values, but three columns.
+    # The initial omega and attitude have three columns each, but no values here.
     n = 7 if attitude else 3
     flat = [each for _, listed in values for each in listed]
     recorder = Recorder(
@@ -199,7 +199,7 @@ def _equations(
 
 
 def _list_summands(torque: StateTorque | TorqueLaw) -> Sequence[StateTorque | TorqueLaw]:
-    """Return the summands of a torque, if possible in the form that names their numbers."""
+    """Return the summands of a torque, if possible with named parameters."""
     parts = (torque,) if isinstance(torque, TorqueLaw) else torque.parts or (torque,)
     return [getattr(part, "named", None) or part for part in parts]
 

@@ -10,19 +10,18 @@ from pyharness.model.errors import InputError
 from pyharness.model.symbols import Recorder
 from pyharness.model.tape import ATTITUDE, N_INPUTS, TIME
 
-# Events are searched in so many periods, of which the second is repeated: no end is in or near it.
+# Events are searched in so many periods; the second, which is far from any end, is repeated.
 PERIODS = 3.0
 _MOST_EVENTS = 5_000_000
 _BLOCK = 100_000  # events that are improved together
-# Half the distance of the values that give a function's slope, and the largest correction of a
-# time, in periods.
+# Step of the difference quotient of a function, and largest correction of a time, in periods.
 _PROBE = 1e-5
 # Largest error of the time of an event before its improvement, in periods.
 _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether all functions, recorded with symbols, depend on omega and its rate alone."""
+    """Return whether all functions can be recorded and depend on omega and its rate alone."""
     return all(map(_is_of_omega, functions))
 
 
@@ -38,12 +37,12 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times of events until `end` (s), and how many precede the repeated period.
+    """Return the times of events until `end` (s), and how many are not repetitions.
 
     `times` (s) are the events of the first PERIODS periods. Raise InputError for more than
     5 000 000 events.
     """
-    # An event at the end of a period may be found on either side of it, and is not lost here.
+    # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period
     inner = times[(times > period - margin) & (times <= 2.0 * period + margin)]
     if not inner.size:

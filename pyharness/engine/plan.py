@@ -16,8 +16,8 @@ from pyharness.model.trajectory import Trajectory
 
 FINEST = REGISTRY["auto"].finest
 # Under a torque with fast waves, Runge-Kutta, which averages them, may need fewer operations than
-# the Taylor series, or be the only method that can solve the scene. The kernel chooses between the
-# two, down to the smallest tolerance at which Runge-Kutta was better in tests.
+# the Taylor series, or be the only method that can solve the scene. The kernel chooses between them
+# down to the smallest tolerance at which Runge-Kutta was better in tests.
 RK4_OR_TAYLOR = "quick or taylor"
 _FEW_DIGITS = 1e-9
 
@@ -32,7 +32,7 @@ class Decision(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The choices before a scene is solved: the method and the computed quantities."""
+    """The choice of method and computed quantities for a scene."""
 
     scene: Scene
     method: str  # name of the method that was chosen or requested

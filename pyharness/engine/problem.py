@@ -25,7 +25,7 @@ _NOT_FINITE = (
 def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     """Return A, B, C, and the torque over the moments; raise InputError if one is not finite."""
     law, moments = scene.body_torque, np.array(scene.moments or (1.0, 1.0, 1.0))
-    # A wave of amplitude 0 has no effect, but computing its sine or cosine would take time.
+    # A wave of amplitude 0 would only take time.
     sines, cosines = (
         columns(tuple(wave for wave in waves if any(wave[0]))) for waves in (law.sines, law.cosines)
     )
@@ -114,8 +114,8 @@ def closed_form(scene: Scene) -> str | None:
     if not scene.torque.is_zero:
         return None
     if 0.0 in (a, b, c):
-        # If one coefficient is 0, omega oscillates if the others have opposite signs. If these have
-        # the same sign, or two coefficients are 0, omega may grow without bound.
+        # Omega oscillates if the other two have opposite signs. Otherwise it may grow without
+        # bound.
         rest = [x for x in (a, b, c) if x != 0.0]
         return "symmetric" if len(rest) == 2 and rest[0] * rest[1] < 0.0 else None
     return None if min(a, b, c) > 0.0 or max(a, b, c) < 0.0 else "elliptic"

@@ -101,7 +101,7 @@ def flip(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Even
 def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> Event:
     """Return the event that a component of omega has a maximum or a minimum.
 
-    It is a root of the component's derivative in the equations of motion.
+    It is a root of the component's derivative.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
         As in `crosses`.
     direction : {-1, 0, 1}
         The sign change of the derivative in the direction of integration; 0 for both. Forward in
-        time, -1 selects maxima and 1 minima; backward in time, 1 selects maxima and -1 minima.
+        time, -1 selects maxima and 1 minima; backward, 1 selects maxima.
 
     Returns
     -------

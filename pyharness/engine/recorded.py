@@ -1,4 +1,4 @@
-"""The equations of motion with a recorded torque, and scenes, as the kernels read them."""
+"""Scenes and tapes (recorded equations of motion) in the arrays that the kernels read."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -40,8 +40,8 @@ _KINDS = {
     "floor": (Operations.FLOOR, 1),
     "select": (Operations.SELECT, 1),
 }
-# The first trial step, in the user's unit of time. Its length hardly matters, because the series
-# gives any shorter step, or one up to 16 times longer.
+# The first trial step, in the user's unit of time. Its length hardly matters, because a series
+# gives a step of any length up to 16 times this.
 LONGEST_TRIAL = 1e3
 
 
@@ -147,7 +147,7 @@ class Listing(NamedTuple):
     tables: list[Table]
 
 
-# The place in a tape's array of the address of compiled leaves, or the number of a ready torque's.
+# Index, in a tape's array, of the address of compiled leaves or the number of built ones.
 _LEAVES = 7
 
 
@@ -242,7 +242,7 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
 
 
 def has_ready_leaves(tape: Tape) -> bool:
-    """Return whether a tape is that of a ready torque, whose leaves were built."""
+    """Return whether leaves for the tape, that of a ready torque, were built with the package."""
     return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 
@@ -251,7 +251,7 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of the compiled leaves of a tape; 0: those of a ready torque, or none.
+    `leaves` is the address of a tape's compiled leaves; 0 for built ones, or none.
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:

@@ -18,15 +18,15 @@ from pyharness.model.state_torque import StateTorque, is_opaque
 from pyharness.model.trajectory import Trajectory
 from pyharness.model.values import Number, boolean, tolerance_of
 
-# Smallest tolerances of Gauss collocation with 1 to 8 stages. For smaller ones the low orders would
-# need too many steps.
+# Smallest tolerances of Gauss collocation with 1 to 8 stages; low orders would need too many steps
+# for smaller ones.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
-# At this tolerance rounding errors spoil 5 of 1000 ordinary motions, at 1e-12 303 of them:
+# At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors, at 1e-12 303:
 # `python -m tests.campaigns.default_campaign 1000 2026-11-26`.
 _DEFAULT = 1e-9
 _ONE_STAGE_DEFAULT = 1e-6
-# No method of SciPy meets a smaller tolerance over a hundred radians with attitude, or if
-# perturbations grow a thousandfold; Radau takes too long.
+# Within the work limit, SciPy's methods meet no smaller tolerance over a hundred radians with
+# attitude, or if perturbations grow a thousandfold.
 _SCIPY_DEFAULT = 1e-8
 
 
@@ -42,7 +42,7 @@ class Method:
     # Default tolerance, 1e-9 or the smallest that the method meets in ordinary scenes within a
     # fraction of its work limit; 1 if the method takes no tolerance.
     default: float = _DEFAULT
-    gives_rows: bool = True  # False: omega at the end alone, from a prepared solver
+    gives_rows: bool = True  # false if only a prepared solver has it, without intermediate output
     # Takes a fifth argument, whether `sol` has the steps.
     gives_steps: bool = False
     order: int = 0  # of the global error in the step size; 0 if it varies
@@ -52,7 +52,7 @@ class Method:
     space_torque: bool = False  # takes a torque about the axes of space, together with attitude
     # Takes a torque that depends on the state, and propagates the attitude under it.
     state_torque: bool = False
-    # Takes only weak torques, recorded ones of time and omega among them; computes no attitude.
+    # Takes only weak torques, also recorded ones of time and omega; computes no attitude.
     weak_torque: bool = False
     scipy: str = ""  # SciPy's name of the method; empty for our own methods
     is_fixed_step: bool = False  # uses the scene's step size, and takes no tolerance
@@ -69,8 +69,8 @@ def _reference(
         return rows_trajectory([], result.omega[:0], 0, len(times), "overflow")
     ended = "complete" if len(result.time) == len(times) else "overflow"
     largest = max(*map(abs, scene.omega), float(np.abs(result.omega).max(initial=0.0)))
-    # No error is returned for a body at rest, as an error of 0 would be untested, and none after a
-    # transformation to principal axes, whose rounding errors are not estimated.
+    # A body at rest has no scale for an error; the rounding errors of a transformation to principal
+    # axes are not estimated.
     error = result.error / largest if largest and not isinstance(scene, PrincipalScene) else None
     if error is not None and result.attitude is not None:
         error = max(error, result.angle_error)
@@ -87,7 +87,7 @@ def _no_rows(*given: object) -> Trajectory:
 
 
 def _from(room: str, name: str, *arguments: str | int) -> Integrator:
-    """Return a solver that imports `name` when called; `arguments` are its first ones."""
+    """Return a solver that imports `name` when called, and passes `arguments` first."""
 
     def solve(*given: Any) -> Trajectory:
         solver = getattr(importlib.import_module(f"pyharness.engine.{room}"), name)
@@ -98,7 +98,7 @@ def _from(room: str, name: str, *arguments: str | int) -> Integrator:
 
 
 def _scipy(scipy: str, title: str, source: str) -> Method:
-    # The others' interpolants are less accurate than their steps.
+    # RK45 and Radau have interpolants that are less accurate than their steps.
     gives_steps = scipy in ("DOP853", "LSODA")
     source, solve = f"scipy.integrate.solve_ivp; {source}", scipy_method(scipy)
     return Method(
@@ -198,8 +198,7 @@ REGISTRY = {
 METHODS = {name: method for name, method in REGISTRY.items() if method.gives_rows}
 FIXED_STEP = tuple(name for name, method in REGISTRY.items() if method.is_fixed_step)
 GAUSS = tuple(name for name in REGISTRY if name.startswith("gauss-"))
-# The methods with a prepared solver for a torque that depends on the state; they alone integrate a
-# scene's own states.
+# The methods with a prepared solver for a torque of the state, which also integrate own states.
 PREPARED_FOR_STATE = ("auto", "taylor")
 # SciPy's name of each of its methods, by the name in this registry.
 SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if method.scipy}

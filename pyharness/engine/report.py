@@ -68,7 +68,7 @@ def trajectory_report(
     rows = np.column_stack([values for _, values in blocks])
     numbers = Table(columns, rows)
     steps = np.arange(1, len(rows) + 1)
-    # The nine elements of a matrix fill the width of a terminal; all else but time is omitted.
+    # The nine elements of a matrix fill the width of a terminal; beside them only time is shown.
     kept = [0, *range(5, len(columns))] if form == "matrix" else list(range(len(columns)))
     counted = Table(
         [Column("step", digits(".0f")), *(columns[k] for k in kept)],

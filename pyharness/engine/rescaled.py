@@ -1,8 +1,8 @@
 """Rescaled time: conversion of scenes and trajectories to another unit of time.
 
-Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s. A
-method that forms them therefore receives the scene in a unit of time in which omega is near 1. The
-ratio of the units is a power of two, so that no number is rounded.
+Products of two components of omega underflow below 1e-154 rad/s and overflow above 1e154 rad/s.
+Methods that form them receive the scene in a unit of time in which omega is near 1. The ratio of
+the units is a power of two, so that no number is rounded.
 """
 
 import math
@@ -25,12 +25,11 @@ from pyharness.model.trajectory import Trajectory
 if TYPE_CHECKING:
     from pyharness.engine.registry import Method
 
-# The exponents of rescaled time are multiples of this number, so that those of nested square roots
-# are whole numbers.
+# The exponents of rescaled time are multiples of this number, so that nested square roots have
+# whole exponents.
 _MULTIPLE = 16
 _SAMPLES = 9  # times at which a torque of the state is evaluated
-# From the inverse of this omega to this omega (rad/s), products of components of different size
-# keep their digits.
+# Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
 
 
@@ -77,7 +76,7 @@ def integrate(
     if is_ordinary(scene.omega):
         return method.solve(scene, times, tolerance, effort, *more)
     if not method.is_fixed_step:
-        # The method does not use the step size, but in the new unit it might not be finite.
+        # The method ignores the step size, which might not be finite in the new unit.
         scene = replace(scene, step_size=abs(times[-1]) or 1.0, steps=1)
     factor = 1.0 if method.any_scale or scene.states else rescaling_factor(scene, times[-1])
     if factor == 1.0:
@@ -97,8 +96,8 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    It allows for the omega that the torque may cause until `time` (s); for a torque of the state,
-    this is an estimate. It is 1 if no rescaling is needed or possible, as for an opaque torque.
+    It allows for the omega that the torque may cause until `time` (s), an estimate for a torque of
+    the state. It is 1 if no rescaling is needed or possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -171,8 +170,8 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
     """Return the tape of a torque in the unit of time 2**exponent s, without rounding.
 
     Each slot (input or result) has its own power of two as factor, so that none overflows or
-    underflows. The outputs are multiplied by 2**(2 * exponent). The result is None if a number
-    would be rounded.
+    underflows. The factor of the outputs is 2**(2 * exponent). Return None if a number would be
+    rounded.
     """
     # Slot n becomes slot `places[n]`, times 2**`exponents[n]`.
     operations: list[Operation] = []
@@ -198,7 +197,7 @@ def scaled_tape(tape: Tape, exponent: int) -> Tape | None:
         """Return a new slot that has the original value of `slot`, times 2**power."""
         if exponents[slot] == power:
             return places[slot]
-        # The kernel recognises an angle proportional to time by its linear combination.
+        # The kernel recognises waves by linear combinations of time alone.
         linear = combinations.get(slot, Linear(0.0, ((slot, 1.0),)))
         return append(Operation("linear", (), combine(linear, power)))
 

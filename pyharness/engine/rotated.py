@@ -1,4 +1,4 @@
-"""Transformations of a scene to an equivalent one, with other axes or signs, or a later time 0."""
+"""Transformations of a scene to other axes, other signs, or another time 0."""
 
 import math
 from collections.abc import Callable
@@ -18,9 +18,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, `turn` is applied to the moments too. It is never applied to the attitude or
-    to a torque about the axes of space. For a torque of the state, `turn` must be a rotation. Raise
-    InputError if the inertia changes with time.
+    If `body` is true, `turn` is applied to the moments too. Attitude, and a torque about the axes
+    of space, are kept. For a torque of the state, `turn` must be a rotation. Raise InputError if
+    the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -46,7 +46,7 @@ def axes_of(turn: Callable[[Triple], Triple]) -> Array:
 
 
 def later(torque: StateTorque, by: float) -> StateTorque:
-    """Return a torque with time 0 moved to the time `by` (s); raise InputError if it is opaque."""
+    """Return a torque whose time 0 is the time `by` (s); raise InputError if it is opaque."""
     if torque.tape is None:
         raise InputError(
             "an opaque torque can't be shifted in time; allowed: a torque that can be recorded"

@@ -117,7 +117,7 @@ def _body(table: dict[str, Any]) -> dict[str, Any]:
             check_keys(given, _TABLE, f"[body] {place}")
             if not {"times", "values"} <= given.keys():
                 raise InputError(f"[body] {place}: a table needs times and values; give both")
-            # Imported only here, as ready terms are: most scenes have none.
+            # Imported only here, because most scenes have no table.
             from pyharness.engine.table_terms import inertia_table
 
             return {**table, place: inertia_table(**given)}

@@ -1,9 +1,8 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
 SciPy controls the local error of a step; our tolerance limits the error at the requested times.
-Local errors add up in proportion to the phase. A preliminary integration with few digits therefore
-determines the largest |omega|, the error amplification and the phase, which give the local
-tolerance.
+Local errors add up in proportion to the phase. The local tolerance therefore follows from the
+largest |omega|, the error amplification and the phase of a preliminary integration with few digits.
 """
 
 import math
@@ -25,16 +24,15 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Largest ratio of the error at the end to the local error: in a motion of a few radians, and added
-# for each radian, times the error amplification. Both were measured on random scenes that the
+# Largest ratio of the error at the end to the local error: in a motion of a few radians, and for
+# each further radian, times the error amplification. Both were measured on random scenes that the
 # checks do not use, and increased by half.
 _SUM = {"DOP853": 30.0, "RK45": 90.0, "Radau": 30.0, "LSODA": 90.0}
 _SUM_A_RADIAN = {"DOP853": 0.05, "RK45": 0.15, "Radau": 0.05, "LSODA": 1.2}
-# The ratio that is added for each radian by which the body rotates, if its attitude is requested,
-# because an error of omega changes the attitude until the end.
+# Added for each radian by which the body rotates, if the attitude is requested, because an error of
+# omega changes the attitude until the end.
 _SUM_A_TURN = {"DOP853": 5.5, "RK45": 2.5, "Radau": 0.5, "LSODA": 55.0}
-# The local tolerance compensates for an error amplification up to this value. Beyond it, the error
-# grows in proportion to the amplification, as with every method.
+# Largest error amplification for which the local tolerance compensates.
 _SENSITIVE = 1e3
 # Factor on the error bound for intermediate output, which SciPy interpolates without error control.
 _ROWS = 4.0
@@ -53,17 +51,16 @@ _MOST_GUESSES = 200
 _NODES_PER_RADIAN = 4.0
 _FEWEST_NODES, _MOST_NODES = 30, 20_000
 
-# Work limit, five to ten seconds of Python. Each wave of a torque adds an eighth to the cost of a
-# right-hand side; Radau also solves linear systems.
+# Work limit in right-hand sides, five to ten seconds. Each wave of a torque adds an eighth to the
+# work. Radau also solves linear systems.
 _MOST_EVALUATIONS = 500_000
 _RADAU_SHARE = 2
 
 
 class _Ahead(NamedTuple):
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
-    # Integral over time of the largest coefficient times |omega|, plus the limited phases of the
-    # torque waves (rad).
-    radians: float
+    # Integral of the largest coefficient times |omega| over time, plus limited phases of waves
+    radians: float  # rad
     growth: float  # error amplification until the end, at least 1
     turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
 
@@ -124,8 +121,8 @@ def scipy_method(name: str) -> Integrator:
                 # The step-size control would search long for an error below the torque's rounding.
                 step = max(step, ROUNDING * noise)
             allowed = step * ahead.largest
-            # The step is limited by the fastest wave that can change omega by more than the local
-            # tolerance over the whole time.
+            # The fastest wave that can change omega by more than the local tolerance limits the
+            # step.
             waves_that_count = (f for push, f in _pushes(scene) if push * abs(times[-1]) > allowed)
             fastest = max(waves_that_count, default=0.0)
             longest = _WAVE_STEP / fastest if fastest > 0.0 else math.inf
@@ -144,8 +141,8 @@ def scipy_method(name: str) -> Integrator:
         ended = "complete" if count == len(times) else "overflow"
         if ended == "complete" and is_blurred:
             ended = "sensitive"
-        # SciPy does not report the number of steps. The right-hand sides include those of the
-        # preliminary integration.
+        # SciPy does not report the number of steps. The evaluations include the preliminary
+        # integration.
         return rows_of(times[:count], rows[:count], run.evaluations, len(times), ended)
 
     return solve
@@ -210,7 +207,7 @@ class _Run(Run):
         largest = max(largest, float(sizes.max()))
         radians, phases = self.rate * length * float(np.mean(sizes)), 0.0
         for push, frequency in _pushes(self.scene):
-            # A phase counts at most as the omega that the wave can add, relative to `largest`.
+            # A phase counts at most as the ratio of the omega that the wave can add to `largest`.
             phases += min(frequency * length, push * length / largest if largest > 0.0 else 0.0)
         turned = 0.0
         if self.scene.attitude is not None:

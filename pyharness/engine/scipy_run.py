@@ -28,18 +28,18 @@ RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 # solve_ivp accepts no relative tolerance below 100 times the machine epsilon.
 FINEST_STEP = 2.222e-14
-# A phase of so many radians has hardly a correct digit in binary64. An omega that still grows there
+# Radians; a larger phase has hardly a correct digit in binary64. An omega that still grows there
 # becomes infinite in finite time, and LSODA would not return.
 LARGEST_PHASE = 1e13
-# LSODA squares the time span to choose its first step, and does not advance if the square
+# LSODA squares the time span (s) to choose its first step, and does not advance if the square
 # underflows, below 1e-150 s.
 _SHORTEST_SPAN = 2.0**-300
-# LSODA of older versions of SciPy has one state for all threads, and raises an exception if two
-# integrations alternate. The lock is reentrant, so that a torque may integrate too.
+# LSODA in older versions of SciPy has one state for all threads, and fails if two integrations
+# alternate. The lock is reentrant, so that a torque may integrate too.
 _ALONE = {"LSODA": threading.RLock()}
 # SciPy's longest step over those of the series; LSODA evaluates the torque only once in a step.
 _PART = 0.5
-# Stiff equations, which need more steps of the series, are left to SciPy's implicit methods.
+# Stiff equations need more steps of the series; they are not checked.
 _MOST_STEPS = 20_000
 # Largest ratio of the steps of the series in a span.
 _RATIO = 8.0
@@ -49,14 +49,14 @@ _FINEST = 1e-13  # tolerance of the steps that end at switches
 
 
 class NoNumberError(Exception):
-    """The exception for an integration that can't continue, as with a NaN in Radau."""
+    """The exception for an integration that can't continue, such as a NaN in Radau."""
 
 
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
     The limit is `most` right-hand sides. The state begins with omega (rad/s). The phase (rad) is
-    `rate`, the largest Euler coefficient, times omega and time.
+    the largest Euler coefficient, `rate`, times omega and time.
     """
 
     def __init__(
@@ -182,7 +182,7 @@ class Span(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """The rows of a series, and spans with limits on SciPy's steps."""
+    """The rows of a Taylor series, and spans with limits on SciPy's steps."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]
@@ -238,7 +238,7 @@ def _spans(lengths: dict[float, float], bounds: Sequence[float]) -> list[Span]:
     least, most, last = math.inf, 0.0, 0.0
     for time, length in lengths.items():
         if time in bounds:
-            # The step ends at a bound, and its length is no measure of the torque.
+            # The length of a step that ends at a bound is no measure of the torque.
             spans.append(Span(time, _PART * (length if least == math.inf else least)))
             least, most, last = math.inf, 0.0, 0.0
             continue

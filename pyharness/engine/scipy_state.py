@@ -37,28 +37,28 @@ _FIRST = {"DOP853": 4.0, "RK45": 8.0, "Radau": 4.0, "LSODA": 25.0}
 # Smallest and largest ratio of a local tolerance to the next.
 _RATIO, _LARGEST_RATIO = 8.0, 1e3
 # The estimated error of the second of two integrations is their difference, divided by the ratio of
-# the local tolerances, times _SAFETY; but at least this fraction of the difference. The errors of
-# LSODA, which also changes its order, are not in proportion to the local tolerances, and neither
-# are those under a torque that jumps, as an opaque function may.
+# the local tolerances, times _SAFETY; but at least this fraction of the difference. With LSODA,
+# which also changes its order, or a torque that jumps, errors are not in proportion to the local
+# tolerances.
 _SAFETY = 4.0
 _LEAST_FRACTION = {"DOP853": 0.25, "RK45": 0.25, "Radau": 0.25, "LSODA": 1.0}
-# The longest step is the time span over this number, which grows with each integration, so that no
-# two pass a short pulse or sample a wave in the same way.
+# The longest step is the time span over a number that grows with each integration, so that no two
+# integrations pass a short pulse or sample a wave in the same way.
 _FEWEST_STEPS, _MORE_STEPS = 32, 7
 _WITHIN = np.array([0.2, 0.5, 0.8])  # parts of a step at which interpolants are compared
 _COARSE = 1e-3
-# The preliminary integration of a body at rest is repeated if omega is smaller than expected by
-# this factor.
+# The preliminary integration of a body at rest is repeated if omega is less than the expectation
+# over this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
 # Steps that do not change the time; LSODA would not return.
 _MOST_STUCK = 50
-# Omega grows without bound if it has grown by this factor when the phase is too large.
+# Omega counts as unbounded if it has grown by this factor when the phase is too large.
 _UNBOUNDED = 1e3
 # Largest difference from the series of a recorded torque, in tolerances.
 _AGREEMENT = 0.5
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
-# A jump of the rates is looked for so far ahead, over the time span, by so many halvings.
+# A jump of the rates is searched this far ahead, over the time span, by so many halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
@@ -89,9 +89,9 @@ def solve_state(
     work limit in right-hand sides of a body without torque. With `with_steps`, `sol` has the steps
     under an opaque torque, by SciPy's interpolants.
 
-    The ending is ``overflow`` if omega grows without bound or the torque is singular. It is
-    ``unchecked`` if the series of a recorded torque does not reach the end. Raise InputError if an
-    opaque function fails, the attitude is missing, the tolerance can't be met, or the work limit is
+    The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
+    if the series of a recorded torque does not reach the end. Raise InputError if an opaque
+    function fails, the attitude is missing, the tolerance can't be met, or the work limit is
     exceeded.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
@@ -123,7 +123,7 @@ def solve_state(
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return the estimated smallest tolerance until `time` (s); 0 if that is not reached."""
+    """Return the estimated smallest tolerance until `time` (s); 0 if `time` is not reached."""
     run = _StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
@@ -199,7 +199,7 @@ def _differences(before: _Rows, after: _Rows, n: int) -> Array:
     if before.is_complete and after.is_complete:
         largest = min(before.largest, after.largest)
     else:
-        # The largest omega until the end does not exist.
+        # Omega becomes infinite at the end; only its rows give a finite scale.
         largest = _largest_of(second)
     apart = np.abs(first[:, :3] - second[:, :3]).max(axis=1, initial=0.0)
     found: Array = np.divide(apart, largest, out=np.zeros(n), where=apart > 0.0)
@@ -265,7 +265,7 @@ class _StateRun(Run):
                     "in N m",
                     float(time),
                 ) from error
-            # A larger omega may be about to become infinite.
+            # Above this omega, NaN may be due to an overflow.
             if any(map(math.isnan, found)) and max(map(abs, state[:3])) <= _ORDINARY:
                 self._undefined = float(time)
             return found
@@ -273,13 +273,12 @@ class _StateRun(Run):
         return between if self.is_smooth else guarded
 
     def _rates(self, time: float, state: Sequence[float]) -> Array:
-        """Return the right-hand side without warnings."""
         self.evaluations += 1
         with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
             return np.array(self.slopes(time, state))
 
     def _check_memory(self) -> None:
-        """Raise InputError if an opaque function does not return the same for the same state."""
+        """Raise InputError if an opaque function returns different values for the same state."""
         self._undefined = None
         first = self._rates(0.0, self.start)
         self._rates(0.5 * self.end, [1.5 * each for each in self.start])

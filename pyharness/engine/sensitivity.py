@@ -21,12 +21,12 @@ from pyharness.model.trajectory import ROUNDING, WITH_ALL_ROWS
 # the tolerance. The computed amplification may be too small by a factor of three, because of the
 # norm and of the number of perturbations.
 _SHARE = 0.3
-# Relative error of a closed form; tests/engine/test_closed_form.py checks it. Up to the
-# amplification, the errors of double-double arithmetic, and so those of the phase, are negligible.
+# Relative error of a closed form (checked by tests/engine/test_closed_form.py); amplification up to
+# which the errors of double-double arithmetic, and so of the phase, are negligible.
 _CLOSED_FORM_ERROR = 16.0 * ROUNDING
 _NEGLIGIBLE_TO = 2.0**44
-# Settings of a Taylor series that supplies only the error amplification: a large tolerance, and a
-# work limit of a twentieth of a second.
+# Tolerance, and work limit (a twentieth of a second), of a Taylor series that supplies only the
+# error amplification.
 _COARSE = 1e-3
 _LITTLE_WORK = 5e-3
 
@@ -41,10 +41,9 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    Each term has a relative rounding error, which is large against their small sum. The result is
-    the omega that each term would cause alone until `t_end` (s), with rounding in each of `steps`
-    steps, over `scale` (rad/s). The default scale is the initial |omega|, or the omega that the
-    whole torque causes. The result is 0 if terms do not nearly cancel, or depend on the state.
+    It is the omega that each term would cause alone until `t_end` (s), with rounding in each of
+    `steps` steps, over `scale` (rad/s): by default the initial |omega|, or the omega that the whole
+    torque causes. It is 0 if terms do not nearly cancel, or depend on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -81,8 +80,7 @@ def closed_form_estimate(
         return None, None
     error = ROUNDING * amplified * (1.0 + noise) + _CLOSED_FORM_ERROR
     if isinstance(scene, PrincipalScene) and scene.attitude is not None:
-        # The initial omega was rounded after the rotation to principal axes, which causes an error
-        # of the angle that grows with time.
+        # Rounding the initial omega about principal axes causes an angle that grows with time.
         error += ROUNDING * max(map(abs, omega0)) * abs(t_end)
     return error, growth
 

@@ -9,11 +9,11 @@ from pyharness.model.errors import TimedError
 from pyharness.model.tape import OMEGA, WITH_DERIVATIVE, Tape, live_slots, slot_values
 from pyharness.model.tape_arrays import ARRAYS
 
-# An operand vanishes if its ratios to its initial value and to its value before the last step,
-# which is very short, are at most these.
+# An operand counts as 0 if its ratios to its initial value, and to its value before the last, very
+# short step, are at most these.
 _NEARLY_ZERO = 1e-6
 _SHRUNK = 0.9
-# Omega grows without bound if its ratio to the initial omega is larger.
+# Omega counts as unbounded if its ratio to the initial omega is larger.
 _UNBOUNDED = 1e6
 
 
@@ -58,7 +58,7 @@ def undefined_operation(
 
     live = live_slots(tape, lambda slot: None, lambda slot: bool(values[slot]))
     derivatives = {each.operands[1] for each in tape.operations if each.kind in WITH_DERIVATIVE}
-    # What is undefined may be a branch that begins here.
+    # The operation may belong to a branch that begins here.
     for slot in [*live, *range(tape.n_inputs, tape.n_inputs + len(tape.operations))]:
         kind, operands, *_ = tape.operations[slot - tape.n_inputs]
         if slot in derivatives:

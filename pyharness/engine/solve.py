@@ -75,7 +75,8 @@ def solve(
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
-        A name in `pyharness.engine.registry.METHODS`. `auto` uses `dop853` for an opaque torque.
+        A name in `pyharness.engine.registry.METHODS`. `auto` uses closed forms or the Taylor
+        series, and `dop853` for an opaque torque.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
         from 0 on. The default depends on the method, 1e-9 for `auto`. Methods with a fixed step
@@ -83,25 +84,24 @@ def solve(
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool, optional
-        Whether the attitude is computed, from the scene's or (1, 0, 0, 0); by default, if the scene
+        Whether to compute the attitude, from the scene's or (1, 0, 0, 0); by default, if the scene
         has one or its torque needs one. The tolerance also applies to its angle (rad).
     dense_output : bool
-        Whether `sol` of the trajectory is the solution as a function of time between 0 and `times`,
-        to within the tolerance. It is a closed form, or has the steps of the integration: Taylor
-        series, or under an opaque torque those of `dop853` and `lsoda`. Other methods need further
-        integrations, and those with a fixed step have a cubic on each step.
+        Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
+        the tolerance. It is free with closed forms and Taylor series, and under an opaque torque
+        with `dop853` and `lsoda`. Other methods need further integrations; those with a fixed step
+        give a cubic on each step.
     events : callable, Event, or list of these
         Functions with the arguments of a torque, or events of `pyharness.events`, whose roots
         between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are as in
         SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept arrays
         are called with arrays.
     sensitivities : iterable of str
-        Names of parameters. `sensitivities` of the trajectory then has the derivatives of omega and
-        of the quaternion with respect to them. A name may be `omega`, `moments`, `coefficients`,
-        or `inertia` (columns I11, I22, I33, I12, I13, I23). `attitude` means small initial
-        rotations (rad) about the body axes. In `torque.NAME`, NAME is a constant of a scene file's
-        expressions, or a function's keyword argument with a number as its default. For a TorqueLaw,
-        it is `constant`, `rate`, `sines` or `cosines` (four columns per wave: three amplitudes,
+        Parameters by which omega and the quaternion are differentiated: `omega`, `attitude` (small
+        initial rotations about the body axes, rad), `moments`, `coefficients`, `inertia` (columns
+        I11, I22, I33, I12, I13, I23) or `torque.NAME`. NAME is a constant of a scene file's
+        expressions, or a function's keyword argument with a number as default; for a TorqueLaw,
+        `constant`, `rate`, `sines` or `cosines` (four columns per wave: three amplitudes,
         frequency). The method must be `auto`, `taylor` or `closed-form`.
 
     Returns
@@ -221,7 +221,7 @@ def _more_rows(
 
 
 def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene) -> Array:
-    """Return the unknowns at the times, (n, m), of a scene with another number."""
+    """Return the unknowns, shape (n, m), of a scene in which a parameter was changed."""
     found = solve(scene, times, "taylor", _OF_DIFFERENCES, effort=effort, attitude=attitude)
     if len(found.time) < len(times):
         raise InputError(

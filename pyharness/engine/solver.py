@@ -82,12 +82,12 @@ class Solver(BoundKernel[Result]):
     scene : Scene
         The prepared scene.
     plan : Plan
-        The chosen method, and the parts that are computed, with reasons; about principal axes.
+        The chosen method and the computed parts, with reasons, for the scene about principal axes.
     status, error, growth, digits, steps, method
         Reports on this thread's last call, unless it raised an error.
     leaves : str or None
-        What computes the series of a recorded torque: ``built`` (a ready torque's code),
-        ``compiled``, or ``interpreter``, with the reason if compilation was requested; else None.
+        The code for the series of a recorded torque: ``built`` with the package, ``compiled``, or
+        ``interpreter``, with the reason if compilation was requested. None for other torques.
     many : callable
         A function that solves from many initial states in one call.
 
@@ -232,7 +232,7 @@ class Solver(BoundKernel[Result]):
 
     @property
     def steps(self) -> int:
-        """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
+        """Return the steps of the last call; for Gauss collocation, the right-hand sides."""
         return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:
@@ -248,8 +248,7 @@ def _code(chosen: Plan, with_attitude: bool) -> int:
     if chosen.closed_form == "sphere" and not with_attitude:
         return CODES["sphere"]
     if chosen.method == "closed-form" or (with_attitude and chosen.closed_form):
-        # The closed form refuses a perturbation whose square underflows. The kernel then uses the
-        # Taylor series, unless the closed form was requested.
+        # If the closed form was not requested, the Taylor series solves what it refuses.
         return Methods.CLOSED_FORM_OR_TAYLOR if chosen.fallback else CODES["closed-form"]
     return CODES[chosen.method]
 

@@ -234,7 +234,7 @@ class Stepper:
         self._largest = max(self._largest, float(np.abs(self._state[:3]).max()))
         # For a body at rest, a guess of the omega that it reaches.
         scale = self._largest or math.sqrt(np.abs(self._rates()[:3]).max()) or 1.0
-        # The sizes to which errors of own states are relative; guesses from 0 on.
+        # Errors of own states are relative to these sizes; a state that is 0 so far has a guess.
         own_sizes = np.maximum(self._own_sizes, np.abs(self._state[self._n : -3]))
         self._own_sizes = sizes = own_sizes
         if not own_sizes.all():
@@ -282,8 +282,8 @@ class Stepper:
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without later changes by the user.
 
-        It is omega (rad/s), the quaternion if computed, and own states, shape (m,), and has a
-        column for each of several times. Raise InputError for a time outside the step.
+        It is omega (rad/s), the quaternion if computed, and own states, shape (m,), or (m, n) for n
+        times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)
@@ -379,7 +379,7 @@ def _check_three(name: str, values: object) -> tuple[float, ...]:
 
 
 def _copy_fixed(values: Array) -> Array:
-    """Return a read-only copy, because changes of a copy would not change the motion."""
+    """Return a read-only copy: changing it would not change the motion."""
     found = values.copy()
     found.setflags(write=False)
     return found

@@ -62,9 +62,9 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return steps in another unit of time, `factor` times shorter, or about other axes.
+    """Return steps in a unit of time that is `factor` times shorter, or about other axes.
 
-    `states` transforms rows of omega, with the attitude if there is one.
+    `states` transforms rows of the state.
     """
     if sol is None or not isinstance(sol.states, Pieces):
         return None

@@ -1,4 +1,4 @@
-"""The switches of a recorded torque in words: which one slides, or is touched, and when."""
+"""Messages about switches (jumps) of a recorded torque that end or spoil an integration."""
 
 import re
 
@@ -16,12 +16,12 @@ _TOUCHED = (
     "whether it changes"
 )
 _SIMPLE = re.compile(r"\w+(\([^()]*\))?")  # a name, or a function of something simple
-# What `solve` replaces by the text of a switch, because the tape of a method has other axes.
+# `solve` replaces it by the formula of the switch, because the tape of a method has other axes.
 _NUMBER = re.compile(r"\[switch (\d+)\]")
 
 
 def reason_of(ended: str, time: float, number: int) -> str | None:
-    """Return why an integration ended at switch `number` of the tape, from 1; 0 stands for none."""
+    """Return why an integration ended at switch `number` of the tape, from 1; 0 for none."""
     if ended != "sliding" and not (ended == "sensitive" and number):
         return None
     message = str(TimedError(SLIDING if ended == "sliding" else _TOUCHED, time))
@@ -29,7 +29,7 @@ def reason_of(ended: str, time: float, number: int) -> str | None:
 
 
 def with_text(reason: str | None, scene: Scene) -> str | None:
-    """Return a reason with the operand of its switch in the scene's own axes and names."""
+    """Return a reason with the formula of its switch in the scene's own axes and names."""
     torque = scene.torque
     found = _NUMBER.search(reason or "")
     if reason is None or found is None:

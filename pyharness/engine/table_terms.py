@@ -22,8 +22,8 @@ from pyharness.model.values import Numbers, Triple, converted, finite, number_li
 _INTERPOLATIONS = ("held", "linear", "cubic")
 _MOST_TIMES, _MOST_PULSES = 1_000_000, 10_000
 _LARGEST_TIME = 1e300
-# Pulses touch if at most this many spacings of floats are between the end of one and the start of
-# the next, because the sum of a start and a duration is rounded.
+# Pulses touch if the gap is at most this many spacings of floats, because the end of a pulse is
+# rounded.
 _TOUCHING = 4.0
 
 
@@ -143,7 +143,7 @@ def _ascending(where: str, times: Any) -> Array:
 
 
 def _as_array(values: Any) -> Any:
-    """Return a DataFrame or Series as an array; iteration would give the names of columns."""
+    """Return a DataFrame or Series as an array; iteration would give names of columns."""
     return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 

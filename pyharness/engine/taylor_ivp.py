@@ -26,12 +26,12 @@ _MOST_OPERATIONS = 20_000
 _LEAST_RTOL = 100.0 * np.finfo(float).eps
 # The least allowed error that counts, whose reciprocal is finite.
 _LEAST_SCALE = 2.0**-1000
-# In the first step, `solve_ivp` misses the root of an event function that is also 0 at the start,
-# and pairs of roots. Therefore the state changes by this part in the first step, and a step is at
-# most so many times as long as the one before, as in SciPy's methods.
+# `solve_ivp` misses pairs of roots in a step, and in the first step roots of an event function that
+# is 0 at the start. Therefore the state changes by this part in the first step, and steps grow at
+# most by this factor, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
-_FIRST_PARTS = 1e-12, 1e-2  # limits of the first step, over the step that the tolerances allow
+_FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over that which the tolerances allow
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]
@@ -142,7 +142,7 @@ class Taylor(OdeSolver):  # type: ignore[misc]
             return span
         change = _FIRST_CHANGE * max(1.0, float(np.abs(self.y / scale).max()))
         sizes = np.abs(step.terms[1:] / scale).max(axis=1)
-        # The first term may have half the change. Term k then has 2**-k of it.
+        # The first term may have half the change, term k 2**-k of it.
         with np.errstate(divide="ignore", over="ignore"):
             parts = 0.5 * (change / sizes) ** (1.0 / np.arange(1, len(sizes) + 1))
         first = float(np.clip(parts.min(), *_FIRST_PARTS)) * abs(step.h)

@@ -30,7 +30,7 @@ KINDS: dict[str, Function] = {
         *(table, pulses),
     )
 }
-# The arguments that may depend on time, and the axes of their components.
+# The axes of the arguments that may depend on time.
 _FRAMES = {"motor": "body", "field": "space", "torque": "space"}
 _LAW = ("constant", "rate", "sines", "cosines")
 

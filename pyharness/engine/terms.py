@@ -61,17 +61,16 @@ def damping(matrix: MatrixLike) -> StateTorque:
 def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTorque:
     """Return a torque of drag that is an odd polynomial of omega.
 
-    It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is that of
-    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is no
-    polynomial, and is not smooth at 0. Away from 0, a Python function with ``numpy.sqrt`` can
-    describe it.
+    It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is the sum of
+    -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is not
+    smooth at 0; away from 0, it can be a Python function with ``numpy.sqrt``.
 
     Parameters
     ----------
     coefficients : iterable of numbers, three numbers, or three rows of three numbers
         1 to 50 coefficients C_0, C_1, ..., in N m (s/rad)^(2n+1), in the forms of `damping`.
     per_axis : bool
-        Whether the powers are those of the components, not of |omega|.
+        Whether to take powers of the components, not of |omega|.
 
     Returns
     -------
@@ -117,8 +116,8 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 def rate_control(gain: MatrixLike, target: Numbers = (0.0, 0.0, 0.0)) -> StateTorque:
     """Return the torque -K (omega - target), which controls the angular velocity.
 
-    Acting alone, with a positive definite K, it drives any nearby omega to the target, if that is 0
-    or along a principal axis.
+    Acting alone, with a positive definite K, it drives any nearby omega to a target that is 0 or
+    along a principal axis.
 
     Parameters
     ----------
@@ -163,8 +162,8 @@ def attitude_control(
     """Return the torque -2 k e0 e - K omega, which rotates the body to a target attitude.
 
     For the attitude q, the error quaternion (e0, e) is target* q, with the conjugate target*. A
-    quaternion and its negative have the same torque, so that the body does not unwind (rotate the
-    long way round). For a number k, the first term is -k sin(angle) about the axis of the error,
+    quaternion and its negative have the same torque, so that the body does not rotate the long way
+    round (unwinding). For a number k, the first term is -k sin(angle) about the axis of the error,
     with the potential k (1 - cos(angle)); the equilibrium at 180 degrees is unstable.
 
     Parameters
@@ -220,9 +219,8 @@ def wheels(
     The motors exert u on the wheels: h' = u. Without motors, h is constant, and the body is a
     gyrostat.
 
-    Either h is the absolute momentum of the wheels about their axes, and the inertia of the body
-    excludes their moments about these axes. Or h is relative to the body, and the inertia includes
-    these moments.
+    If h is the absolute momentum of the wheels about their axes, the inertia of the body must
+    exclude their moments about these axes; if h is relative to the body, include them.
 
     Parameters
     ----------

@@ -1,7 +1,4 @@
-"""Reading of the files that `Trajectory.save` writes.
-
-Files may come from anyone. Therefore every value is checked.
-"""
+"""Reading of the files that `Trajectory.save` writes; every value is checked."""
 
 import itertools
 import math
@@ -41,7 +38,7 @@ _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
-    All numbers, and the results of its methods, are bit-for-bit the same. A torque that scene files
+    All numbers, and the results of methods, are bit-for-bit the same. A torque that scene files
     can't describe becomes a recorded torque.
 
     Parameters
@@ -149,7 +146,7 @@ def _events(
     _require(sum(lengths) == n and np.isfinite(times).all())
     ends = list(itertools.accumulate(lengths))
     parts = [slice(end - length, end) for end, length in zip(ends, lengths, strict=True)]
-    # The motion begins at time 0, and a terminal event may be before the first row.
+    # Integration begins at time 0; a terminal event may be before the first row.
     away = rows[-1] - rows[0] if len(rows) > 1 else rows.sum() or times.sum()
     for part in parts:
         _require((np.diff(math.copysign(1.0, away) * times[part]) >= 0.0).all())

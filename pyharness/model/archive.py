@@ -1,8 +1,8 @@
 """Archives of `numpy.savez` with a digest, for trajectories and ensembles.
 
 The array `header` is JSON with the kind of the content and its schema number, and `sha256` is a
-digest of all other arrays. Files may come from anyone. Therefore nothing is executed or unpickled,
-and no array is larger than the file.
+digest of all other arrays. Files are not trusted: nothing is executed or unpickled, and no array is
+larger than the file.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ _OTHERS = (".csv", ".json", ".md", ".toml", ".tsv", ".txt", ".xlsx", ".xml")
 
 
 def checked_path(where: str, path: object) -> str:
-    """Return the path as text, a new one without an ending with .npz; or raise InputError."""
+    """Return the path as text, with .npz if it is new and has no ending; or raise InputError."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"{where}: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -35,7 +35,7 @@ def checked_path(where: str, path: object) -> str:
 
 
 def checked_file(where: str, path: object) -> str:
-    """Return a path that can be written, as `checked_path`; or raise InputError."""
+    """Return `checked_path`; raise InputError for an unwritable path or a text file's ending."""
     name = checked_path(where, path)
     ending = os.path.splitext(name)[1].lower()
     if ending in _OTHERS:
@@ -71,10 +71,10 @@ def add_entry(digest: Any, name: str, data: bytes | memoryview) -> None:
 def read_archive(
     where: str, name: str, kinds: tuple[str, str], known: Iterable[str], written: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arrays and the header of an archive; raise InputError with `where` before it.
+    """Return the arrays and the header of an archive, or raise InputError, beginning with `where`.
 
-    `kinds` are the kind in the header and a noun for it, `known` the arrays that it may have, and
-    `written` says who wrote it.
+    `kinds` are the kind in the header and its noun in messages, `known` are the allowed arrays, and
+    `written` describes a valid file.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)
@@ -85,7 +85,7 @@ def read_archive(
             raise ValueError("another kind of file")
     except Exception:  # zipfile, json and NumPy raise errors of many types
         raise damaged from None
-    # Checked before the arrays, which may be others in another version.
+    # Checked before the arrays, which may differ in another version.
     kind = f"{kinds[1]} file"
     check_schema(where, kind, header.get("schema"), "take a version that reads it")
     try:
@@ -104,7 +104,7 @@ def read_archive(
 def _arrays(
     content: bytes, known: Iterable[str], names: Sequence[str] = ()
 ) -> tuple[dict[str, Any], str]:
-    """Return the arrays with these names, by default all, and their digest without `DIGEST`."""
+    """Return the arrays with these names, by default all, and the digest of all but `DIGEST`."""
     found, digest = {}, hashlib.sha256()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         allowed = {f"{name}.npy" for name in ("header", DIGEST, *known)}

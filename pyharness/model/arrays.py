@@ -28,8 +28,8 @@ FROM_ZERO: Rule = (lambda x: x >= 0.0, "a number from 0")
 def rows_of(where: str, values: object, *shape: int | str, rule: Rule | None = None) -> Array:
     """Return user values as a float array of rows, or raise InputError; a single row is allowed.
 
-    `shape` is the shape of a row, in which a letter, such as "k", stands for any length. `rule`
-    tests each number, and has a phrase for the allowed ones.
+    `shape` is the shape of a row, in which a letter, such as "k", is any length. `rule` tests each
+    number.
     """
     if type(values) is float and not shape and rule is None:
         return np.array([values])
@@ -94,7 +94,7 @@ def check_rows(name: str, array: Array, n: int) -> None:
 
 
 def row_of(array: Array, i: int) -> Any:
-    """Return the row of body `i` (from 0), or the shared row."""
+    """Return the row of body `i`, from 0, or the shared row."""
     return array[0 if len(array) == 1 else i]
 
 

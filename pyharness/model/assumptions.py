@@ -1,4 +1,4 @@
-"""Values that this edition supplies where the thesis gives nothing or can be read in two ways."""
+"""Assumptions: values that we supply where the thesis has none or can be read in two ways."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -23,7 +23,7 @@ def assumptions() -> list[dict[str, Any]]:
 
 
 def open_starts() -> dict[int, str]:
-    """Return the cases for which the thesis gives no omega(0), each with whose we take."""
+    """Return the cases for which the thesis gives no omega(0), with the source of our value."""
     cases = facts("cases")["case"]
     return {each["number"]: each["assumed_omega"] for each in cases if "assumed_omega" in each}
 
@@ -31,7 +31,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
 
-    A scene that is no case, and a value that the user supplies, depend on none.
+    There are none for a scene that is no case, or a value that the user supplies.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -59,7 +59,7 @@ def _is_in(each: dict[str, Any], listing: Listing) -> bool:
 
 
 def mark(scene: Scene, listing: Listing) -> str:
-    """Return `MARK` if a run of a listing depends on an assumption about its cards, else ""."""
+    """Return `MARK` if a run depends on an assumption about the cards of its listing, else ""."""
     return MARK if any(each["on"] == "listing" for each in assumed(scene, [listing])) else ""
 
 
@@ -69,7 +69,7 @@ def case_mark(case: int) -> str:
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return for JSON the assumptions on which runs depend, each with the runs' cases."""
+    """Return for JSON the assumptions on which runs depend, each with its cases."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return for JSON the assumptions of claims alone, without a case."""
+    """Return for JSON the assumptions on which claims alone depend."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 
@@ -91,7 +91,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return the line that explains the marks of runs; none without an assumption."""
+    """Return the line that explains the marks of runs; an empty list if there are none."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -27,12 +27,12 @@ class Rotation(Protocol):
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 SEQUENCES = ("3-1-3", "3-2-1")
 FORMS = ("quaternion", *SEQUENCES, "matrix")
-NEAR_ONE = 1e-12  # a norm that differs from 1 by at most this was intended to be 1
+NEAR_ONE = 1e-12  # largest deviation of a norm from 1 that counts as rounding
 _ROUNDED = 2.0**-51  # deviation of a norm from 1 that normalisation cannot reduce
 
 
 def scalar_first(values: object) -> Any:
-    """Return the quaternions of a SciPy `Rotation`, scalar first, and any other value unchanged."""
+    """Return the quaternions of a SciPy `Rotation`, scalar first, or any other value unchanged."""
     as_quat = getattr(values, "as_quat", None)
     return values if as_quat is None else np.asarray(as_quat())[..., [3, 0, 1, 2]]
 
@@ -167,7 +167,7 @@ def quaternions_of_axes(axes: Array) -> Array:
 
 def rotated(vectors: Array, matrix: Array) -> Array:
     """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
-    # The fixed order of the sums gives bit-for-bit the same products for any n, and as in C.
+    # In this order, the sums have the same bits for any n, and as in C.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
         [(x * matrix[..., i, 0] + y * matrix[..., i, 1]) + z * matrix[..., i, 2] for i in range(3)],
@@ -176,7 +176,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes of the matrix's axes from those of the principal axes, (4,) or (n, 4)."""
+    """Return attitudes, (4,) or (n, 4), of the axes that `turn` rotates to the principal axes."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

@@ -33,7 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw the paths in space of the body axes (ends: dots) and omega's direction (end: cross)."""
+    """Draw the paths in space of the body axes (to dots) and of omega's direction (to a cross)."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -70,7 +70,7 @@ class _Motion(NamedTuple):
 
 
 def check_animation(path: object, moments: Triple | Changing | None) -> str:
-    """Return `path` as text; raise InputError unless a brick with `moments` can be drawn there."""
+    """Return `path` as text; raise InputError unless it can show a brick with `moments`."""
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"animate: {kind_of(path)}; allowed: a path, as text or a Path")
     name = os.fsdecode(path)
@@ -138,7 +138,7 @@ def _ends(found: "Trajectory") -> tuple[float, float]:
     """Return the first and the last time (s), in the order of the rows."""
     ends = found.time[[0, -1]].tolist() if len(found.time) else [0.0, 0.0]
     if found.sol is not None:
-        # Rows at negative times alone end the motion from 0 backwards.
+        # If the rows are all before 0, the motion runs backward from 0.
         ends = [found.sol.t_min, found.sol.t_max][:: -1 if ends[1] < 0.0 else 1]
     if ends[0] == ends[1]:
         raise InputError(

@@ -12,10 +12,10 @@ MARKS = {
 
 @dataclass(frozen=True)
 class Basis:
-    """The reason why a limit has its value, defined once, beside the limit.
+    """The basis of a limit.
 
-    `mark` is a key of `MARKS`, the weakest if parts differ. `limit` states the limit, and `source`
-    the theorem, derivation or command, in Markdown.
+    `mark` is a key of `MARKS`, that of the weakest part. `limit` states the limit, and `source` the
+    theorem, derivation or command, in Markdown.
     """
 
     mark: str

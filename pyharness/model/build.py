@@ -74,9 +74,9 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return the installation, the machine and versions, for a bug report; None if unknown.
+    """Return the installation, the machine and versions for a bug report, with None for unknown.
 
-    "arithmetic" says which option or library changes the kernels' arithmetic; if none does, ``as
+    "arithmetic" names the option or library that changes the kernels' arithmetic, or is ``as
     written``. "environment" has the variables of `INFLUENCES` that are set.
     """
     has_affinity = hasattr(os, "sched_getaffinity")
@@ -105,7 +105,7 @@ def _installer() -> str:
 
 
 def _ask_kernels() -> dict[str, str | None]:
-    """Return the best instruction set of both build and processor, and the faults of arithmetic."""
+    """Return the best instruction set of build and processor, and the faults of arithmetic."""
     try:
         from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:

@@ -1,4 +1,4 @@
-"""Inertias that are polynomials of time, and the derivative of omega of bodies that have them."""
+"""Inertias that are polynomials of time, and Euler's equations with a changing inertia."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,14 +15,14 @@ from pyharness.model.errors import InputError
 from pyharness.model.values import Matrix, Numbers, Triple, finite, number_list, triple
 
 Polynomial = tuple[float, ...]  # coefficients in ascending powers of time
-# Largest number of coefficients. Higher powers of time have no physical use, and lose digits.
+# Largest number of coefficients; higher powers of time lose digits.
 _MOST = 10
 _POLYNOMIALS = f"allowed: three lists of 1 to {_MOST} numbers"
 _MATRICES = f"allowed: a list of 1 to {_MOST} matrices, each of three rows of three numbers"
 
 
 class Changing:
-    """The base class of inertias that change; its own methods are those of polynomials."""
+    """The base class of inertias that change with time, with the methods of polynomials."""
 
     if TYPE_CHECKING:
 
@@ -83,7 +83,7 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s) around 0 between which the matrix is positive definite, or infinities."""
+        """The times (s) around 0 between which the inertia is positive definite, or infinities."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -111,9 +111,9 @@ class ChangingMoments(Changing):
     """Principal moments of inertia that are polynomials of time.
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
-    in the body. Two assumptions apply: mass that moves within the body has no angular momentum
-    relative to the body axes, and mass that leaves has none about the centre of mass. With the
-    moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
+    in the body. With the moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
+    This assumes that mass that moves has no angular momentum relative to the body axes, and mass
+    that leaves has none about the centre of mass.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class ChangingInertia(Changing):
 
 
 def _items(where: str, values: object, most: int, allowed: str) -> list[Any]:
-    # No more than `most` elements are read, so that an endless generator is refused.
+    # Only `most` elements are read, so that an endless generator is refused.
     return [x for x, _ in zip(number_list(where, values, allowed), range(most), strict=False)]
 
 
@@ -257,7 +257,6 @@ def _polynomial(where: str, values: object) -> Polynomial:
 
 
 def _value(polynomial: Polynomial, time_powers: Sequence[Any]) -> Any:
-    """Return the value of a polynomial from the powers of the time."""
     total: Any = 0.0
     for coefficient, power in zip(polynomial, time_powers, strict=False):
         if coefficient:
@@ -266,7 +265,6 @@ def _value(polynomial: Polynomial, time_powers: Sequence[Any]) -> Any:
 
 
 def _derivative(polynomial: Polynomial) -> Polynomial:
-    """Return the derivative of a polynomial with respect to time."""
     return tuple(n * c for n, c in enumerate(polynomial))[1:]
 
 
@@ -275,7 +273,7 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))
-        # Differences of nearly equal moments, unlike of products, have no rounding errors.
+        # Differences of nearly equal moments have no rounding errors; those of products would.
         products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
         return [
             (torque[k] - rate[k][k] * omega[k] + products[k]) / moment

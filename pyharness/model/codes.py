@@ -61,8 +61,8 @@ class Series:
     MOST_ORDER = 24
     LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
     SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
-    # Radians of the fastest perturbation. In a longer motion, variations that are not precise lose
-    # their phase, and their growth, the error amplification, is too small.
+    # Radians of the fastest perturbation. In a longer motion, inaccurate perturbations lose their
+    # phase, and their computed growth, the error amplification, is too small.
     LONG = 5000.0
 
 
@@ -87,7 +87,7 @@ class Storage:
 
 
 class Operations:
-    """The operations of a tape, as the kernel knows them."""
+    """The integers of the operations of a tape."""
 
     LINEAR = 1  # a constant plus a sum of coefficients times slots
     PRODUCT = 2
@@ -104,6 +104,5 @@ class Operations:
     # The result is constant in a step.
     SWITCH = 12  # 1 where the operand is positive, else 0
     FLOOR = 13
-    # One of two combinations of one slot, numbers operand 2 and the next: the first where operand 1
-    # is not 0.
+    # The linear combination number operand 2 where operand 1 is not 0, else the next one.
     SELECT = 14

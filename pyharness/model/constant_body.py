@@ -1,4 +1,4 @@
-"""Scenes with a changing inertia or a torque about axes of space, as scenes of another torque."""
+"""Conversion of a changing inertia, or a torque about axes of space, to a recorded torque."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,10 +11,10 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene with the same solution, of a constant body and a torque about its axes.
+    """Return a scene with the same solution, a constant body and a torque about its axes.
 
-    Where the inertia changes, it has A = B = C = 0, and omega' as its torque. With the inertia I
-    and the torque N, omega' follows from I omega' = N - I' omega - omega x (I omega).
+    If the inertia I changes, the result has A = B = C = 0 and the torque omega', which follows from
+    I omega' = N - I' omega - omega x (I omega) with the torque N.
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:

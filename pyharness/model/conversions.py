@@ -52,8 +52,7 @@ class _Quantity(NamedTuple):
 class Conversions:
     """A base class of trajectories: fields, mechanical quantities and conversions.
 
-    A changing inertia is taken at the time of the row. Where moments of inertia are needed, a body
-    with coefficients raises InputError.
+    A changing inertia is evaluated at the time of each row.
     """
 
     time: Array
@@ -169,7 +168,7 @@ class Conversions:
             if torque.in_space:
                 omega = turned_to_space(self._attitudes(), omega)
         else:
-            # A torque that does not depend on the attitude gets any.
+            # A torque that ignores the attitude gets any.
             needed = torque.needs_attitude
             attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
             own = np.zeros((len(self.time), 0)) if self.own is None else self.own
@@ -182,10 +181,10 @@ class Conversions:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        It is the change of the kinetic energy, without the work of the motors of the ready term
-        `wheels` on the wheels. The formula is (omega - omega0) . I (omega + omega0) / 2. Unlike a
-        difference of energies, it loses no digits where omega has changed little. Its error is that
-        of omega times the angular momentum.
+        It is the change of the kinetic energy, computed as (omega - omega0) . I (omega + omega0)/2,
+        which loses no digits where omega has changed little. Its error is the error of omega times
+        the angular momentum. The work that the motors of `pyharness.torques.wheels` do on the
+        wheels is not included.
 
         Returns
         -------
@@ -218,8 +217,8 @@ class Conversions:
         if isinstance(moments, Changing):
             return moments.momentum(self.time, omega)
         axes = np.eye(3) if self.axes is None else self.axes
-        # The rounding of a matrix product may depend on the order of the elements in memory, which
-        # a file does not preserve in full.
+        # The rounding of a matrix product may depend on the order in memory, which a file may not
+        # preserve.
         ordered = np.ascontiguousarray(omega)
         momentum: Array = ((ordered @ axes) * np.array(moments)) @ axes.T
         return momentum
@@ -366,9 +365,8 @@ class Conversions:
     def animate(self, path: str | os.PathLike[str]) -> None:
         """Write an animation of a brick that has the body's moments, and moves as the body.
 
-        Nothing is solved again. With dense output, the frames are 0.05 s apart; a motion shorter
-        than 2 s is stretched to 2 s, and one longer than 10 s is compressed to 10 s. Without dense
-        output, each of these frames shows the nearest row.
+        The frames are 0.05 s apart. A motion shorter than 2 s is stretched to 2 s, and one longer
+        than 10 s compressed to 10 s. Without dense output, each frame shows the nearest row.
 
         Parameters
         ----------
@@ -397,10 +395,10 @@ class Conversions:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
-        The restored numbers are bit-for-bit the same. The file is written completely or not at all.
-        Its format is that of `numpy.savez`, with an array for each attribute. The array `scene` is
-        the text of a scene file; `header` has other attributes and the operations of a recorded
-        torque in JSON.
+        The restored numbers are bit-for-bit the same. The file is written completely or not at all,
+        in the format of `numpy.savez`, with an array for each attribute. The array `scene` is the
+        text of a scene file; `header` has other attributes, and the operations of a recorded
+        torque, in JSON.
 
         Parameters
         ----------

@@ -1,7 +1,6 @@
 """Dense output: the solution as a function of time, by polynomials through Chebyshev points.
 
-The formulas are in Trefethen 2013, Approximation Theory and Approximation Practice, chapters 2 to
-5.
+Formulas: Trefethen 2013, Approximation Theory and Approximation Practice, chapters 2 to 5.
 """
 
 from collections.abc import Callable
@@ -41,13 +40,11 @@ def nodes(low: Array, high: Array, at: Array) -> Array:
     return found
 
 
-# Number of nodes of a polynomial.
-NODES = 17
+NODES = 17  # of a polynomial
 POINTS = points(NODES)
 TO_COEFFICIENTS = to_coefficients(NODES)
-# Number of times that are evaluated together; it limits the memory.
-_BLOCK = 20_000
-_ROUNDED = 4.0  # units in the last place by which a time such as n*dt may be beyond an end
+_BLOCK = 20_000  # times that are evaluated together; limits the memory
+_ROUNDED = 4.0  # units in the last place by which a time such as n*dt may exceed an end
 # Weights of the barycentric formula.
 _WEIGHTS: Array = np.where(np.arange(NODES) % 2, -1.0, 1.0)
 _WEIGHTS[[0, -1]] /= 2.0
@@ -88,10 +85,10 @@ class Pieces:
 
 
 def sizes_of(largest: Array, n_own: int) -> Array:
-    """Return the sizes to which errors are relative, from the largest value of each unknown.
+    """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    They are the largest component of omega, 1 for the quaternion, and the own sizes of own states.
-    The shape is that of `largest`, (..., m).
+    They are the largest component of omega for all its components, 1 for the quaternion, and the
+    own value for each own state; 1 in place of 0. Shapes are (..., m).
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)

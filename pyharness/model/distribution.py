@@ -7,7 +7,7 @@ from pyharness.model.errors import InputError, kind_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# On the package index, the name `pyharness` belongs to another package.
+# The name `pyharness` belongs to another package on PyPI.
 DISTRIBUTION = "rigid-body-harness"
 
 

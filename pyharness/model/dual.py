@@ -9,8 +9,8 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
-# Factors on the limit of operations of a recorded torque: _MORE for a tape that no kernel reads,
-# _FEWER for one that a kernel reads, whose memory is proportional to their number.
+# Factors on the limit of operations of a recorded torque: for a tape that no kernel reads, and for
+# one that a kernel reads, with memory in proportion.
 _MORE, _FEWER = 100, 10
 
 
@@ -72,10 +72,7 @@ def dual(value: Any, count: int) -> Dual:
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape with its outputs, then the derivatives of each by the inputs in `slots`.
-
-    Forward differentiation is exact.
-    """
+    """Return a tape with its outputs, then the derivatives of each by the inputs in `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])
@@ -106,9 +103,9 @@ def of_duals(
     slope: Callable[[Any, Any], Any],
     symbolic: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
-    """Return a function of numbers and dual numbers; `slope` is of the argument and the value.
+    """Return a function of numbers and dual numbers, from its derivative `slope`(argument, value).
 
-    The function of the values of dual numbers is `symbolic`, or the same.
+    For the values of dual numbers, `symbolic` replaces `function` if not None.
     """
 
     def called(x: Any) -> Any:

@@ -14,8 +14,8 @@ _SLACK = 2.0  # safety factor on the estimated effort, which may be too low
 _ROUNDING = 1.0 + 1e-9  # tolerates the rounding of an effort that a message suggested
 _UNFORESEEN = 10.0  # factor on the present effort if the needed effort is not estimated
 # By implementation: the largest number of steps without waves of the torque (some 30 s for the
-# slowest program), and the work for one wave relative to such a step. "another word" is a Python
-# program in another arithmetic than binary64; "binary32" and "binary128" are compiled programs.
+# slowest program), and the work for a wave in steps. "another word" is a Python program in another
+# arithmetic than binary64; "binary32" and "binary128" are compiled programs.
 _LIMITS = {
     "fortran": (1e8, 1.0),
     "python": (5e5, 0.05),
@@ -23,7 +23,7 @@ _LIMITS = {
     "binary32": (2e5, 0.1),
     "binary128": (2e5, 10.0),  # our own sine function is slow
 }
-# The largest number of steps of a compiled program on many bodies, summed over the bodies.
+# Largest number of steps of a compiled program, summed over many bodies.
 _MOST_STEPS_OF_ALL = 1e9
 
 
@@ -43,10 +43,7 @@ def advice(instead: str, effort: float, needed: float | None = None) -> str:
 
 
 def suggested(effort: float, needed: float | None = None) -> str:
-    """Return, as text, a factor on the work limit with which a computation should complete.
-
-    It is twice `needed`, or ten times the insufficient `effort`.
-    """
+    """Return as text a sufficient effort: twice `needed`, or ten times the present `effort`."""
     factor = max(_SLACK * needed, effort) if needed else _UNFORESEEN * effort
     factor = min(1e300, factor)
     digit = 10.0 ** (math.floor(math.log10(factor)) - 1)
@@ -62,7 +59,7 @@ def waves(scene: Scene) -> int:
 
 
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
-    """Raise InputError if a program exceeds the work limit of an `implementation`, as "python".
+    """Raise InputError if a program exceeds the work limit of an `implementation`.
 
     The work is the number of steps, increased for each wave of the torque.
     """

@@ -143,7 +143,7 @@ class Ensemble(BatchResult):
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return the result for n bodies and m times of one for n m bodies, without copies."""
+        """Return the result for n m bodies as one for n bodies and m times, without copies."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
@@ -184,7 +184,7 @@ class Ensemble(BatchResult):
         return frame
 
     def _columns(self) -> list[tuple[str, tuple[str, ...], Array]]:
-        """Return unit, names and values, last axis by name, of what is present."""
+        """Return unit, names and values (last axis: names) of each attribute that is not None."""
         given = (
             ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
             ("1", ("q0", "q1", "q2", "q3"), self.attitude),
@@ -231,8 +231,8 @@ class Ensemble(BatchResult):
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the three components of omega of all bodies with matplotlib.
 
-        Over `times`, the median and the band of the middle 90 % of the bodies are drawn; else the
-        distribution of the final values: for each value, the fraction of bodies below it.
+        With `times`, the median and the band of the middle 90 % of the bodies are drawn; else the
+        cumulative distribution of the final values.
 
         Parameters
         ----------

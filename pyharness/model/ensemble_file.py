@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 _KIND = "pyharness ensemble"
 _FILE = "ensemble file"
 _WRITTEN = "a file that Ensemble.save wrote"
-# The length of an omega, an attitude and so on, by attribute.
+# The length of a row, by attribute.
 _WIDTHS = {"omega": 3, "attitude": 4, "estimates": 2}
 _ARRAYS = (*_WIDTHS, "own", "status", "times")
-# Counts of events, -1 without a result, (functions, bodies); times, then states, of all events.
+# Counts of events, (functions, bodies), -1 without a result; times and states of all events.
 _EVENTS = ("event_counts", "t_events", "y_events")
 _SENSITIVITY = "sensitivity_"
 

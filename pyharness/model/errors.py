@@ -2,8 +2,7 @@
 
 from collections.abc import Iterable
 
-# Most characters of a message. Only one that quotes long input is longer, and is shortened.
-_LONGEST = 900
+_LONGEST = 900  # most characters of a message; one that quotes long input is shortened
 
 
 class InputError(ValueError):
@@ -32,7 +31,7 @@ class InputError(ValueError):
         super().__init__(line)
 
 
-# Why an integration ends at a switch.
+# The reason of an integration's end at a switch.
 SLIDING = (
     "a switch (where, sign, a comparison) would change back and forth without end from t = {time} "
     "s on, because both sides push towards it; write a smooth function, such as tanh(x/width), or "
@@ -74,7 +73,7 @@ class NotBuiltError(RuntimeError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Return `text` with unprintable characters escaped, except those in `kept`, as ``"\n\t"``."""
+    r"""Return `text` with unprintable characters escaped, except those in `kept`."""
     if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
         return text
     return "".join(
@@ -83,7 +82,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def kind_of(value: object) -> str:
-    """Return the type of a value in words, such as "a list", alike for TOML, Python and NumPy."""
+    """Return the type of a value in words, such as "a list", for TOML, Python and NumPy."""
     kinds = {
         "text": (str, bytes, bytearray), "true or false": (bool,), "a whole number": (int,),
         "a number": (float,), "a complex number": (complex,), "a list": (list, tuple),
@@ -92,7 +91,7 @@ def kind_of(value: object) -> str:
     for name, types in kinds.items():
         if isinstance(value, types):
             return name
-    # Attributes are read instead of types, so that NumPy is not imported. An array is a list.
+    # Attributes are read so that NumPy need not be imported. An array is a list.
     dtype_kind = getattr(getattr(value, "dtype", None), "kind", None)
     if isinstance(dtype_kind, str):
         if getattr(value, "shape", ()) != ():
@@ -113,7 +112,7 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not `allowed`; it suggests a similar allowed name.
+    """Return the InputError for a name that is not `allowed`, which suggests a similar one.
 
     `what` is the kind of name, such as "case"; `where`, such as "--fix", begins the message.
     """

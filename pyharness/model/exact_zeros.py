@@ -28,7 +28,7 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the zeros (s) next to time 0, or infinities, of a polynomial that is positive at 0."""
+    """Return the zeros (s) before and after time 0, or infinities, of a polynomial above 0 at 0."""
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)
@@ -47,7 +47,7 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
     while not whole[-1]:
         whole.pop()
     exponent = _bound(whole)
-    # No positive zero exceeds 2**exponent s; time over this bound is the new unknown.
+    # No positive zero exceeds 2**exponent s; the unknown is time over this bound.
     least = min(0, exponent * (len(whole) - 1))
     row = _bernstein([c << (exponent * n - least) for n, c in enumerate(whole)])
     unit = Fraction(2) ** exponent

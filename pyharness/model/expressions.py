@@ -61,8 +61,8 @@ def parsed(
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and own
-    states, whose rates by name are expressions too. Values are in N m, or in 1/s2 for a body with
-    coefficients. Raise InputError, which names the place, for an invalid expression.
+    states, whose `rates` are expressions too. Values are in N m, or in 1/s2 for a body with
+    coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)
     texts = _three_texts(expressions)
@@ -147,7 +147,7 @@ def _checked_text(text: object, place: str) -> str:
 
 def _component(text: str, names: Mapping[str, Any], place: str) -> Any:
     found: dict[ast.AST, Any] = {}
-    # A loop, unlike recursion, is not limited by the stack; a node follows its parent in the list.
+    # A loop, unlike recursion, is not limited by the stack. Nodes follow their parents in the list.
     for node, operands, function in reversed(_operations(text, names, place)):
         try:
             value = function(*(found[each] for each in operands))
@@ -180,7 +180,7 @@ def _tree(text: str, place: str) -> ast.expr:
     except (RecursionError, MemoryError):
         raise _too_deep(place) from None
     except (SyntaxError, ValueError) as error:
-        # Python's message, about statements or memory, would mislead.
+        # Python's message would mislead.
         at = getattr(error, "offset", None) or 1
         near = text[max(at - 1, 0) :] or text
         raise InputError(

@@ -1,7 +1,6 @@
-"""Elementary functions of floats and of other floating-point numbers.
+"""Elementary functions of floats, by the C library, and of the numbers of `pyharness.thesis.word`.
 
-Those of floats are from the C library. Other numbers are of a class in `pyharness.thesis.word`,
-whose methods round correctly.
+The latter have other formats than binary64, and methods that round correctly.
 """
 
 import math

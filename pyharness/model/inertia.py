@@ -2,7 +2,7 @@
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
 few correct digits. The elements are integer multiples of a power of 2, the unit. The absolute
-determinant of a regular matrix is hence at least the cube of the unit. This bounds its smallest
+determinant of a regular matrix is therefore at least the cube of the unit. This bounds its smallest
 absolute eigenvalue from below, and so determines the number of bits.
 """
 
@@ -22,21 +22,19 @@ Exact = tuple[Fraction, Fraction, Fraction]
 
 SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
 _KEPT = 256  # number of cached principal frames
-# Least number of bits of an eigenvalue that is not 0. A double-double number has only 106 bits.
+# Least number of bits of an eigenvalue that is not 0; more than the 106 of double-double.
 _BITS = 128
 _PAIRS = ((0, 1), (0, 2), (1, 2))
-# An off-diagonal element below 2**_NOISE, in units of its last bit, is only rounding error.
-_NOISE = 8
-# Limit of the number of rotations. The convergence is quadratic; about ten suffice.
-_MOST_ROTATIONS = 500
+_NOISE = 8  # an off-diagonal element below 2**_NOISE units of its last bit is rounding error
+_MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
     """The principal moments (kg m2) and axes of one body, rounded, and to at least 30 digits.
 
-    Each axis, a column of `axes`, is near the body's own axis of the same number; they form a
-    right-handed frame. `moments_low` is the exact minus the rounded moments.
+    The columns of `axes` form a right-handed frame, each near the body's own axis of the same
+    number. `moments_low` is the exact minus the rounded moments.
     """
 
     moments: Triple
@@ -88,7 +86,7 @@ def symmetric_matrix(where: str, values: object) -> Matrix:
 
 @lru_cache(maxsize=_KEPT)
 def principal_frame(inertia: Matrix) -> PrincipalFrame:
-    """Return the principal frame; moments are unsorted, each accurate to its last digit."""
+    """Return the principal frame; each moment is accurate to its last digit."""
     values, vectors = diagonalised(inertia)
     order: list[int] = []
     # Each body axis gets the nearest remaining eigenvector.
@@ -175,7 +173,7 @@ def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: 
 
 
 def _last_bit(x: float) -> int:
-    """Return the exponent of the lowest nonzero bit of a number."""
+    """Return the exponent of a number's lowest nonzero bit."""
     numerator, denominator = x.as_integer_ratio()
     if denominator > 1:
         return 1 - denominator.bit_length()

@@ -20,12 +20,9 @@ from pyharness.model.values import three
 
 COUNTS = {"moments": 3, "inertia": 9}
 _RETURNS = {"moments": "three moments", "inertia": "three rows of three numbers"}
-# Times between 0 and the end at which moments must be above 0.
-_CHECKED = 1000
-# Times (s) at which a matrix must be symmetric.
-_TRIED = (0.0, 0.37, 1.9, 11.3, -0.7)
-# Largest relative difference of an element across a switch or a break that counts as rounding.
-_CONTINUOUS = 1e-9
+_CHECKED = 1000  # number of times to the end at which moments must be above 0
+_TRIED = (0.0, 0.37, 1.9, 11.3, -0.7)  # times (s) at which a matrix must be symmetric
+_CONTINUOUS = 1e-9  # largest relative jump of an element that counts as rounding
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,7 @@ class InertiaFunction(Changing):
     """An inertia that is a continuous function of time.
 
     The outputs of `tape` are the three moments, or the nine elements of the matrix by rows.
-    `written` are the values of a scene file: expressions and numbers, or a table's keys and values.
+    `written` has the values in a scene file: expressions and numbers, or a table's items.
     """
 
     place: str
@@ -55,7 +52,7 @@ class InertiaFunction(Changing):
         return ", ".join(str(each).replace("'", "") for each in values)
 
     def values(self) -> list[Any] | dict[str, Any] | None:
-        """Return what a scene file has in its place; None for a function of Python."""
+        """Return the inertia as a scene file has it; None for a Python function."""
         is_table = self.written and isinstance(self.written[0], tuple)
         return dict(self.written) if is_table else list(self.written) or None
 
@@ -79,16 +76,16 @@ class InertiaFunction(Changing):
     def _rows(self, found: Sequence[Any]) -> list[list[Any]]:
         if self.is_diagonal:
             return [[found[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
-        # The triangle above the diagonal; below it, the same elements may be rounded otherwise.
+        # Only the upper triangle is used, because the lower one may be rounded otherwise.
         return [[found[3 * min(i, j) + max(i, j)] for j in range(3)] for i in range(3)]
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """Infinite times: a moment that reaches 0 is a singularity, which ends the integration."""
+        """Infinite times, because a moment that reaches 0 ends the integration as a singularity."""
         return -np.inf, np.inf
 
     def check(self, times: Iterable[float]) -> None:
-        """Raise InputError if a moment is not above 0 at one of many times to those of `times`."""
+        """Raise InputError if a moment is not above 0 at one of 1001 times from 0 to each time."""
         for end in times:
             if not (end and np.isfinite(end)):
                 continue
@@ -191,9 +188,9 @@ def checked_function(found: InertiaFunction) -> InertiaFunction:
 
 
 def _check_continuous(tape: Tape, where: str) -> None:
-    """Raise InputError unless choices are those of minimum, maximum, abs and clip.
+    """Raise InputError unless all choices are continuous, such as minimum, maximum, abs and clip.
 
-    A jump of the inertia would change omega, and its derivative has no value there.
+    A jump of the inertia would make omega jump.
     """
     jumps = InputError(
         f"{where}: an inertia that may jump; allowed: minimum, maximum, abs, clip, interp, tables "

@@ -1,8 +1,8 @@
 """Listings: programs of the thesis with a choice of their defects, readings and conjectures.
 
-A card has one line of a program. A defect is a mistake of the printed program, active if not
-corrected. A reading is an interpretation of a doubtful card other than the one that we adopt. A
-conjecture is an assumption about a statement for which no card exists.
+A card is one line of a program. A defect is a mistake of the printed program, active if not
+corrected. A reading is an interpretation of a doubtful card other than ours. A conjecture is an
+assumption about a statement for which no card exists.
 """
 
 from collections.abc import Iterable, Set
@@ -99,7 +99,7 @@ class Listing:
 
     @classmethod
     def original(cls, program: str, readings: Iterable[str] = ()) -> "Listing":
-        """Return the listing with all defects, the conjectures of `switches`, and `readings`."""
+        """Return the listing with the defects and conjectures of `switches`, and `readings`."""
         return cls(program, frozenset(switches(program)), frozenset(readings))
 
     @classmethod
@@ -154,7 +154,7 @@ def subset(
 ) -> Listing:
     """Return a Listing: a program with a selection of its defects, readings and conjectures.
 
-    The parameters are those of the command line; `Listing` explains the three kinds.
+    `Listing` explains the three kinds; the parameters are also options of the command line.
 
     Parameters
     ----------
@@ -166,11 +166,11 @@ def subset(
     fix, keep : iterable of str
         Names to correct, and names to keep active.
     readings : iterable of str
-        The readings to activate. If the base is `corrected`, only `keep` activates one, because a
-        corrected statement is the same under every reading.
+        The readings to activate. In a corrected base only `keep` activates one, because a corrected
+        statement is the same under every reading.
     conjectures : iterable of str, optional
-        The assumptions to make, or ``none``. The default is those of `Listing.original`; if the
-        base is `corrected`, only `keep` activates one.
+        The assumptions to make, or ``none``; by default those of `Listing.original`. In a corrected
+        base only `keep` activates one.
 
     Returns
     -------

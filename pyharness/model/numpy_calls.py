@@ -1,8 +1,8 @@
-"""NumPy's functions of arrays that hold symbols, while a function is recorded.
+"""NumPy's functions for arrays of symbols, while a user's function is recorded.
 
-NumPy has no hook for choices, comparisons and linear algebra of objects, nor for the result of
-numpy.zeros. While a user's function is recorded, these functions are therefore replaced in the
-modules numpy, numpy.linalg and math. Calls from other threads, and without symbols, are passed on.
+NumPy can't overload choices, comparisons and linear algebra of objects, nor the result of
+numpy.zeros. During recording these functions are therefore replaced in the modules numpy,
+numpy.linalg and math. Calls from other threads, and without symbols, reach the originals.
 """
 
 import math
@@ -30,7 +30,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace NumPy's functions in this thread; `with_targets` also numpy.zeros and numpy.empty."""
+    """Replace NumPy's functions in this thread, and `with_targets` those that make new arrays."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -57,11 +57,11 @@ def _install() -> None:
 
 
 class _Replaced:
-    """A function of arrays with symbols, in the place of the original, whose attributes it has."""
+    """A replacement of a function, for symbols, with the attributes of the original."""
 
     def __init__(self, original: Callable[..., Any], function: Callable[..., Any]) -> None:
         self._original, self._function = original, function
-        # Modules that are imported meanwhile read its name, signature and text.
+        # Modules that are imported meanwhile read its name and signature.
         update_wrapper(self, original)
 
     def __call__(self, *given: Any, **named: Any) -> Any:
@@ -79,7 +79,7 @@ class _Replaced:
 
 
 class _Target(_Replaced):
-    """A function that returns a new array, of objects where symbols will be assigned to it."""
+    """A replacement of a function that makes an array, to which symbols can be assigned."""
 
     def __init__(self, original: Callable[..., Any], value: float) -> None:
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
@@ -110,7 +110,7 @@ def _has_symbol(value: Any) -> bool:
 def _comparison(compare: Callable[[Any, Any], Any]) -> Any:
     def compared(x: Any, y: Any) -> Any:
         found = compare(x, y)
-        # The negative of a bool of Python is a number.
+        # ~True is a number in Python.
         return np.bool_(found) if isinstance(found, bool) else found
 
     return lambda array, other: np.frompyfunc(compared, 2, 1)(array, other)
@@ -134,7 +134,7 @@ def symbol_array(values: Any) -> Any:
 
 
 def _wrapped(original: Callable[..., Any]) -> _Replaced:
-    """Return a function whose result, an array of symbols, compares as `SymbolArray`."""
+    """Return a function whose result is a `SymbolArray`."""
     return _Replaced(original, lambda *given, **named: _viewed(original(*given, **named)))
 
 
@@ -144,7 +144,7 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return a function of arrays of objects; a scalar result is no array."""
+    """Return a function for each element of arrays of objects; a scalar result is no array."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:
@@ -188,7 +188,7 @@ def _arctan2(y: Any, x: Any) -> Any:
 
 
 def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
-    """Return the broken line through points, constant beyond them unless told otherwise."""
+    """Return the piecewise linear function through points, constant beyond them by default."""
     places, values = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
 
     def piecewise(at: Any) -> Any:
@@ -236,7 +236,6 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
 
 
 def _solve(matrix: Any, right: Any) -> Any:
-    """Return the solution of a linear system."""
     return _inverse(matrix) @ np.asarray(right, dtype=object)
 
 
@@ -299,7 +298,7 @@ def called_once(
     raise AssertionError
 
 
-# What a function that accepts numbers only says of symbols.
+# Messages of functions that accept numbers only.
 _OF_NUMBERS = re.compile(r"[Oo]bject\b|dtype\('O'\)|input types|Symbol")
 _WRAPPED = (
     "array", "asarray", "cross", "dot", "inner", "outer", "matmul", "einsum", "stack",
@@ -352,7 +351,7 @@ ELEMENTARY: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 _OF_LINALG: dict[str, Callable[..., Any]] = {"norm": _norm, "solve": _solve, "inv": _inverse}
 _TARGETS = {"zeros": 0.0, "empty": 0.0, "ones": 1.0}
-# By module and name: a function of the original that returns the replacement.
+# By module and name: a function from the original to its replacement.
 _REPLACEMENTS: list[tuple[Any, dict[str, Callable[..., Any]]]] = [
     (module, {name: partial(_Replaced, function=each) for name, each in functions.items()})
     for module, functions in ((np, _OF_NUMPY), (np.linalg, _OF_LINALG), (math, _OF_MATH))

@@ -34,7 +34,7 @@ def check_writable(path: str, option: str) -> None:
         elif not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             reason = "permission denied"
         else:
-            # Permissions do not show that a file system, such as /proc, accepts no file.
+            # Permissions alone do not show that /proc, for example, accepts no file.
             probe = _File(path)
             try:
                 probe.write(b"")
@@ -49,8 +49,8 @@ def check_writable(path: str, option: str) -> None:
 def write_files(contents: dict[str, bytes], option: str) -> None:
     """Write several files, all or none; raise InputError, which names `option`, on failure.
 
-    Files have temporary names and are then renamed. After a failure or Ctrl-C, the previous files
-    are restored. Devices and pipes are written first, and never replaced.
+    Files are written under temporary names, then renamed. After a failure or Ctrl-C, the previous
+    files are restored. Devices and pipes are written first, and never replaced.
     """
     path = ""
     try:
@@ -115,8 +115,8 @@ class _File:
 
     def __init__(self, path: str) -> None:
         self.path = path
-        # A link is followed to its target, as in an ordinary write. The temporary files are in the
-        # target's folder, as a rename works only within a file system.
+        # A link is followed to its target, as in an ordinary write. Temporary files are in the
+        # target's folder, because a rename works only within a file system.
         self.target = os.path.realpath(path)
         beside = os.path.join(os.path.dirname(self.target), f".pyharness-{os.urandom(8).hex()}")
         self.new, self.old = f"{beside}-new", f"{beside}-old"

@@ -1,4 +1,4 @@
-"""States of the user's own beside omega and attitude: integral terms, wheel speeds, lags."""
+"""Own states: unknowns that a user adds to omega and attitude, such as integral terms or lags."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ from pyharness.model.errors import InputError, kind_of
 from pyharness.model.values import finite
 
 _LARGE = 1e120  # products of smaller states, and of their errors, are finite
-MOST_STATES = 8  # beside omega and attitude, which the kernel has places for
+MOST_STATES = 8  # for which the kernel has places
 # Names of other columns of results, and of other values in expressions.
 _TAKEN = (
     *("t", "time", "recorded_time", "omega", "omega1", "omega2", "omega3", "velocity", "velocity1"),
@@ -16,7 +16,7 @@ _TAKEN = (
 
 
 class OwnState(NamedTuple):
-    """A state of the user's own, in any unit: its name, and its value at time 0.
+    """An own state, in any unit: its name, and its value at time 0.
 
     Its error is relative to its largest absolute value so far, or to `scale` if that is larger.
     """

@@ -16,8 +16,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     """Return the content of a file or pipe that a user named.
 
     Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more than
-    `limit` bytes, or a pipe without data for `PATIENCE` (10) seconds; `what` is the expected
-    content.
+    `limit` bytes, or a pipe without data for 10 s; `what` is the expected content.
     """
     try:
         content = _read(os.fspath(path), limit)
@@ -61,10 +60,7 @@ def _is_quiet(handle: int) -> bool:
 
 
 def write_waiting(path: str, content: bytes) -> None:
-    """Write to a device, or to a pipe once it has a reader.
-
-    Raise OSError if a pipe has no reader within `PATIENCE` (10) seconds.
-    """
+    """Write to a device, or a pipe; raise OSError if a pipe has no reader within 10 s."""
     end = time.monotonic() + PATIENCE
     while True:
         try:

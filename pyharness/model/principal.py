@@ -94,8 +94,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     if isinstance(law, StateTorque):
         law = law.rotated(frame.axes)
     elif not law.in_space:
-        # Large components may cancel in the torque about an axis of small moment. It is therefore
-        # rounded only after the transformation.
+        # Rounded after the transformation, because large components may cancel about an axis of
+        # small moment.
         law = exact_law(law, frame.into)
     given = _fields(scene) | {"inertia": None, "torque": law, "attitude": attitude}
     given |= {"omega": _rotate(frame, scene.omega), "moments": frame.moments}
@@ -107,7 +107,7 @@ def _fields(scene: Scene) -> dict[str, Any]:
 
 
 def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
-    """Return a trajectory transformed from principal `axes` (columns) back to the body's own."""
+    """Return a trajectory transformed from principal `axes` (columns) to the body's own."""
     attitude = found.attitude
     if attitude is not None:
         attitude = _attitude_in_scene_axes(attitude, axes)
@@ -115,7 +115,7 @@ def in_scene_axes(found: Trajectory, axes: Array) -> Trajectory:
 
 
 def states_in_scene_axes(states: Array, axes: Array, own: int) -> Array:
-    """Return rows of omega, attitude up to column `own`, and own states, from principal axes."""
+    """Return rows of states about the body's own axes; own states begin at column `own`."""
     turned, rest = states[:, 3:own], states[:, own:]
     if own > 3:
         turned = _attitude_in_scene_axes(turned, axes)

@@ -17,14 +17,10 @@ Progress = Callable[[int, int, str], None]
 Its arguments are the numbers of completed parts and of all, and the name of the next part.
 """
 
-# Most bodies in a piece. They take some milliseconds, after which Python checks for a signal.
-_PIECE = 1 << 18
-# Fewest bodies per thread. With fewer, a further thread costs more time than it saves.
-_SMALL = 256
-# Fewest pieces with a progress bar.
-_REPORTS = 100
-# None if no bar was requested.
-_bar: ContextVar[Any] = ContextVar("bar", default=None)
+_PIECE = 1 << 18  # most bodies in a piece: some milliseconds, until Python checks for a signal
+_SMALL = 256  # fewest bodies for which a further thread saves time
+_REPORTS = 100  # fewest pieces with a progress bar
+_bar: ContextVar[Any] = ContextVar("bar", default=None)  # None if no bar was requested
 
 
 def no_progress(done: int, total: int, what: str) -> None:
@@ -63,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide a function that reports progress: the user's, or for True one with a bar."""
+    """Provide a function that reports progress: the user's, or for True one that shows a bar."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):
@@ -101,7 +97,7 @@ def for_each_piece(
         ends = [n * piece // count for piece in range(count + 1)]
         pieces = [slice(first, last) for first, last in itertools.pairwise(ends)]
     if threads == 1 or len(pieces) < 2:
-        # Only the main thread receives signals; this is usually the calling one.
+        # Only the main thread, usually this one, receives signals.
         for piece in pieces:
             work(piece, given_up)
             count_done(piece.stop - piece.start)

@@ -1,7 +1,6 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-The types are named tuples, because each start of the program creates them, and dataclasses would
-take five times as long.
+Each start of the program creates the types; dataclasses would take five times as long as tuples.
 """
 
 import math
@@ -26,7 +25,7 @@ def exact(value: Any) -> str:
 
 
 def plain(value: Any) -> str:
-    """Return a word or whole number as text; None is a dash."""
+    """Return a value as text; None is a dash."""
     return "-" if value is None else str(value)
 
 
@@ -73,12 +72,12 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: `head` and `write` for rounded numbers, `name` and `full` for CSV."""
+    """A column of a table: head and format of rounded numbers, and for CSV of all digits."""
 
     head: str
     write: Callable[[Any], str] = plain
     left: bool = False  # whether the values are aligned left; numbers are aligned right
-    unit: str = ""  # of the values, as CSV has them; `write` may convert them
+    unit: str = ""  # of the values in CSV; `write` may convert them
     name: str = ""  # head in CSV; if empty, `head` is used
     full: Callable[[Any], str] = exact
     fit: str = ""  # "wrap" or "cut": treatment of a last column that is too wide
@@ -138,14 +137,14 @@ class Picture:
         self.figure, self.numbers, self.title = figure, numbers, title
 
 
-# A check for JUnit: kind, id, reason of a failure (empty if it passed), command that repeats it.
+# A check for JUnit: kind, id, reason of a failure (empty if passed), command that repeats it.
 Case = tuple[str, str, str, str]
 
 
 class Report(NamedTuple):
     """The results of a subcommand, from which every output format is written."""
 
-    title: str  # the verb that made the report
+    title: str  # the subcommand
     text: Sequence[Section]  # for the terminal; empty sections are skipped
     record: Callable[[], dict[str, Any]]  # for JSON
     data: Table | None = None  # for CSV, in full

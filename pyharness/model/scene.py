@@ -31,14 +31,14 @@ from pyharness.model.values import Triple as Triple
 if TYPE_CHECKING:
     from pyharness.model.inertia import Exact
 
-# Bytes for the results of a step: eight binary64 numbers and the error code IER, stored twice, in
-# the kernel and in the trajectory.
+# Bytes for the results of a step, eight binary64 numbers and the error code IER, in the kernel and
+# again in the trajectory.
 _BYTES_PER_STEP = 2 * (8 * 8 + 4)
 # The compiled programs count steps and right-hand sides in 32 bits. A step evaluates at most five
 # right-hand sides.
 _COUNTABLE_STEPS = 400_000_000
 _LONGEST_NAME = 60
-# Modules whose stack frames are between the user's call and the creation of the scene.
+# Modules whose stack frames may be between the user's call and the creation of a scene.
 _BETWEEN = (
     *("copy", "dataclasses", "pyharness.engine.scene_reader"),
     *("pyharness.model.keywords", "pyharness.model.scene_file", __name__),
@@ -99,15 +99,15 @@ class Scene:
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, ChangingMoments, or function of t, optional
-        The principal moments of inertia (kg m2). If they change, this attribute is None, and
-        `changing` has them. A function of the time (s) is recorded, and must not jump;
-        `inertia_table` makes one from rows.
+        The principal moments of inertia (kg m2). A function of the time (s) is recorded, and must
+        not jump; `inertia_table` makes one from rows. The attribute is None if they change;
+        `changing` then has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
-        The torque; zero by default. Three numbers are constant. `pyharness.torques` makes a
-        StateTorque. A function returns the components about the body axes, and is recorded with
-        symbols; one that can't be recorded is passed as ``opaque(function)``.
+        The torque; zero by default, and constant for three numbers. `pyharness.torques` makes a
+        StateTorque. A function returns the components about the body axes; its arithmetic is
+        recorded in calls with symbols. Pass one that can't be recorded as ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
@@ -120,8 +120,8 @@ class Scene:
         returns the torque and a dict of the states' rates. Errors of a state are relative to its
         largest absolute value so far, or to the second number of a pair if that is larger.
     step_size : float
-        The step size (s) of the programs of 1982, as the other arguments below, and of methods with
-        a fixed step.
+        The step size (s) of methods with a fixed step, and of the programs of 1982, to which also
+        the other arguments below belong.
     steps : int
         The number of steps.
     masses, forces : three numbers
@@ -253,7 +253,7 @@ class Scene:
         object.__setattr__(self, name, value)
 
     def _set_changing(self) -> None:
-        # A changing inertia is moved, so that code for a constant inertia does not use it.
+        # Moved to `changing`, so that code for a constant inertia does not use it.
         for place in ("moments", "inertia"):
             given = getattr(self, place)
             if callable(given):
@@ -319,8 +319,7 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest then exceeds the sum of the others by more than rounding (2**-50 of the
-        largest).
+        The largest then exceeds the sum of the others by more than 2**-50 of itself (rounding).
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -346,7 +345,7 @@ class Scene:
 
     @property
     def body_torque(self) -> TorqueLaw:
-        """The torque law about the body axes; raise InputError as `law`, or for axes of space."""
+        """The `law`; raise InputError also if it is about the axes of space."""
         if self.torque.in_space:
             raise InputError(SPACE_TORQUE)
         return self.law

@@ -1,4 +1,4 @@
-"""Scenes of the cases of Table 1 of the thesis, and the text of TOML files of scenes.
+"""Scenes of the cases of Table 1 of the thesis, and the text of scene files (TOML).
 
 `pyharness.engine.scene_reader` reads these files. Each InputError begins with `where`.
 """
@@ -76,7 +76,7 @@ def read_toml(path: str | os.PathLike[str], where: str) -> dict[str, Any]:
 
 
 def read_file(path: str | os.PathLike[str], where: str) -> bytes:
-    """Return the bytes of a user's TOML file. A pipe can be read only once."""
+    """Return the bytes of a user's TOML file; a pipe can be read only once."""
     return read_input(path, where, _LARGEST_FILE, "a TOML file")
 
 
@@ -97,8 +97,8 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
-    Masses, forces and case are not written. Raise InputError for an opaque or recorded torque, and
-    above 50 ready terms or 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for an opaque torque or one recorded
+    from Python, and above 50 ready terms or 1 000 000 bytes.
     """
     import json
 
@@ -163,7 +163,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term; its inertia may change only as the body's."""
+    """Return the lines of a ready term; an inertia in it may change only if it is the body's."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "
@@ -215,7 +215,7 @@ def body_of(scene: Scene) -> tuple[str, Any]:
 
 
 def as_lists(value: Any) -> Any:
-    """Return the value with lists for tuples and tables for torque laws, as JSON has them."""
+    """Return the value with lists for tuples, and tables for torque laws, as in JSON."""
     if isinstance(value, TorqueLaw):
         return law_table(value)
     return list(map(as_lists, value)) if isinstance(value, tuple) else value
@@ -239,7 +239,7 @@ def _waves(where: str, entries: object) -> list[tuple[Any, Any]]:
 
 
 def check_written_schema(data: dict[str, Any], kind: str) -> None:
-    """Raise InputError if a user's file has an unsupported schema number; it may have none."""
+    """Raise InputError if a user's file has an unsupported schema number."""
     given = data.get("schema", SCHEMAS[kind])
     check_schema("top level", kind, given, "write it in that form, or take a version that reads it")
 

@@ -20,7 +20,7 @@ _LONGEST_TEXT = 60
 
 
 def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
-    """Return lines that describe a scene, with a mark on what is assumed in runs of `listings`."""
+    """Return lines that describe a scene, with marks on what runs of `listings` assume."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, InertiaFunction):
@@ -66,7 +66,7 @@ def _polynomials(coefficients: Sequence[Sequence[float]]) -> str:
 
 
 def _polynomial(coefficients: Sequence[float]) -> str:
-    """Return a polynomial of time as text, as in "40 + 0.5 t - 0.01 t^2"."""
+    """Return a polynomial of time as text, such as "40 + 0.5 t - 0.01 t^2"."""
     text = ""
     for power, coefficient in enumerate(coefficients):
         if coefficient:

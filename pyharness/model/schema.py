@@ -1,4 +1,4 @@
-"""Schema numbers: versions of file formats (docs/reference/formats.md)."""
+"""Schema numbers: versions of file formats (docs/reference/output.md)."""
 
 from pyharness.model.errors import InputError, kind_of
 

@@ -1,4 +1,4 @@
-"""Torques that depend on the state, recorded or opaque."""
+"""Torques that depend on the state: recorded as operations, or opaque (called at each time)."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -44,24 +44,24 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        The three expressions of a scene file that were recorded, and pairs of name and value of
+        The three expressions of a scene file, if recorded from them, and pairs of name and value of
         their constants.
     terms : tuple
-        The other summands in a scene file: at most one `TorqueLaw`, and ready terms, as pairs of
-        keys and values that begin with the kind.
+        The other summands in a scene file: at most one `TorqueLaw`, and ready terms (torques of
+        `pyharness.torques`) as pairs of keys and values.
     parameters : tuple of pairs
         Names and values of the recorded function's keyword arguments with numbers as defaults.
     varied : Tape or None
         The recorded function with these parameters as further inputs.
     own : tuple of str
-        The names of the scene's own states, which are further inputs of the tape; their rates are
-        further outputs.
+        The names of the scene's own states: further inputs of the tape, whose rates are further
+        outputs.
     starts : tuple of OwnState
         States that a scene with this torque gets if it has none.
     parts : tuple
         The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
-        False, True and False; attributes in common with `TorqueLaw`.
+        False, True and False; for code that also takes a `TorqueLaw`.
     """
 
     tape: Tape | None
@@ -84,7 +84,7 @@ class StateTorque:
         """Return one line without the operations of the tape."""
         if self.tape is None:
             return f"StateTorque(opaque, needs_attitude={self.needs_attitude})"
-        # Expressions and constants may be long, and are shortened together.
+        # Expressions and constants may be long, and are shortened as one text.
         parts = [f"{list(self.expression)}, {dict(self.constants)}"] if self.expression else []
         parts += [repr(x) if isinstance(x, TorqueLaw) else str(x[0][1]) for x in self.terms]
         given = " + ".join(parts)
@@ -131,7 +131,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque for omega, attitude and components about `axes`, columns of a matrix.
+        """Return the torque with omega, attitude and components about `axes` (columns).
 
         Raise InputError for an opaque torque.
         """
@@ -196,8 +196,8 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     Raises
     ------
     InputError
-        If the function can't be recorded, does not return three numbers, or gives different records
-        in two calls, as with memory or with random numbers.
+        If the function can't be recorded, does not return three numbers, or differs between two
+        calls, as with memory or random numbers.
 
     Examples
     --------
@@ -271,7 +271,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def count_arguments(function: Function, where: str, allowed: str) -> int:
-    """Return the number of arguments of a function that reads states, 3 or 4."""
+    """Return the number of arguments of a function of own states: 3, or 4 with the attitude."""
     parameters = _parameters(function, where, f"allowed: {allowed}")
     count = sum(each.kind in _POSITIONAL for each in parameters)
     if count not in (3, 4):
@@ -377,7 +377,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque with the recordable numeric keywords of its function as parameters."""
+    """Return a torque whose parameters are its function's recordable numeric keywords."""
     values = {
         each.name: value
         for each in signature(function).parameters.values()
@@ -388,7 +388,7 @@ def _with_parameters(torque: StateTorque, function: Function, called: Function) 
     def recorded_with(names: Sequence[str]) -> Tape | None:
         """Return the tape with these keywords as inputs, or None if it can't be recorded."""
         recorder = Recorder(n_inputs=N_INPUTS + len(names))
-        # A number of factors is no parameter.
+        # An exponent, which is a number of factors, is no parameter.
         recorder.has_powers = not names
 
         def named(time: Symbol, omega: Any, attitude: Any, *inputs: Symbol) -> Any:

@@ -1,7 +1,8 @@
 """Symbols: arguments with which a function is called so that its arithmetic is recorded on a tape.
 
-A symbol is a linear combination of the slots of a tape. Sums, and products with numbers, only
-change its coefficients. Any other operation has a slot for its result, only one even if repeated.
+A symbol is a linear combination of slots (places of inputs and results) of a tape. Sums, and
+products with numbers, only change its coefficients. Any other operation has a slot for its result,
+only one even if repeated.
 """
 
 import math
@@ -27,11 +28,10 @@ from pyharness.model.tape import (
 )
 from pyharness.model.values import converted
 
-# Most operations, and most terms of a linear combination: they determine the kernel's memory and
-# time.
+# Most operations, and most terms of a linear combination, which determine memory and time.
 MOST_OPERATIONS = 2000
 _MOST_POWER = 1000
-# Smaller factors, as of (x / 1e12)**30, would underflow.
+# Smaller factors, such as in (x / 1e12)**30, would underflow.
 _LEAST_FACTOR = 2.0**-400
 _ALLOWED = (
     "+ - * / ** and NumPy's elementary functions, where, clip, minimum, maximum, sign, abs, floor, "
@@ -59,29 +59,29 @@ class Recorder:
         instead: str = "opaque(function), which SciPy's methods solve",
         has_lines: bool = True,
     ) -> None:
-        """Begin an empty tape; messages begin with `place` and say what to use `instead`.
+        """Begin an empty tape; messages begin with `place` and suggest `instead`.
 
-        `has_lines` says whether a function is recorded, whose lines messages name.
+        With `has_lines`, messages name the line of the function that is recorded.
         """
         self._has_lines = has_lines
         self.place = place
         self.most, self._n_inputs, self._instead = most, n_inputs, instead
         self._slots: dict[Operation, int] = {}
         self.has_powers = True  # whether exponents may be symbols
-        self.was_converted = False  # whether a symbol was to become a float
+        self.was_converted = False  # whether the function tried to make a symbol a float
 
     def inputs(self) -> list["Symbol"]:
         """Return a symbol for each input: time, omega, attitude, and any parameters."""
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded; say what to `write`."""
+        """Return the exception for an operation that can't be recorded; `write` is allowed."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols; `reason` is its own."""
+        """Return the exception for a function that accepts no symbols, with its own `reason`."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
@@ -142,7 +142,7 @@ def _of_symbols(
 
 
 def _is_moderate(factor: float) -> bool:
-    """Return whether a constant factor may be taken out of products without loss."""
+    """Return whether a constant factor can be moved out of products without underflow."""
     return _LEAST_FACTOR <= abs(factor) <= 1.0 / _LEAST_FACTOR
 
 
@@ -287,7 +287,7 @@ class Symbol:
     __rtruediv__ = _of_symbols(lambda x, y: y / x)
 
     def __pow__(self, power: Any) -> "Symbol":
-        """Record and return a power; that of a negative number is defined for integers alone."""
+        """Record and return a power; a negative base requires an integer."""
         if isinstance(power, Symbol):
             if not self.recorder.has_powers:
                 raise self.recorder.refusal("a power that is not a number")
@@ -357,11 +357,11 @@ class Symbol:
         return _condition(self.recorder.result("switch", (slot,)))
 
     def ceil(self) -> "Symbol":
-        """Return the smallest whole number from this symbol on."""
+        """Return this symbol rounded up."""
         return -((-self).floor())
 
     def trunc(self) -> "Symbol":
-        """Return the whole number next to this symbol on the side of 0."""
+        """Return this symbol rounded toward 0."""
         return self.sign() * abs(self).floor()
 
     __ceil__, __trunc__ = ceil, trunc
@@ -388,7 +388,7 @@ class Symbol:
     __le__ = _of_symbols(lambda x, y: negated((x - y).switch()))
 
     def __eq__(self, other: object) -> Any:
-        """Refuse the comparison, which is true at isolated times at most."""
+        """Refuse the comparison, which holds at isolated times at most."""
         raise self.recorder.refusal("a comparison with == or !=", "< and > in numpy.where")
 
     __ne__ = __eq__
@@ -424,7 +424,7 @@ class Symbol:
         """Return a composed function, and refuse others; NumPy looks them up by name."""
         if name in _COMPOSED:
             return partial(_COMPOSED[name], self)
-        # NumPy's mean reads `dtype`, and works without it.
+        # NumPy's mean works without `dtype`.
         if name.startswith("_") or name == "dtype":
             raise AttributeError(name)
         raise self.recorder.refusal(f"{name} of the state")
@@ -440,7 +440,7 @@ class Condition(Symbol):
         return _condition(select(self, other, False))
 
     def __or__(self, other: Any) -> Any:
-        """Return the condition that one holds at least."""
+        """Return the condition that at least one holds."""
         return _condition(select(self, True, other))
 
     def __xor__(self, other: Any) -> Any:
@@ -482,7 +482,7 @@ def select(condition: Any, first: Any, second: Any) -> Any:
 
 
 def _line() -> str:
-    """Return the user's function and line that called."""
+    """Return the name and line of the calling user's function."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename.startswith(_LIBRARIES):
         frame = frame.f_back

@@ -24,9 +24,9 @@ TIME = 0
 OMEGA = (1, 2, 3)
 ATTITUDE = (4, 5, 6, 7)
 N_INPUTS = 8
-# The kinds of operations whose results are constant but where a root of the operand is crossed.
+# The kinds of operations whose results are constant between certain values of the operand.
 SWITCHES = ("switch", "floor")
-# The kinds whose second operand is their derivative, which series alone need.
+# The kinds whose second operand is their derivative, which only Taylor series need.
 WITH_DERIVATIVE = ("log", "atan", "asin")
 
 
@@ -38,11 +38,11 @@ class Linear(NamedTuple):
 
 
 class Table:
-    """A function of time that consists of cubic polynomials, in arrays that are not changed.
+    """A function of time that consists of cubic polynomials.
 
     Row k of `pieces`, shape (n, 4), has c0 to c3 of c0 + c1 s + c2 s^2 + c3 s^3, where s is the
     time (s) minus breaks[k]. It applies from this break to the next; the first piece also before,
-    the last without end.
+    the last also after all breaks.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -106,17 +106,17 @@ class Tape:
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a pickle holds; another process has other hashes."""
+        """Return the fields for `pickle`, without the hash, which differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     @cached_property
     def has_branches(self) -> bool:
-        """Whether there is a "select", whose other operand may be singular."""
+        """Whether there is a "select", whose unused operand may be singular."""
         return any(each.kind == "select" for each in self.operations)
 
     @property
     def n_switches(self) -> int:
-        """The number of switches, each of which divides the states into two or more regions."""
+        """The number of operations of the kinds `SWITCHES`."""
         return sum(each.kind in SWITCHES for each in self.operations)
 
     @property
@@ -201,9 +201,9 @@ def live_slots(
 ) -> list[int]:  # fmt: skip
     """Compute the operations on which the outputs depend, operands first, and return their slots.
 
-    Of a "select" they depend on the chosen operand alone; the other may be singular. `compute` is
-    called for each slot, `is_true` for a condition that was computed. Only series need the
-    derivatives of `WITH_DERIVATIVE`.
+    Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
+    called for each slot, `is_true` for a computed condition. Derivatives of `WITH_DERIVATIVE` are
+    computed `for_series` alone.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -282,7 +282,7 @@ FLOATS: Functions[float] = Functions(
     float, _sqrt, exponential, math.tanh, sine, cosine, _value, logarithm, math.atan, arcsine, step,
     whole, selected,
 )  # fmt: skip
-# Large exponentials that overflow are replaced by powers of 2, as in tape_series.f90.
+# Exponentials of larger arguments are replaced by powers of 2, as in tape_series.f90.
 _LARGE_ARGUMENT = 210.0
 # Replacements for small arguments, by kind.
 _SMALL = {"large": 2.0**-303, "moderate": 2.0**-140}
@@ -292,8 +292,8 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    A large exponential that spoils an output, as in sinh(x)/cosh(x), is replaced by another large
-    number, unless the outputs depend on which.
+    If a large exponential overflows, as in sinh(x)/cosh(x), it is replaced by another large number,
+    unless the outputs depend on this number.
     """
     found: list[float] = []
     try:
@@ -304,7 +304,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     if found and all(map(math.isfinite, found)):
         return found
     if tape.has_branches or not found:
-        # A branch that is not chosen may be singular, and so may a derivative, as of abs(x)**1.3.
+        # An unused branch or derivative, as of abs(x)**1.3, may be singular.
         tape = _without_branches(tape, inputs)
         found = evaluate(tape, inputs, FLOATS)
     if all(map(math.isfinite, found)) or all(each.kind != "exp" for each in tape.operations):
@@ -324,7 +324,7 @@ def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
 
 
 def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
-    """Return the tape with 0 in place of what does not matter for these inputs."""
+    """Return the tape with 0 in place of operations that have no effect for these inputs."""
     values: list[Any] = [*inputs, *[0.0] * len(tape.operations)]
 
     def compute(slot: int) -> None:
@@ -344,6 +344,6 @@ def _saturated(kind: str, x: float) -> float:
         return exponential(x)
     if kind == "large":
         return 2.0**1000
-    # Numbers differ between arguments, so that a quotient of two exponentials affects the outputs.
+    # The numbers differ between arguments, so that a quotient of two exponentials shows.
     part = math.fmod(math.frexp(min(x, 1e308))[0] * (1e7 if kind == "other" else 1e4), 1.0)
     return 1.01 + part if kind == "moderate" else math.ldexp(1.0, 167 + int(600.0 * part))

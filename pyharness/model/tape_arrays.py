@@ -19,7 +19,7 @@ def table_values(table: Table, times: Any) -> Array:
 
 def without_equal_constants(table: Table) -> Table:
     """Return a continuous table without breaks between equal constants."""
-    # Equal neighbours are constants, because the table is continuous where pieces vary.
+    # Equal neighbours must be constants, because the table is continuous.
     changes = (table.pieces[1:] != table.pieces[:-1]).any(axis=1)
     kept = np.concatenate(([True], changes))
     return Table(table.breaks[kept], table.pieces[kept])

@@ -57,7 +57,7 @@ class TorqueLaw:
     sines: tuple[Wave, ...] = ()
     cosines: tuple[Wave, ...] = ()
     frame: str = "body"
-    # The `StateTorque` with named numbers from which the law was recognised; None in copies.
+    # The `StateTorque` with named parameters from which the law was derived; None in copies.
     named: Any = field(default=None, init=False, compare=False, repr=False)
 
     if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 def to_body(vector: Any, attitude: Any) -> Array:
     """Return the components about the body axes of a vector about the axes of space.
 
-    The matrix is written out, so that terms of one torque share its products.
+    Written with the matrix, so that terms of one torque share its products.
     """
     u, v, w = vector
     rows = rows_to_body(attitude)

@@ -17,7 +17,7 @@ from pyharness.model.report import counted, short
 
 # Largest relative rounding error in binary64.
 ROUNDING = 2.0**-53
-# The ways to end a run (`Trajectory.ended`) with all requested rows present.
+# The endings (`Trajectory.ended`) with all requested rows.
 WITH_ALL_ROWS = ("complete", "sensitive", "unchecked")
 ENDINGS = (*WITH_ALL_ROWS, "stopped", "overflow", "singular", "sliding", "event")
 _RESULTS = [ENDS.index(ending) for ending in WITH_ALL_ROWS]
@@ -63,7 +63,7 @@ class Stop:
     step : int
         The number of the step, from 1, whose result is the last row.
     variable : str
-        The variable that failed: `U1` to `U3` (omega), `V1` to `V3` (velocity), or a norm, `U` (of
+        The variable that failed: `U1` to `U3` (omega), `V1` to `V3` (velocity), or the norm `U` (of
         omega) or `UV` (of both).
     quotient : float
         The Lipschitz quotient (1/s): the change of the derivative between two stages over the
@@ -119,7 +119,7 @@ class Trajectory(Conversions):
         The error amplification: the largest norm of the state-transition matrix of omega from any
         time to the end.
     reason : str or None
-        The time and the operation at which a recorded torque is undefined, slides, or is touched.
+        Why a recorded torque ended the integration or made it sensitive: the time and operation.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
@@ -127,7 +127,7 @@ class Trajectory(Conversions):
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
         Principal moments, kg m2, or an inertia that changes; None for coefficients.
     axes : ndarray, shape (3, 3), or None
-        The principal axes, in columns; None if they are the body's own.
+        The principal axes in columns; None if they are the body's own.
     exact : ndarray of object, shape (n, 8), or None
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
         the other attributes have the nearest floats.
@@ -140,11 +140,10 @@ class Trajectory(Conversions):
     t_events : list of ndarray, or None
         The times (s) of the events of each function, in order.
     y_events : list of ndarray, or None
-        Omega (rad/s), with the attitude if requested and own states, at these times: shape (k, m)
-        for m rows of `y`.
+        The states (columns of `y`) at these times, shape (k, m) for k events.
     sensitivities : dict of ndarray, or None
-        By name of a parameter, the derivatives of omega (rad/s), with the quaternion if requested:
-        shape (n, 3, m) or (n, 7, m) for m values.
+        By name of a parameter with m values, the derivatives of omega (rad/s), shape (n, 3, m), or
+        with the quaternion (n, 7, m).
 
     Examples
     --------
@@ -283,7 +282,7 @@ def digits_left(error: float | None) -> float | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BatchResult:
-    """The angular velocities of n bodies, and how the computation of each body ended.
+    """The angular velocities of n bodies, and how the computation of each ended.
 
     `omega` (rad/s), shape (n, ..., 3), is NaN where there is no result. `status`, shape (n,), has
     integers of `pyharness.model.codes.Statuses`.

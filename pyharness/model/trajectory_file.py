@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
-Of the archive, `header` has other attributes, and `scene` is the text of a scene file. The header
-may have a tape. A linear combination is a list of its constant and pairs of slot and
-coefficient. An operation is a list of its kind, and its operands, linear combination, or breaks and
-pieces.
+The archive has an array for each attribute, the text `scene` of a scene file, and `header` with all
+else in JSON, such as a tape. There a linear combination is a list of its constant and pairs of slot
+and coefficient. An operation is a list of its kind, and its operands, linear combination, or breaks
+and pieces.
 """
 
 import json
@@ -42,7 +42,7 @@ ROWS: dict[str, tuple[str, tuple[int, ...]]] = {
     "ier": ("i4", ()),
 }
 NUMBERS = ("error", "growth", "tolerance")  # of the header; None for unknown
-OWN = "own"  # an array of rows, whose width is the number of the scene's own states
+OWN = "own"  # an array of rows, with a column for each own state
 AXES = "axes"  # an array without rows, shape (3, 3)
 # The number of events of each function; the times and states of all events.
 EVENTS = ("event_counts", "event_times", "event_states")
@@ -123,7 +123,7 @@ def _moments_record(moments: Any) -> Any:
 
 
 def _scene_record(scene: Scene) -> tuple[dict[str, Any], str]:
-    """Return the data that no scene file has, for JSON, and the text of the scene file."""
+    """Return the data that a scene file lacks, for JSON, and the text of the scene file."""
     record: dict[str, Any] = {
         "masses": scene.masses,
         "forces": scene.forces,

@@ -14,7 +14,7 @@ from pyharness.model.errors import InputError, kind_of
 T = TypeVar("T")
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
-# A number that float() converts: int, Fraction, Decimal, a NumPy scalar; text is excluded.
+# A number that float() converts: int, Fraction, Decimal, a NumPy scalar; no text.
 Number = SupportsFloat | SupportsIndex
 # Several numbers: for example a list, a tuple, an array or a generator.
 Numbers = Iterable[Number]
@@ -61,12 +61,12 @@ def converted(value: object) -> float | str:
         return _TOO_LARGE if math.isinf(found) and found != value else found
     except OverflowError:
         return _TOO_LARGE
-    except Exception:  # a user-defined class may raise anything; its value is no number
+    except Exception:  # a user-defined class may raise anything
         return kind_of(value)
 
 
 def is_no_number(value: object) -> bool:
-    """Return whether a value is text, boolean, an array or the like, which float() might accept."""
+    """Return whether a value is text, boolean or an array, which float() might accept."""
     if isinstance(value, (bool, str, bytes, bytearray, memoryview)):
         return True
     kind = getattr(getattr(value, "dtype", None), "kind", _REAL[0])
@@ -127,7 +127,7 @@ def number_list(where: str, values: object, allowed: str) -> Iterable[object]:
 
 
 def integer(where: str, value: object) -> int:
-    """Return a whole number, but no float, as an int, or raise InputError."""
+    """Return a whole number as an int; raise InputError for anything else, such as a float."""
     if type(value) is int:
         return value
     if not is_no_number(value):

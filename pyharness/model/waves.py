@@ -1,8 +1,8 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
 A solver divides amplitudes by a moment and rounds. The sum of two opposite amplitudes with a
-relative difference of 1e-10 would then have only six correct digits; after an exact sum, all are.
-Merged laws have at most one sine and one cosine per frequency, none of frequency 0.
+relative difference of 1e-10 would then have only six correct digits; after an exact sum it has all.
+A merged law has at most one sine and one cosine per frequency, none of frequency 0.
 """
 
 import math
@@ -42,7 +42,7 @@ def is_mergeable(law: TorqueLaw) -> bool:
 
 
 def exact_law(law: TorqueLaw, turn: Callable[[Exact], Exact] | None = None) -> TorqueLaw:
-    """Return a merged torque law, its vectors rotated by `turn` before they are rounded.
+    """Return a merged torque law, with vectors rotated by `turn` before rounding.
 
     Raise InputError if an amplitude overflows.
     """
@@ -115,7 +115,7 @@ def with_merged_rows(constant: Array, sines: Array, cosines: Array) -> tuple[Arr
         try:
             law = merged(law)
         except InputError:
-            # The sum overflows. An infinite constant makes the status of this body report it.
+            # The sum overflows, which an infinite constant shows in the status of this body.
             constant[n] = np.inf
             continue
         constant[n] = law.constant
@@ -133,7 +133,7 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
         if waves.size:
             acts = waves[..., :3].any(axis=-1)
             frequencies = np.abs(waves[..., 3])
-            # Waves of amplitude 0 only fill up a law.
+            # Waves of amplitude 0 are padding.
             found = found | (acts & (frequencies == 0.0)).any(axis=-1)
             sizes = np.sort(np.where(acts, frequencies, np.nan), axis=-1)
             found = found | (sizes[:, 1:] == sizes[:, :-1]).any(axis=-1)
@@ -141,6 +141,6 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without columns that are 0 in all laws; NaN counts as a wave."""
+    """Return the waves, (m, k, 4), without those that are 0 in all laws; NaN counts as a wave."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

@@ -28,7 +28,7 @@ def axial_top(scene: Scene, times: Sequence[float]) -> list[Row]:
             "about axis 3 only"
         )
     waves = law.sines + law.cosines
-    # Enough digits for products of the largest time, the largest omega and the largest frequency.
+    # Digits for products of the largest time, omega and frequency.
     sizes = (*map(abs, times), 0.0), map(abs, scene.omega), (*(abs(f) for _, f in waves), 1.0)
     digits = DIGITS + sum(max(0, Decimal(max(each)).adjusted() + 1) for each in sizes)
     with decimal.localcontext(prec=digits, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN):

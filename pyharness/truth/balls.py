@@ -59,9 +59,9 @@ def _refuse(*_: Any) -> Any:
 
 
 def functions_at(time: Fraction, forward: bool) -> Functions[Any]:
-    """Return the functions of tapes (recorded operations) for a step after or before `time` (s).
+    """Return the functions of tapes (recorded operations) for a step from `time` (s).
 
-    A table is replaced by its piece in the step.
+    A table is replaced by its piece in the step, after `time` if `forward`, else before.
     """
 
     def table(each: Table, at: Any) -> Any:

@@ -1,7 +1,7 @@
-"""Error of the reference: a proved bound where a proof is cheap, else the estimate.
+"""Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
-A proof encloses the solution in balls; the distance of the reference from the farthest points of
-the balls bounds its error. The reference and its estimate do not depend on the proof.
+A proof encloses the solution in balls (intervals, given by middle and radius). The distance of the
+reference from their farthest points bounds its error.
 """
 
 import math
@@ -22,11 +22,10 @@ from pyharness.truth.enclosed import Balls
 from pyharness.truth.reference import Reference
 
 PROVED, ESTIMATED = "proved", "estimated"
-# Factors on the work limits of the two provers that take steps, each then about half a second.
+# Factors on the work limits of the two provers that take steps, for about half a second each.
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
-# Digits by which a ball is smaller than the estimated error.
-_SPARE_DIGITS = 2
+_SPARE_DIGITS = 2  # by which a ball is smaller than the estimated error
 _DIGITS, _MOST_DIGITS = 20, 60  # without an estimate; the largest number with a proof
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
 
@@ -36,9 +35,8 @@ Row = Sequence[float | Fraction]
 class ErrorBound(NamedTuple):
     """Bounds on the error of the reference at all its times.
 
-    `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis:
-    "proved", or "estimated" for the reference's own estimate. `warning` is a sentence if the proved
-    error exceeds the estimate.
+    `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis,
+    "proved" or "estimated". `warning` is a sentence if the proved error exceeds the estimate.
     """
 
     value: float
@@ -57,7 +55,7 @@ class ErrorBound(NamedTuple):
 
     @property
     def larger(self) -> "ErrorBound":
-        """Return one bound for both omega and attitude, the larger of the two."""
+        """Return the larger of the bounds for omega and attitude."""
         if self.turned is None:
             return self
         return joined([self._replace(angle=None, angle_basis=None), self.turned])
@@ -95,8 +93,7 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of the reference `known` of a scene.
 
-    If `before_rounding`, it is for omega plus `remainder`, the part that rounding to binary64
-    removed.
+    If `before_rounding`, it is for omega plus `remainder`, the part that rounding removed.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -125,14 +122,14 @@ def error_bound(
     any_torque: bool = False,
     effort: float = 1.0,
 ) -> ErrorBound:
-    """Return the error bound of values of the reference at `times` (s).
+    """Return the error bound of the reference at `times` (s).
 
     `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, which remain where nothing is
     proved.
 
-    Omega is proved if the scene has a certificate, which needs no library. With python-flint the
-    attitude is proved in torque-free motion, and with `any_torque`, both under any recorded torque.
+    Without a library, omega is proved if the scene can have a certificate. With python-flint, the
+    attitude is proved in torque-free motion, and with `any_torque` both under any recorded torque.
     The limit of a proof is about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
@@ -157,7 +154,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return a bound for all of the bounds in `found`, at least one."""
+    """Return the largest of the bounds in `found`, at least one."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -214,7 +211,7 @@ class _Statement(NamedTuple):
         omega: Sequence[Balls] | None = None
         attitude: Sequence[Balls] | None = None
         if has_certificate(self.scene):
-            # Used also with python-flint, so that the bound of omega is the same without it.
+            # Used even with python-flint, so that the bound of omega does not depend on it.
             bare = replace(self.scene, attitude=None)
             with suppress(InputError):
                 omega = prove(bare, self.times, digits, effort * _INTEGER_WORK).enclosure.omega
@@ -230,10 +227,10 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits that make balls small beside the estimate; None if too many."""
+        """Return the digits for balls that are small against the estimate; None if too many."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
-            # Omega is 0 at all times, or the estimate says nothing.
+            # Omega is 0 at all times, or there is no estimate.
             return _DIGITS
         wanted = math.ceil(math.log10(largest) - math.log10(self.claimed)) + _SPARE_DIGITS
         return max(1, wanted) if wanted <= _MOST_DIGITS else None
@@ -262,9 +259,9 @@ def _extreme_angles(
 ) -> tuple[float, float]:
     """Return the least and the largest error (rad) that the quaternions `rows` may have.
 
-    The error is twice the angle between the lines of two quaternions. The sine s of the angle to
-    the ball's middle is exact before rounding, and arcsin(s) < s (1 + s**2) for s <= 1/2. Four
-    radii r have the norm 2 r, so that middle and true line differ by at most arcsin(2 r) < 4 r.
+    The error is twice the angle between the lines of two quaternions. For the sine s of the angle
+    to the ball's middle, arcsin(s) < s (1 + s**2) if s <= 1/2. Four radii r have the norm 2 r, so
+    that middle and true line differ by at most arcsin(2 r) < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

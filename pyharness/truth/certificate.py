@@ -32,12 +32,12 @@ from pyharness.truth.reference import check_order
 _TUBE_BITS = 30  # a tube is at least 2**-30 of the solution thick
 _GUARD_BITS = 16
 _LENGTH_BITS = 20
-_SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or less than the digits need
-_TOLERATED = 3  # bits by which the last terms may exceed their limit
+_SHARE_BITS = 20  # the last terms are at most 2**-20 of the radius, or what the digits allow
+_TOLERATED = 3  # bits by which the last terms may exceed this limit
 _MOST_STEPS = 20_000  # some five to thirty seconds
 _MOST_ATTEMPTS = 6
-# After the fraction _EARLY of the time, the growth of the radius is extrapolated. If it needs more
-# digits, _MORE are added to them.
+# After the fraction _EARLY of the time, the growth of the radius is extrapolated; _MORE is added to
+# the further digits that it needs.
 _EARLY, _MORE = 0.05, 1.5
 _WORDS = "Taylor steps in integer arithmetic"
 
@@ -56,7 +56,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that errors grow so much that more digits are needed; their number is the argument."""
+    """Signal that amplified errors need more digits; their number is the argument."""
 
 
 def has_certificate(scene: Scene) -> bool:
@@ -90,7 +90,7 @@ def prove(
     for attempt in range(_MOST_ATTEMPTS):
         run = _Run(record, times, wanted, digits)
         try:
-            # The last attempt is not stopped early: its message states how far a proof reaches.
+            # The last attempt is not stopped early, and reports how far a proof reaches.
             last = attempt == _MOST_ATTEMPTS - 1
             run.prove(limit, effort, progress, 1.0 if last else _EARLY)
         except _AmplifiedError as error:
@@ -134,7 +134,7 @@ class _Run:
     ) -> None:
         self._record, self._times = record, [Fraction(t) for t in times]
         self._goal = goal
-        # More terms give fewer steps and a smaller certificate; too many cost time.
+        # More terms give fewer steps and a smaller certificate, but cost time.
         self._order = max(16, round(min(1.6 * digits, digits + 40.0)))
         self._clock = max(_LENGTH_BITS + 12, self._times[-1].denominator.bit_length())
         needed = math.ceil(digits / math.log10(2.0)) + _GUARD_BITS
@@ -193,7 +193,7 @@ class _Run:
             more = self._expected_excess(radii[0], source, middle, time / end)
             if early < time / end < 1.0 and more > 0.0:
                 raise _AmplifiedError(more + _MORE)
-            # The checker adds the distance from the stated middle, which is 0, rounded up.
+            # The checker adds the distance from the stated middle: 0, rounded up.
             radius, wave_radius = radii[0] + system.norm([0, 0, 0]), radii[1]
             self.steps.append([h, tube, radius, middle])
             length = max(1, int(abs(h) * 2.0 ** min(longer, -excess)))
@@ -202,18 +202,18 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return, by extrapolation, how many digits too large the last radius will be."""
+        """Return by how many digits the last radius will be too large, by extrapolation."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))
-        # The mean rate since half the present time is assumed to remain.
+        # The mean rate since half the present time is extrapolated.
         then, before = amplified[bisect(amplified, (share / 2.0, 0.0))]
         rate = (total - before) / (share - then) if share > then else 0.0
         unit = max(1 << self._bits, *map(abs, middle))
         return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
 
     def _tube(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> tuple[int, int]:
-        """Return the error of one step without amplification, and a tube radius larger than it."""
+        """Return the error of one step without amplification, and a larger radius for the tube."""
         series, residuals, wave_residual = expansion
         forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
         source = radius + self._system.norm(residuals) + forced

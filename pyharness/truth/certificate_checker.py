@@ -1,19 +1,18 @@
 """Check a certificate: a proof that balls contain the solution of Euler's equations.
 
-The program needs only Python's standard library, and imports nothing from the prover. It computes
-with integers, and with fractions where it reads numbers. Its arguments are files of certificates;
-it prints the scenes and rows that they prove. The exit status is 1 unless all certificates hold.
+The program imports only Python's standard library, and computes with integers. Its arguments are
+files of certificates; it prints the scenes and rows that they prove. The exit status is 1 unless
+all certificates hold.
 
 The equations are y' = f(t, y) for the angular velocity omega, and for the sines and cosines of the
-torque. In a step of length h, a polynomial p(s), s from 0 to 1, approximates the solution. Its
-coefficients are those of the Taylor series, rounded down. The proof does not depend on them,
-because it bounds the residual d = p' - h f(p) of the polynomial itself.
+torque. In a step of length h, a polynomial p(s), s from 0 to 1, approximates the solution: the
+Taylor series with coefficients rounded down. Any polynomial would do, because the proof bounds its
+residual d = p' - h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958). Here mu bounds the logarithmic
-norm of the Jacobian of f in a tube around p. The resulting bound of |e| holds while |e| is less
-than the radius of the tube. If the bound itself is less, it holds on the whole step, because |e| is
-continuous. At the time of a row, the solution therefore differs from the polynomial of a step by at
-most the radius of the step.
+norm of the Jacobian of f in a tube around p. The resulting bound of |e|, the radius of the step,
+holds while |e| is less than the radius of the tube. If the bound itself is less, it holds on the
+whole step, because |e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -33,7 +32,7 @@ FORMAT = "pyharness-certificate-2"
 MOST_BITS = 12_000
 LONG, LARGEST = re.compile("[-+.0-9eE/]{4301}"), 1 << 28  # a number, characters of a file
 SCALE_BITS = 20
-UNIT = 1 << 64  # the factor by which an error grows in a step is an integer over this number
+UNIT = 1 << 64  # growth factors of errors are integers over this number
 
 Expansion = tuple[list[list[int]], list[int], int]
 
@@ -75,8 +74,8 @@ class System:
             terms = [factors[i], *(push / moment for push in pushes)]
             common = lcm(*(each.denominator for each in terms))
             self.rows.append((common, [int(each * common) for each in terms]))
-        # The symmetric part of the Jacobian by omega is a sum of three matrices, one for each
-        # component of omega. The norm of such a matrix is a factor times this component.
+        # The symmetric part of the Jacobian by omega is a sum of one matrix for each component,
+        # whose norm is a factor times this component.
         parts = [Fraction(p, d) / s**2 for (d, (p, *_)), s in zip(self.rows, scales, strict=True)]
         pairs = ((1, 2), (2, 0), (0, 1))
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
@@ -84,7 +83,7 @@ class System:
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
         """Return Taylor series, and bounds on the residuals of omega and waves, over 2**bits."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
-        # Coefficient k is rounded down by less than 1. This changes the residual by less than k.
+        # Coefficient k is rounded down by less than 1, which changes the residual by less than k.
         rounding = order * (order + 1) // 2
         for n, frequency in enumerate(self.frequencies):
             sine, cosine = series[3 + 2 * n], series[4 + 2 * n]
@@ -109,7 +108,7 @@ class System:
                 rate = h * (factor * sums[i] + (pushes[i][k - 1] << bits))
                 omega[i].append((rate >> bits + clock) // (common * k))
         for i, (common, (factor, *_)) in enumerate(self.rows):
-            # The omitted products are those of the coefficients n and m with n + m >= order.
+            # Products of the coefficients n and m with n + m >= order are omitted.
             ends = accumulate(map(abs, reversed(omega[i - 1])))
             omitted = abs(factor) * sum(map(mul, map(abs, omega[i - 2]), ends))
             omitted += abs(pushes[i][order]) << bits
@@ -133,7 +132,7 @@ class System:
         """Return a bound on h mu, for the Jacobian of omega' by omega, over UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
-            # The mean is a sharper bound but costs time, which a small factor does not justify.
+            # The mean is a sharper bound, but for a small factor not worth its time.
             size = mean(each) if factor * 1000 > max(self.factors) else sum(map(abs, each))
             most = abs(h) * factor.numerator * (size + over(tube * scale, 1 << SCALE_BITS))
             growth += over(most * UNIT, factor.denominator << self.bits + self.clock)
@@ -186,8 +185,8 @@ def exponential(x: int) -> int:
     return total + term  # the rest of the series is less than its last term
 
 
-# The form of a certificate. A tuple stands for a list of its length, a list for one of any length,
-# and a set for the allowed types. Numbers that binary64 would round are texts.
+# The form of a certificate. A tuple means a list of its length, a list one of any length, and a set
+# the allowed types. Numbers that binary64 would round are texts.
 NUMBER = re.compile("-?[0-9]+([./][0-9]+)?")
 WHOLE, REAL, TEXT, EXACT = {int}, {int, float}, {str, NUMBER}, {int, float, NUMBER}
 THREE, WAVES = (REAL,) * 3, [((REAL,) * 3, REAL)]

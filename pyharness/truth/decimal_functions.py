@@ -24,7 +24,7 @@ def sine_cosine(angle: Decimal) -> tuple[Decimal, Decimal]:
         x = angle / 2**halvings
         square = x * x
         sine = _alternating(x, square, 1)
-        # The versine, 1 - cosine, has no loss of digits if the cosine is near 1.
+        # The versine, 1 - cosine, loses no digits if the cosine is near 1.
         versine = _alternating(square / 2, square, 2)
         for _ in range(halvings):
             sine, versine = 2 * sine * (1 - versine), 2 * versine * (2 - versine)
@@ -88,7 +88,7 @@ def _arctan_inverse(n: int) -> Decimal:
 def product(x: Row, reversed_y: Row) -> Decimal:
     """Return the Taylor coefficient of a product of two series, the second one reversed."""
     if x and not x[-1]:
-        # Polynomials, such as those of time, end in many zeros, which change no digit of the sum.
+        # Series of polynomials end in many zeros, which change no digit of the sum.
         n = len(x) - 1
         while n and not x[n - 1]:
             n -= 1

@@ -18,18 +18,18 @@ from pyharness.truth.decimal_switches import Switches
 from pyharness.truth.tape_series import TapeSeries, series_products
 
 _MOST_STEPS = 100_000  # some 30 seconds, more if the torque has sines or cosines
-# Work limit in steps, some ten seconds, on which `effort` is a factor. A wave of the torque takes a
-# fifth of the work of a step, as does a product of two series on the tape of a recorded torque.
+# Work limit in steps, some ten seconds, times `effort`. A wave of the torque, or a product of two
+# series of a recorded torque, takes a fifth of the work of a step.
 _ORDINARY_STEPS = 20_000
-# The mean length of the first steps shows in a fraction of a second whether the limit will be
-# exceeded. The forecast allows for a motion that becomes slower by the factor _PACE_SLACK.
+# The mean length of the first steps forecasts in a fraction of a second whether the limit will be
+# exceeded, even if the motion becomes slower by the factor _PACE_SLACK.
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
-# Largest difference between a derivative and the derivative of its series at the end of a step,
-# times the step, over the local tolerance. A series that converges as its last terms do is below.
+# Largest defect of a series: the difference between the rates and its derivative at the end of a
+# step, times the step, over the local tolerance. A series that has converged is below.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
-# If the number of steps grows with a higher power of time than this, the forecast uses that power.
+# Least growth of the number of steps, as a power of time, that the forecast extrapolates.
 _GROWING = Decimal("1.3")
 _LEAST = Decimal("1e-330")  # s, below all floats
 
@@ -46,22 +46,21 @@ def taylor_series(
 ) -> list[Row]:
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
-    Rows are missing from where omega grows without bound or the torque is singular. The quaternion
-    has the norm of the scene's. `coefficients` are A, B, C; `order` is the degree, which high
-    powers in the torque may increase; `tolerance` is local and relative. `effort` is a factor on a
-    work limit of some ten seconds; None means 100 000 steps, fewer if the torque depends on the
-    state.
+    The rows end where omega grows without bound or the torque is singular. Quaternions keep the
+    norm of the scene's. `coefficients` are A, B, C; high powers in the torque may increase `order`,
+    the degree; `tolerance` is local and relative. `effort` is a factor on a work limit of some ten
+    seconds; None means 100 000 steps, fewer if the torque depends on the state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
     if tape is not None and tape.least_order > order:
-        # The caller compares integrations of different orders, which must remain different.
+        # The caller compares integrations of different orders, which must stay different.
         order = tape.least_order + order // 4
     is_recorded = isinstance(scene.torque, StateTorque) or scene.changing is not None
     at_end = [equations]
     switches = Switches(tape) if tape is not None and tape.has_switches else None
     if is_recorded:
-        # Sums of the torque that cancel may be rounded to 0, as those beside a saturated tanh are.
+        # Sums that cancel may be rounded to 0, as beside a saturated tanh.
         changes = Decimal(0), Decimal(10) ** (4 - getcontext().prec)
         results = {} if switches is None else switches.results
         at_end = [_Equations(scene, coefficients, velocity, each, results) for each in changes]
@@ -87,7 +86,7 @@ def taylor_series(
         length = _step(series[:moving], tolerance, rest)
         if scene.attitude is not None:
             length = min(length, _step(series[moving:], tolerance, rest, 4))
-        # No pulse of the expansion is skipped.
+        # Shortened so that no pulse of the torque is skipped.
         length = length if tape is None else tape.reach(length)
         length = length.copy_sign(times[-1])
         if switches is not None:
@@ -150,14 +149,14 @@ class _Limit:
         if step + stops >= self._most:
             self._refuse(stops + (self._forecast(step, abs(begin), rest) if step else 0))
         elif step == 0:
-            # The first step alone justifies a refusal only if the limit would be exceeded tenfold.
+            # The first step alone counts only if the limit would be exceeded tenfold.
             if rest > 10 * Decimal(self._most) * abs(length):
                 self._refuse(rest / abs(length))
         elif self._effort is not None and 2 * step >= self._next:
             if step >= self._next:
                 needed = self._forecast(step, abs(begin), rest)
-                # Where omega grows without bound, steps become shorter, and their mean length is
-                # unsuitable for a forecast.
+                # Where omega grows without bound, steps become shorter, and their mean length gives
+                # no forecast.
                 shrinks = 10 * abs(length) * step < abs(begin)
                 if needed > Decimal(_PACE_SLACK * self._most) and not shrinks:
                     self._refuse(needed)
@@ -208,8 +207,8 @@ def _law_of(scene: Scene) -> TorqueLaw:
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
 
-    They are at most `tolerance` times the largest of the first `leading` unknowns or, if these are
-    0, of their first nonzero Taylor terms.
+    They are at most `tolerance` times the largest of the first `leading` unknowns, or of their
+    first nonzero Taylor terms if these unknowns are 0.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -218,7 +217,7 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
         size = _size(coefficients, k)
         if size and begun is not None:
             lengths = [
-                # The root needs few digits, but an exponent range as large as that of Decimal.
+                # The root needs few digits, but Decimal's range of exponents.
                 ((tolerance * before / size).ln() / (k - j)).exp()
                 for j in range(begun, 1 if begun == 0 else begun + 4)
                 if (before := _size(coefficients, j, leading))
@@ -244,15 +243,15 @@ def _is_continued(
     length: Decimal,
     tolerance: Decimal,
 ) -> bool:
-    """Return whether the derivatives at the end of a step are those of the Taylor series.
+    """Return whether the rates at the end of a step agree with the derivative of the Taylor series.
 
-    A pulse of the torque within the step may be invisible at its beginning. The last element of
-    `equations` determines the effect of rounding, which is allowed.
+    A pulse of the torque within the step may be invisible at its beginning. Rounding errors, which
+    the last of the `equations` determines, are allowed.
     """
     slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
 
     def rates(which: _Equations, factor: Decimal) -> Row:
-        # Where a table changes at the end of the step, its earlier piece is meant.
+        # If a table changes at the end of the step, its earlier piece applies.
         moved = [factor * x for x in state]
         return [row[1] for row in which.expand(factor * end, moved, 1, length < 0)[:3]]
 
@@ -296,7 +295,7 @@ class _Equations:
         else:
             self._law = _law_of(scene)
         self._changing = scene.changing
-        # The equations of a changing inertia contain the torque, not divided by moments.
+        # With a changing inertia, the torque is not divided by moments.
         exact = divisors(scene) if scene.changing is None else (Fraction(1),) * 3
         self._moments = list(map(to_decimal, exact))
         self._velocity, self._attitude = velocity, scene.attitude is not None
@@ -360,7 +359,7 @@ class _Equations:
         for (amplitude, frequency), quarter in waves:
             rate = Decimal(frequency)
             sine, cosine = sine_cosine(rate * time)
-            # The derivatives of sin are sin, cos, -sin, -cos; those of cos begin one later.
+            # Derivatives 0 to 3 of sin are sin, cos, -sin, -cos; those of cos begin one later.
             cycle = [sine, cosine, -sine, -cosine]
             factor = Decimal(1)
             for k in range(order):
@@ -377,7 +376,7 @@ class _Equations:
 def _moved(polynomial: Sequence[float], time: Decimal) -> Row:
     """Return the Taylor coefficients around `time` of a polynomial around 0."""
     row = [Decimal(c) for c in polynomial]
-    # Horner's scheme, repeated, moves the centre of a polynomial.
+    # Repeated Horner's scheme.
     for first in range(len(row) - 1):
         for k in range(len(row) - 2, first - 1, -1):
             row[k] += time * row[k + 1]
@@ -401,8 +400,8 @@ def _rates_by_momentum(
         j, m = (i + 1) % 3, (i + 2) % 3
         push = torque[i] - product(series[j], momentum[m][::-1])
         push += product(series[m], momentum[j][::-1])
-        # Coefficient k of L' is k + 1 times coefficient k + 1 of L, whose only term with
-        # coefficient k + 1 of omega is its product with coefficient 0 of I.
+        # Coefficient k of L' is k + 1 times coefficient k + 1 of L. In this, coefficient k + 1 of
+        # omega occurs only in the product with coefficient 0 of I.
         others = sum(
             (product(each[1:], omega) for each, omega in zip(inertia[i], backward, strict=False)),
             Decimal(0),

@@ -1,4 +1,4 @@
-"""Switches of a recorded torque in decimal arithmetic: the roots at which its steps end."""
+"""Switches (jumps) of a recorded torque in decimal arithmetic; steps end where they change."""
 
 from decimal import Decimal, getcontext
 
@@ -8,19 +8,19 @@ from pyharness.model.errors import SLIDING, TimedError
 from pyharness.truth.decimal_functions import Row, value_at
 from pyharness.truth.tape_series import TapeSeries
 
-# The last terms of an operand in a step, over the sum of all.
+# Largest last terms of an operand in a step, over the sum of all.
 _SMALL = Decimal("1e-8")
-_ZERO = Decimal("1e-20")  # part of the terms that is a rounding error
+_ZERO = Decimal("1e-20")  # part of the terms that counts as rounding error
 _IMAGINARY = 1e-4  # largest imaginary part of a real root, over the step
 _NEWTON = 8
-_TOGETHER = Decimal("1e-15")  # relative difference of roots that are one
+_TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 
 
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    An operand at a level, where its switch changes, is in `_levels` by slot, with the end of the
-    interval that the next step leaves: -1 for the lower end, 1 for the upper.
+    A switch changes where its operand crosses a level. `_levels` has, by slot, the operands at a
+    level: -1 if it is the lower end of their interval, 1 if the upper.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -31,11 +31,11 @@ class Switches:
         self._next: dict[int, int] = {}
 
     def settle(self) -> bool:
-        """Set the results that are not those of the operands; return whether one changed."""
+        """Set the results by the values of the operands; return whether one changed."""
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
-                # Its derivative shows the side; on a level, the result is that of NumPy.
+                # Its derivative decides; an operand that stays on the level has NumPy's result.
                 known = self._levels.get(slot)
                 value = level if is_floor else Decimal(0)
                 if slot in self.results and known is not None:
@@ -52,9 +52,9 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Return whether an operand did not leave its level, so that its result was changed.
+        """Return whether an operand would not leave its level, so that its result was changed.
 
-        Raise TimedError if neither side leaves it.
+        Raise TimedError if it leaves the level with neither result.
         """
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = self._levels.get(slot)
@@ -75,7 +75,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened until all operands are resolved and to the first root."""
+        """Return the step (s), shortened to resolve all operands, and to the first root."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []

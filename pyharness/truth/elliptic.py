@@ -1,7 +1,8 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike Taylor series, it loses no digits with time, and many flips near the separatrix take no more
-work. It uses Landen's transformation, and shares no code with the closed form that it checks.
+Unlike a Taylor series, they lose no digits with time, and many flips near the separatrix take no
+more work. The module uses Landen's transformation, and shares no code with the closed form that it
+checks.
 """
 
 import decimal
@@ -14,7 +15,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene, checked_scene
 from pyharness.truth.decimal_functions import Row, sine_cosine, to_decimal
 
-# Digits of the arithmetic, beside those that the squares of small components need.
+# Digits of the arithmetic; squares of small components add to them.
 _DIGITS = 90
 
 
@@ -45,8 +46,8 @@ def _decades(values: Sequence[Fraction]) -> int:
 
 def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) of a motion that is not steady."""
-    # The formulas need the coefficient whose sign differs from the others to be the second, and
-    # negative. Changing the signs of all coefficients and all components of omega is allowed.
+    # In the formulas, the second coefficient is negative and the others are not. The signs of all
+    # coefficients and all components of omega may be changed together.
     for first, sign in itertools.product(range(3), (1, -1)):
         axes = [first, (first + 1) % 3, (first + 2) % 3]
         a = [sign * coefficients[axis] for axis in axes]
@@ -94,8 +95,8 @@ def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if the second coefficient is negative and another is 0."""
     axis = 0 if not a[0] else 2
     other = 2 - axis
-    # With u the component about the axis `other` and v the component about the second axis,
-    # u' = a[other] v w and v' = a[1] u w, where w, the component about `axis`, is constant.
+    # Let u, v and w be the components about `other`, the second axis and `axis`. Then
+    # u' = a[other] v w and v' = a[1] u w, and w is constant.
     w = omega[axis]
     upper, lower = a[other] * w, a[1] * w
     rate = (-upper * lower).sqrt()
@@ -110,8 +111,8 @@ def _move_on_ellipse(a: Row, omega: Row, time: Decimal) -> Row:
 def _normal(start: Row, p: Fraction, q: Fraction, time: Decimal) -> Row:
     """Return x, y, z (1/s) at `time` (s), where x' = y z, y' = -z x, z' = x y.
 
-    In `start` z is not 0. p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p. The solution
-    uses the addition theorems of sn, cn and dn.
+    `start` has z other than 0; p = x**2 + y**2 is not 0, and q = z**2 + y**2 is at least p. The
+    solution uses the addition theorems of sn, cn and dn.
     """
     x, y, z = start
     sign = -1 if z < 0 else 1
@@ -146,7 +147,7 @@ def jacobi(u: Decimal, comodulus: Decimal) -> tuple[Decimal, Decimal, Decimal]:
         levels.append(k1)
         u = u / (1 + k1)
         complement = 2 * complement.sqrt() / (1 + complement)
-    # Only the square of the remaining modulus has an effect, and it is negligible.
+    # The square of the remaining modulus, on which the functions depend, is negligible.
     sn, cn = sine_cosine(u / (1 + k1))
     dn = Decimal(1)
     levels.append(k1)

@@ -1,4 +1,4 @@
-"""Balls that contain the solution of a scene at requested times."""
+"""Balls (intervals, given by middle and radius) that contain the solution of a scene."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ class Enclosure:
     """Balls that contain the solution of one scene at requested times; None if not requested.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the quaternion, without normalisation, by omega at time 0.
+    derivatives of omega and of the (not normalised) quaternion by omega at time 0.
     """
 
     time: tuple[float, ...]  # s
@@ -85,7 +85,7 @@ def decimals(balls: Balls) -> tuple[list[str], float]:
 
 def rounded_up(x: Fraction) -> float:
     """Return a binary64 number of four digits that is at least `x`; `x` is not negative."""
-    # One factor exceeds the rounding errors of the conversion to a decimal string.
+    # A factor above 1 compensates for rounding to a decimal string.
     candidates = (float(f"{float(x) * factor:.3e}") for factor in (1.0, 1.001, 1.01))
     # Near the least binary64 number, the factors may change nothing.
     above = math.nextafter(float(x), math.inf)
@@ -121,9 +121,9 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
-    They are the square roots of abs(A), abs(B) and abs(C) over the largest, and at least 0.01. The
-    logarithmic norm is then 0 for rotations about the axes of the largest and smallest moment,
-    unless a unit is 0.01.
+    They are the square roots of abs(A), abs(B) and abs(C) over the largest, but at least 0.01. If
+    none is 0.01, the logarithmic norm is 0 for rotations about the axes of the largest and smallest
+    moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

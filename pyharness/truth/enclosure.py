@@ -1,4 +1,4 @@
-"""Proved enclosures: balls that contain the solution of a scene.
+"""Proved enclosures: balls (intervals, given by middle and radius) that contain the solution.
 
 Torque-free motion is proved in closed form (`enclosure_free`), torques of time alone by Taylor
 steps in integers (`certificate`), and all others by Taylor steps in balls (`enclosure_steps`). The
@@ -41,12 +41,11 @@ def enclose(
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
     10**-digits rad/s, times the largest component of omega (for a closed form, of the initial one)
     if that exceeds 1 rad/s. `velocity` (m/s) and `transition` request more; attitude and rotational
-    energy are included if the scene has attitude and moments. `progress` receives the percentage of
-    the last time, 100, and the time as text. `effort` is a factor on the limit of steps.
+    energy are included if the scene has attitude and moments. `progress` receives a percentage of
+    the time, 100, and the time as text. `effort` is a factor on the limit of steps.
 
-    Raise InputError if the times are not in order, python-flint is missing, or the torque is
-    opaque. Raise it also if the solution can't be enclosed up to the last time, or the limit is
-    exceeded.
+    Raise InputError if the times are not in order, python-flint is missing, the torque is opaque,
+    the solution can't be enclosed up to the last time, or the limit is exceeded.
     """
     checked_scene(scene, True, True, True, True)
     if not 1 <= integer("digits", digits) <= MOST_DIGITS:

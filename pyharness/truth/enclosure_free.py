@@ -1,9 +1,8 @@
 """Proved enclosures of torque-free motion at any time, in ball arithmetic (python-flint).
 
 Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
-1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by comparing fractions, never
-balls, because a scene's binary64 numbers are exact. Import this module only where python-flint is
-installed.
+1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of
+fractions, not of balls (intervals). Import this module only where python-flint is installed.
 """
 
 import math
@@ -30,9 +29,9 @@ def enclose_free(
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
     With `attitude`, four more contain the unit quaternion from body to space, scalar first and
-    continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, and times the largest
-    initial component if that exceeds 1 rad/s. The motion must be bounded, and have moments for an
-    attitude. Raise InputError if 20 000 bits do not suffice.
+    continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, times the largest
+    initial component if that exceeds 1 rad/s. The motion must be bounded; an attitude needs
+    moments. Raise InputError if 20 000 bits do not suffice.
     """
     scale = max(Fraction(1), *(abs(Fraction(w)) for w in scene.omega))
     bits = min(64 + math.ceil(digits * math.log2(10)), _MOST_BITS)
@@ -68,7 +67,7 @@ def _solution(scene: Scene, attitude: bool) -> Callable[[Fraction], Balls]:
         omega = omega_on_ellipse(axis, a, w, t)
         if moments is None:
             return omega
-        # The motion is a rotation about the angular momentum and one about the symmetry axis.
+        # Rotations about the angular momentum and about the symmetry axis make up the motion.
         about = list(w)
         about[axis] *= moments[axis] / moments[axis - 1]
         turned = _rotated(begin, [x * t / 2 for x in about])
@@ -96,13 +95,13 @@ class Orbit:
 
     Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start`
     + `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` is k**2, and `square` the square of
-    the size of dn. On the separatrix m = 1; cn and dn are then sech, and sn is tanh.
+    the size that multiplies dn. On the separatrix m = 1; cn and dn are then sech, and sn is tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
         """Compute the constants for coefficients `a` and initial omega `w` (rad/s)."""
         s = [abs(x) for x in a]
-        # The sign of the coefficient of the axis of sn differs from the two others.
+        # The coefficient of the axis of sn differs in sign from the others.
         y = next(k for k in range(3) if a[k] * a[k - 1] < 0 and a[k] * a[k - 2] < 0)
         x, z = (y + 1) % 3, (y + 2) % 3
         if s[x] * w[z] ** 2 < s[z] * w[x] ** 2:
@@ -151,7 +150,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; a reduction is exact with any integer."""
+    """Return an integer near the middle of `x`; any will do for an exact reduction."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 
@@ -164,15 +163,15 @@ def carlson(x: Fraction, y: Fraction, z: Fraction) -> arb:
 class _Attitude:
     """The attitude along an orbit.
 
-    Let e be the direction of the axis of dn and n that of the angular momentum L, both in the body.
-    Then n e = c dn(u) with c > 0. T is the kinetic energy. The attitude is the product of a
+    Let e be the direction of the axis of dn and n that of the angular momentum L, both in the body,
+    and T the kinetic energy. Then n e = c dn(u) with c > 0. The attitude is the product of a
     constant, the rotation by psi about e, and the smallest rotation from n to e.
 
     Euler's equations give psi' = (2 T/L + omega e)/(1 + n e). Like dn, psi' has the periods 2K and
     4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the
     residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of
-    theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles and residues. The
-    difference of the two is thus constant.
+    theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles and residues, so
+    that the difference is constant.
     """
 
     def __init__(

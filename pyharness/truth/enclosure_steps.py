@@ -1,12 +1,12 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step a polynomial p approximates the solution of y' = f(t, y). Its residual p' - f(t, p) is
-bounded on the whole step in ball arithmetic; the proof does not depend on how p was computed.
+In each step a polynomial p approximates the solution of y' = f(t, y). Any p will do, because its
+residual p' - f(t, p) is bounded on the whole step in ball (interval) arithmetic.
 
 The unknowns form blocks, such as omega and attitude. The norms of the blocks of y - p form the
-vector r, which obeys r' <= M r + d, where d bounds the residual. The diagonal of M bounds the
-logarithmic norms of the diagonal blocks of the Jacobian near p, and is not negative. The rest of M
-bounds the norms of the other blocks. Since M is not negative, r(h) <= exp(h M) (r(0) + h d). For
+vector r, which obeys r' <= M r + d, where d bounds the residual. The diagonal of M, not negative,
+bounds the logarithmic norms of the diagonal blocks of the Jacobian near p; the rest of M bounds the
+norms of the other blocks. Since M is not negative, r(h) <= exp(h M) (r(0) + h d). For
 one block this is theorem I.10.6 of Hairer, Norsett and Wanner 1993, Solving Ordinary Differential
 Equations I.
 """
@@ -101,7 +101,7 @@ class Equations:
 
     The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
     `transition`, the derivatives of omega and attitude by omega at time 0, row by row. `blocks` are
-    the slices of the groups that are present, `scales` the units of errors.
+    the slices of the present groups, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -179,7 +179,7 @@ class Equations:
         changing = self._scene.changing
         assert changing is not None
         matrix = changing.matrix(Dual(time, [arb(1)]))
-        # An element that is constant is a float, whose quotients Python would round.
+        # Constant elements are floats, whose quotients Python would round.
         values = [[x.value if isinstance(x, Dual) else arb(x) for x in row] for row in matrix]
         pushed = [
             n
@@ -193,7 +193,7 @@ class Equations:
 
 
 def _tapes(scene: Scene) -> list[Tape]:
-    """Return tapes whose sum is the torque; a law has one per wave, to avoid rounded sums."""
+    """Return tapes whose sum is the torque; a law has one per wave, because sums are rounded."""
     law = scene.torque
     if isinstance(law, TorqueLaw):
         laws = [TorqueLaw(law.constant, law.rate, frame=law.frame)]
@@ -246,12 +246,11 @@ class _Proof:
         self.blocks = equations.blocks
         self.scales = [arb(x) for x in equations.scales]
         self.breaks = [Fraction(x) for x in equations.breaks]
-        # With few digits, the precision is below binary64, and these balls are not exact.
+        # With few digits the precision is below binary64, so that these balls may be inexact.
         start = [ball(x) for x in equations.start]
         rounding = [x - x.mid() for x in start]
         self.time = Fraction(0)
-        # The middles of the unknowns, as exact balls, and the radius of each block's ball in scaled
-        # units, exact and not negative.
+        # Exact balls of the middles of the unknowns; exact radii of the blocks in scaled units.
         self.middle = [x.mid() for x in start]
         self.radii = [self.norm(rounding, block) for block in self.blocks]
 
@@ -352,10 +351,10 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds on the terms from number `count` of the rates along the polynomials.
+        """Return bounds on the rates' Taylor terms from number `count` on, summed, along p.
 
-        Let the rates be at most M on a disc whose radius is c steps. By Cauchy's estimate, term
-        number k is at most M c**-k at the end of the step. The bounds are geometric series.
+        If the rates are at most M on a disc whose radius is c steps, term number k is at most
+        M c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.
         """
         length = abs(ball(h))
         candidates = []

@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
-In each period of omega the body rotates about the angular momentum by the same angle, so that the
-integration by Taylor series covers only one period. Near the separatrix errors of omega grow
-exponentially; segments therefore start from omega of `elliptic.py`. No code is shared with the
-closed form that this module checks.
+In each period of omega the body rotates about the angular momentum by the same angle, so that
+Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially;
+segments therefore start from the omega of `elliptic.py`. No code is shared with the closed form
+that this module checks.
 """
 
 import decimal
@@ -18,15 +18,13 @@ from pyharness.truth.decimal_series import taylor_series
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.reference import exact_coefficients
 
-# Digits of the arithmetic; thirty are correct after 1e6 periods.
-_DIGITS = 50
+_DIGITS = 50  # of the arithmetic; thirty are correct after 1e6 periods
 _ORDER, _TOLERANCE = 44, Decimal("1e-44")
 # Length of a segment in units of 1/rate; errors grow in it by a factor of some e**10 = 2e4.
 _SEGMENT = 10
 # On the separatrix omega counts as steady where sech(rate * time - u) is below some e**-_SETTLED.
 _SETTLED = 120
-# Work limit of the integration in radians; some three minutes.
-_MOST_RADIANS = 1e5
+_MOST_RADIANS = 1e5  # work limit of the integration; some three minutes
 
 
 def free_attitude(scene: Scene, time: float) -> Row:
@@ -53,7 +51,7 @@ def free_attitude(scene: Scene, time: float) -> Row:
         whole, rest = divmod(abs(end), period)
         period, rest = period.copy_sign(end), rest.copy_sign(end)
         after_rest, after_period = _followed(scene, [rest, period], rate)
-        # One period changes the attitude by this rotation in space, whenever it begins.
+        # Any period changes the attitude by this rotation in space.
         turn = list(product(after_period, conjugate(begin)))
         return unit(list(product(_power(turn, int(whole)), after_rest)))
 
@@ -98,8 +96,8 @@ def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])
     energies = [moment * rate * rate for moment, rate in zip(i, w, strict=True)]
-    # At u = 0, where omega has no component about the middle axis, the low axis has this part of
-    # the energy.
+    # Part of the energy about the low axis at u = 0, where omega has no component about the middle
+    # axis.
     part = (i[high] - i[middle]) / (i[high] - i[low])
     return ((2 * _root(sum(energies) * part / energies[low])).ln() + _SETTLED) / rate
 

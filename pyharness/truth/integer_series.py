@@ -1,8 +1,8 @@
 """A second reference, by Taylor series in integer arithmetic.
 
 It shares no code with `truth/reference.py`. Numbers are integers over 2**BITS, in units in which
-the last time is 1 and the largest omega about 1. Sines and cosines of the torque are unknowns too,
-so that no library function is needed.
+the last time is 1 and the largest omega about 1. Sines and cosines of the torque are further
+unknowns, so that no library function is needed.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from pyharness.model.trajectory import Array
 
 BITS = 160
 _ORDER = 36
-_LAST = 60  # most bits of the last Taylor terms of a step, so that they are below 2**-100 units
+_LAST = 60  # most bits of the last Taylor terms of a step, which are then below 2**-100 units
 _CLOCK = 64  # steps are multiples of 2**-64 of the last requested time
 _MOST_STEPS = 20_000  # a step takes a third of a millisecond
 # The guessed unit of omega is accepted if the largest omega is 2**-_BELOW to 2**_ABOVE units.
@@ -121,7 +121,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _evaluate(terms: Series, part: Fraction) -> Fraction:
-    """Return a Taylor series at the fraction `part` of its step; `terms` are at the step's end."""
+    """Return a series at the fraction `part` of its step, from its terms at the step's end."""
     fixed = _fixed(part)
     total = 0
     for term in reversed(terms):
@@ -157,10 +157,10 @@ class _Equations:
         self._products = [_fixed(x * span * unit) for x in products]
         self._constant = [_fixed(Fraction(x) * p) for x, p in zip(law.constant, push, strict=True)]
         self._rate = [_fixed(Fraction(x) * p * span) for x, p in zip(law.rate, push, strict=True)]
-        # All torque terms of one frequency are two unknowns, a sine and a cosine. If the angle at
-        # the last time is below 1 rad, the unknown is the sine divided by this angle, so that a
-        # sine of large amplitude has all its digits. Of each: the factors of the cosine and of the
-        # sine in each other's derivative, and by axis those of both in the torque over moment.
+        # The waves of one frequency have two unknowns, a sine and a cosine. If the angle at the
+        # last time is below 1 rad, the sine is divided by this angle, so that a sine of large
+        # amplitude has all its digits. An entry has the factors of cosine and sine in each other's
+        # derivative, and by axis their factors in the torque over moment.
         self._waves = []
         for frequency in {abs(f) for _, f in law.sines + law.cosines}:
             angle = Fraction(frequency) * span

@@ -1,8 +1,8 @@
 """Reference solutions of scenes, with estimates of their errors.
 
-A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by the
-Taylor series of equations 13-15 of the thesis in decimals, with exact Euler coefficients. The
-module shares no code with the methods that it checks.
+A sphere, and a symmetric body without torque, have a closed form. Any other scene is solved by
+Taylor series of equations 13-15 of the thesis in decimal arithmetic, with exact Euler coefficients.
+No code is shared with the methods that the module checks.
 """
 
 import decimal
@@ -29,8 +29,8 @@ DIGITS = 40
 _QUICK = ((20, Decimal("1e-19")), (24, Decimal("1e-22")))
 _PRECISE = ((32, Decimal("1e-31")), (37, Decimal("1e-35")))
 _HALF_ULP = 2.0**-53
-# The precise integrations differ by little more than their rounding errors. Their difference may by
-# chance be less than the error, at most 2.5 times in 1500 scenes (tests.campaigns.proved).
+# Precise integrations differ by little more than rounding errors. Their difference may by chance be
+# less than the error, by a factor of at most 2.5 in 1500 scenes (tests.campaigns.proved).
 _BY_CHANCE = 4
 
 
@@ -40,13 +40,11 @@ class Reference:
 
     time: Array  # shape (n,), s; the requested times, up to the last one with finite omega
     omega: Array  # shape (n, 3), rad/s
-    # shape (n, 3), m/s; translational velocity under the scene's forces on its first mass; None if
-    # it was not requested
+    # shape (n, 3), m/s; translational velocity under the scene's forces on its first mass, or None
     velocity: Array | None
     source: str  # a text that states how the solution was computed
     estimate: float  # estimated error of any omega before rounding (rad/s)
-    # shape (n, 3); the part of omega (rad/s) that rounding removed. The sum of `omega` and
-    # `remainder` has twice as many digits as `omega`.
+    # shape (n, 3), rad/s; the part of omega that rounding removed, with as many digits again
     remainder: Array | None = None
     attitude: Array | None = None  # shape (n, 4), unit quaternions; None if the scene has none
     angle_estimate: float = 0.0  # estimated error of any attitude before rounding (rad)
@@ -73,9 +71,9 @@ def reference(
     """Return the reference solution of `scene` at `times` (s).
 
     The times have one sign and lead away from 0; the first may be 0. The estimated error is the
-    largest difference of two integrations with different order and steps; if `precise`, four times
-    that. A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified too
-    much. Attitudes always result from the series.
+    largest difference of two integrations with different order and steps, times four if `precise`.
+    A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified too much.
+    Attitudes are always computed by the series.
 
     `effort` is a factor on a work limit of some ten seconds, forecast from the first steps; None
     means 100 000 steps. A torque that depends on the state must be recorded; the rows end before it
@@ -86,7 +84,7 @@ def reference(
         scene.changing.check(times)
         if isinstance(scene.changing, InertiaFunction):
             scene = with_constant_body(scene)
-        # The tape of a law rounds the sum of amplitudes with one frequency to binary64.
+        # A tape has amplitudes of one frequency as a sum that is rounded to binary64.
         if isinstance(scene.torque, TorqueLaw) and scene.torque.in_space:
             scene = replace(scene, torque=of_law(scene.torque))
     _check_torque(scene)
@@ -151,8 +149,8 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or a torque-free symmetric body in closed form, else None.
 
-    It has as many digits after the decimal point as the current arithmetic has digits; an angle of
-    1e41 rad is computed with some 41 more.
+    It has as many digits after the decimal point as the arithmetic has digits; digits before the
+    point are added to the precision.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

@@ -12,20 +12,19 @@ from decimal import Context, Decimal
 from pyharness.model.tape import N_INPUTS, SWITCHES, Linear, Operation, Table, Tape, live_slots
 from pyharness.truth.decimal_functions import Row, arcsin, arctan, product, sine_cosine, value_at
 
-# A larger angle has no sine in any method; its reduction would take as many digits as it has.
+# A larger angle has no sine in any method, because its reduction would take too many digits.
 _LARGEST_ANGLE = Decimal("1e308")
 # An exponential below exp(-_INVISIBLE) affects no digit of a result, whatever its factor.
 _INVISIBLE = 400
 # Largest ratio of a step to the distance of a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
-# Products of at least this many factors are checked; products of two show in any series.
-_MANY_FACTORS = 3
-# The order is this multiple of the number of factors, but at most _MOST_ORDER, so that a product
-# shows in the series although its factors and their derivatives are 0.
+_MANY_FACTORS = 3  # products of so many factors are checked; those of two show in any series
+# The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
+# whose factors are 0 here shows in the series.
 _ORDER_A_FACTOR = 4
 _MOST_ORDER = 100
-# If the square of a root's polynomial agrees with the operand to this relative accuracy, a negative
-# value of the polynomial is not merely its truncation error.
+# A negative value of a root's polynomial is no truncation error if its square has this relative
+# difference from the operand.
 _TRUSTED = Decimal("1e-6")
 
 _ROUGH = Context(prec=9)
@@ -64,9 +63,9 @@ class TapeSeries:
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations; `change` is relative, of the terms of sums, with alternate sign.
+        """Store the operations, with terms of sums changed by plus or minus `change` (relative).
 
-        `results` are those of the switches by slot, which the caller changes.
+        `results` has the results of switches by slot, which the caller changes.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -79,7 +78,7 @@ class TapeSeries:
             for slot, (_, _, _, table) in enumerate(tape.operations, N_INPUTS)
             if table is not None
         }
-        # The first piece of a table also holds before its first break.
+        # The first piece of a table also applies before its first break.
         changes = {time for _, breaks in self._breaks.values() for time in breaks[1:]}
         self._changes = sorted(changes)
         self._powers, largest = _powers(tape)
@@ -92,9 +91,8 @@ class TapeSeries:
     ) -> None:
         """Begin an expansion around `time` (s).
 
-        The caller extends `omega` and `attitude`, the Taylor coefficients of the unknowns;
-        `attitude` may be empty. At a break of a table the later piece is expanded if `forward`,
-        else the earlier one.
+        The caller extends `omega` and `attitude` (perhaps empty), the Taylor coefficients of the
+        unknowns. At a break of a table the later piece is expanded if `forward`, else the earlier.
         """
         self._order = 0
         self._tables = {
@@ -215,10 +213,10 @@ class TapeSeries:
     def reach(self, length: Decimal) -> Decimal:
         """Return the step (s), reduced so that the series of every operation converges.
 
-        An exponential, or the derivative of a hyperbolic tangent, may be invisible at the beginning
-        of a step and large a little later. Its argument therefore changes by at most half the
-        order, unless the function remains invisible; so do the terms of a product of many factors,
-        in the mean. A divisor has no zero in the circle around the beginning.
+        An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
+        beginning of a step and large a little later. Its argument therefore changes by at most half
+        the order, unless the function remains negligible. The mean order of the terms of a product
+        is limited in the same way. A divisor has no zero in the circle around the beginning.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -228,14 +226,14 @@ class TapeSeries:
             while (change := value_at(sizes, length)) > 2 * most:
                 length /= 2
             if change > most:
-                # The change is a convex function of the length, so that the quotient is enough.
+                # The change is a convex function of the length: one reduction is enough.
                 length *= most / change
         while any(self._is_hidden(each, length) for each in self._powers):
             length *= Decimal("0.7")
         return length
 
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
-        """Return whether a product may be visible in a step, but not in the computed terms.
+        """Return whether a product may matter in a step, although its computed terms do not.
 
         The mean order of a product's terms is the sum of the mean orders of its factors.
         """
@@ -252,7 +250,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return the largest change of an operation's last operand in a step; None is no limit."""
+        """Return the limit, or None, of the change of an operation's last operand in a step."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -284,7 +282,7 @@ class TapeSeries:
 
 
 def _powers(tape: Tape) -> tuple[list[_Power], int]:
-    """Return the products that are no factors of larger ones, and the largest number of factors."""
+    """Return the products that are not part of larger ones, and the largest number of factors."""
     factors: dict[int, Counter[int]] = {}
     numbers: dict[int, int] = {}
     scales: dict[int, float] = {}
@@ -327,7 +325,7 @@ def _divisors(tape: Tape) -> dict[int, set[int]]:
 
 
 def _sum(linear: Linear | None, change: Decimal) -> _Sum:
-    """Return a linear combination, rounded, so that equal numbers have the difference 0."""
+    """Return a linear combination with rounded numbers, so that equal ones cancel exactly."""
     if linear is None:
         return Decimal(0), []
     constant, terms = +Decimal(linear.constant), []

@@ -1,7 +1,7 @@
 """The data of the pages on claims, thesis, figures and apparatus.
 
-A claim is a statement of the thesis that we test. A judgement has our verdicts on it, for original
-and corrected programs; `judged` has the judgements of all claims, `told` those of all sentences.
+A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
+and corrected programs. `judged` has the judgements of all claims, `told` those of all sentences.
 `figures` has Figures 6 to 12, drawn from computed curves, by file name without suffix.
 """
 
@@ -28,7 +28,7 @@ from pyharness.views.pictures import saved
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis, with its anchor and the judgements of its claims."""
+    """A sentence of the thesis, with the judgements of its claims."""
 
     sentence: Sentence
     judged: list[Judgement]
@@ -39,8 +39,7 @@ class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
     `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
-    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is its apparatus
-    entry, or empty.
+    HTML. `cards` has the numbers of the cards that compute it, by program.
     """
 
     number: str
@@ -68,9 +67,10 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return the verdicts to show, each with its programs; a claim not on results has one alone.
+    """Return the verdicts to show, each with its programs.
 
-    Of a design it is that of the programs as printed, else that without their faults.
+    A claim about results has two. Another has one: on a design that of the programs as printed,
+    else that of the corrected ones.
     """
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
@@ -88,7 +88,7 @@ def assumption(case: int, programs: Iterable[str] = (), listing: str = "original
 
 
 def counted(judged: Sequence[Judgement]) -> str:
-    """Return the sentence that counts the verdicts."""
+    """Return a sentence with the counts of verdicts."""
     results = counts(judged)
     others = [verdicts(each)[0][1] for each in judged if each.claim["kind"] != "result"]
     number = Counter(others)
@@ -171,10 +171,9 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the figures, and Figure 7 with its limit, as SVG and CSV.
+    """Return the figures as SVG and CSV, and Figure 7 with both versions of its programs.
 
-    Figure 7 with its limit shows the original and the corrected programs, and the limit of omega of
-    the original one as the step size goes to 0.
+    It also shows the limit of the original program's omega as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
@@ -188,8 +187,8 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, each with its number, caption and place.
 
-    `drawn` has our drawings. `says` has the thesis's sentences on the figure, each with its anchor,
-    which is empty for sections I to IV. `ours` is the text for a figure that is not drawn.
+    `drawn` has our drawings. `says` has the thesis's sentences on the figure, with anchors, which
+    are empty for sections I to IV. `ours` is the text for a figure that is not drawn.
     """
     found = []
     for each in facts("figures")["printed"]:
@@ -213,7 +212,7 @@ def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
     found |= {"several programs": [], "no card": []}
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
-        # The page shows the cards as links.
+        # As links, on the page.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
         programs = [*entry["cards"]]
         group = programs[0] if len(programs) == 1 else "several programs" if programs else "no card"

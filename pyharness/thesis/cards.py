@@ -2,7 +2,7 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
 number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
-the twin's lines for each card; the Fortran port names its cards in comments.
+for each card the lines of the Python port, the twin; the Fortran port names its cards in comments.
 `data/apparatus.toml`, the critical apparatus, explains the deviations of the scan.
 """
 
@@ -24,9 +24,9 @@ PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage of a card that differs between our text and the scan.
+    """A passage of a card that differs between our text and the scan, without blanks.
 
-    `ours` and `scans` are without blanks. `entry` identifies the explanation in the apparatus.
+    `entry` identifies the explanation in the apparatus.
     """
 
     ours: str
@@ -35,7 +35,7 @@ class Difference(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A line of a source file: name of the file, number from 1, and text."""
+    """A line of a source file, with its number from 1."""
 
     file: str
     line: int
@@ -46,9 +46,8 @@ class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
     `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
-    occurrence of its characters after the one before. `printed` is the number in the scan, if it is
-    another, and the apparatus entry that explains it. `lost` is the entry about a card that the
-    scan lacks, else None.
+    occurrence of its characters after the one before. `printed` is another number in the scan, and
+    the apparatus entry that explains it. `lost` is the entry on a card that the scan lacks.
     """
 
     program: str
@@ -92,7 +91,6 @@ class Card(NamedTuple):
 
         Raise ValueError if the text does not have all differences in order.
         """
-        # Differences ignore blanks.
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
         done = at = 0
@@ -137,7 +135,7 @@ class Deck:
     """The cards of a program by number, and the lines of port and twin for each card."""
 
     def __init__(self, program: str) -> None:
-        """Read the table of cards of the program from `data/cards`."""
+        """Read the program's cards."""
         self.program = program
         self._places = facts("cards/places")[program]
         self.cards = {
@@ -294,14 +292,14 @@ def tight(text: str) -> str:
 
 
 def port_file(program: str) -> str:
-    """Return the name of a program's port in the folder `PORT`."""
+    """Return the name of a program's Fortran port."""
     return f"{program.replace('-', '_')}.fypp"
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the defect or reading on which a port's line depends, and whether it is active.
+    """Return the switch on which a port's line depends, and whether the line needs it active.
 
-    Return None if the line depends on no single switch.
+    A switch is a defect or reading. Return None if the line depends on no single one.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

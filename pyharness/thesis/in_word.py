@@ -1,7 +1,7 @@
 """Runs of the programs in an arithmetic of `word.py`, such as the 48 bits of the CDC.
 
-The twins run in each, the compiled programs in the formats of IEEE 754. Their numbers are exchanged
-with the extension module as bytes, in this machine's order.
+The twins run in every arithmetic, the compiled programs in the formats of IEEE 754. Numbers pass to
+and from the extension module as bytes, in this machine's order.
 """
 
 import copy
@@ -129,7 +129,7 @@ def _check_angles(scene: Scene) -> None:
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number in binary32, binary64 or binary128."""
+    """Return the bytes of a number in binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
@@ -140,12 +140,12 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
-    # Memory of a copy, which NumPy allocates, is aligned for any number.
+    # The copy is aligned for any number.
     return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the array of numbers in bytes that `to_bytes` has made."""
+    """Return the numbers in bytes from `to_bytes`."""
     patterns = (each.tobytes() for each in given.reshape(n_bytes(word), -1, order="F").T)
     found = [_number(int.from_bytes(each, sys.byteorder), word) for each in patterns]
     return np.array(found, dtype=object).reshape(given.shape[1:], order="F")
@@ -156,7 +156,7 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the field 0, but the unit in the last place of the field 1.
+        # A subnormal number has the field 0, but the unit of the field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

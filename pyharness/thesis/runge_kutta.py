@@ -33,7 +33,7 @@ def run(
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Points and slopes of the stages have the program's own indices.
+    # With the program's own indices.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -115,7 +115,7 @@ def lipschitz_test(
     last = 6 if velocity_counts else 3
     if listing.has("lipschitz-per-component"):
         found = [*zip(STOP_VARIABLES[:last], change_k, change_u, strict=False)]
-        tests = found[3:] + found[:3]  # the velocity first
+        tests = found[3:] + found[:3]  # velocity first
     else:
         tests = [("UV" if velocity_counts else "U", _norm(change_k[:last]), _norm(change_u[:last]))]
     for variable, change, by in tests:

@@ -1,8 +1,8 @@
 """Words: floating-point formats of p bits with a rounding rule, for runs of the twins.
 
 A number of a word has the operators of a float, also with integers, floats and numbers of the same
-word. A float is treated as a literal of a source text: its shortest decimal representation is
-rounded, not its exact binary value.
+word. A float counts as a literal of a source text: its shortest decimal representation is rounded,
+not its exact binary value.
 
 Rules are functions of pairs of integers (m, e), for a number m 2**e; m has p bits, or fewer if
 subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an
@@ -20,12 +20,12 @@ from typing import Any, ClassVar, NamedTuple
 from pyharness.model.errors import InputError, unknown
 
 RULES = ("nearest-even", "chop", "FX", "RX")
-# Additional bits with which a sine or cosine is computed before it is rounded to the word.
+# Of a sine or cosine before it is rounded to the word.
 _GUARD_BITS = 40
 Pair = tuple[int, Any]
 Rounding = Callable[[int, int], Pair]
 Operation = Callable[[int, int, int, int], Pair]
-# Exponents of an integer coefficient, for the octal exponent fields 0000 and 3776 of a CDC word.
+# For an integer coefficient, from the octal exponent fields 0000 and 3776 of a CDC word.
 _LEAST, _MOST = -1023, 1022
 
 
@@ -239,8 +239,7 @@ class Number:
     def __eq__(self, other: object) -> bool:
         """Return whether the difference, computed in the word, is zero.
 
-        In a CDC word, two neighbouring numbers may have the difference zero, and then count as
-        equal.
+        In a CDC word, two neighbouring numbers may have the difference zero.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -310,7 +309,7 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        It is applied to the `_shadow` of each; a finite result other than 0 means that 0 was added.
+        It is that of the `_shadow` of each operand; if it is finite and not 0, 0 was added.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):

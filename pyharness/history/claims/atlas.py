@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes. Each claim counts equally: 1 point
-if it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
+The starts cover the sphere of directions at several magnitudes. A claim scores 1 point if it is
+reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
 """
 
 import math
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
-# The points of each code, with the code as index.
+# Indexed by code.
 _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the verdict codes of the claims for the original programs, by start in `starts`."""
+    """Return verdict codes of the original programs by claim, for each of the thesis's starts."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}
@@ -277,7 +277,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # The maps of the first and last magnitude resemble their neighbours'.
+    # The first and last maps resemble their neighbours.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)

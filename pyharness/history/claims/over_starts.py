@@ -1,7 +1,7 @@
-"""Verdicts on claims from many initial omegas at once, by the functions in `rules`.
+"""Verdicts on claims from many initial omegas (starts) at once, by the functions in `rules`.
 
-A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none.
+A sweep supplies the starts, the listing with its readings, and the number of steps. Each start is
+used in all cases in which the thesis gives none.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
 _TOLERANCE = 1e-12
-_EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected time beforehand
+_EFFORT = 1e9  # in effect none, because a sweep reports its expected time beforehand
 
 
 class Starts:
@@ -41,9 +41,9 @@ class Starts:
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
+        """Store the laboratory and the starts (rad/s), shape (n, 3)."""
         self._one, self._omega0 = one, omega0
-        # As the methods of the same names of `Laboratory`.
+        # As in `Laboratory`.
         self.scene = one.scene
         self.solution = cache(self._integrated)
         self.error = cache(partial(rules.largest_error, self))
@@ -52,7 +52,7 @@ class Starts:
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Return the runs of a program on a case from every start."""
-        # Other runs are needed once, for their error, which is cached.
+        # Other runs serve once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def _starts(self, case: int) -> Array:
@@ -96,9 +96,9 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the code of the verdict on a claim for each initial omega of a batch, shape (n,).
+    """Return the codes of the verdict on a claim for the starts of a batch, shape (n,).
 
-    Every code is SILENT if the claims do not apply to the sweep. Only cases of the claim are run.
+    All are SILENT if the claims do not apply to the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -123,8 +123,7 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # Two benches are cached: with the requested number of steps, and with 100 steps for claims
-    # independent of this number.
+    # One with the requested number of steps, and one with 100 for claims independent of it.
     return Starts(one, batch.omega0)
 
 

@@ -1,8 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-A twin is our port to Python. Results must agree bit for bit in all cells (a program, a case,
+A twin is our Python version. Results must agree bit for bit in all cells (a program, a case,
 defects and readings) and in random scenes. `docs/how-to/ports.md` describes the protocol.
-The report has the first differing steps, and the times of the answers.
 """
 
 import math
@@ -59,14 +58,14 @@ class Cell:
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
-        """Return the trajectory of the Python port of the program."""
+        """Return the twin's trajectory."""
         run = PROGRAM_REGISTRY[self.listing.program].run
         return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
 
 
 @dataclass(frozen=True)
 class PortCheck(Check):
-    """The comparison of a port with the Python twin in one run.
+    """The comparison of a port with the twin in one run.
 
     `difference` has the first step that differs, with the value of each variable; `seconds` is the
     time until the port's answer.
@@ -196,7 +195,7 @@ def _rows(twin: Trajectory) -> Array:
     return np.column_stack([twin.recorded_time, twin.omega, twin.velocity])
 
 
-_MOST_STEPS = 3  # failed checks whose step is shown in full
+_MOST_STEPS = 3  # failed checks shown in full
 _UNITS = {"T": "s", "U": "rad/s", "V": "m/s"}
 _STEP = (*words("variable unit ours theirs"), Column("ulp"))
 _TIMES = (
@@ -214,7 +213,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
     seconds = sum(check.seconds or 0.0 for check in checks)
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
-    # Sections for steps follow the list of failures, the second section.
+    # After the list of failures, the second section.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
     known = {"seed": seed} if seed else {}

@@ -17,7 +17,7 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.bounded import ErrorBound
 from pyharness.truth.reference import Reference
 
-# Largest relative error that rounding causes in any method, divided by the error amplification.
+# Relative error that rounding causes in any method, divided by the error amplification.
 _ROUNDING = 4e-15
 
 
@@ -28,9 +28,9 @@ class ProgramFinding:
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # distance of Fortran and the twin; None if only the twin was run
-    differences: tuple[str, ...]  # names of the results in which Fortran and the twin differ
-    order: Order | None  # measured for a corrected program in binary64 only
+    ulps: float | None  # None if only the twin was run
+    differences: tuple[str, ...]  # results in which Fortran and twin differ
+    order: Order | None  # for a corrected program in binary64 only
     seconds_per_step: float
 
     __repr__ = short_repr

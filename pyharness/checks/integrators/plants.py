@@ -1,4 +1,4 @@
-"""Faults planted in an integrator's requests and answers, and the self-test that uses them."""
+"""Faults planted in an integrator's requests and answers, and their self-test."""
 
 import itertools
 import json
@@ -25,7 +25,7 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
-# A function of a quaternion, omega at both ends of a step, and its size (s).
+# From a quaternion, omega at both ends of a step, and its size (s).
 Advance = Callable[[Any, Array, Array, float], Any]
 
 
@@ -37,7 +37,7 @@ class IntegratorPlant:
     request: Callable[[dict[str, Any]], object] | None = None
     state: Callable[[State, Scene], State] | None = None
     advance: Advance | None = None
-    # What an integrator with the fault has, of `_possible`.
+    # What the fault requires of the integrator, of `_possible`.
     needs: tuple[str, ...] = ()
 
 
@@ -170,7 +170,7 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
         motion = ask(json.dumps(asked).encode(), rows)
         if plant.state is None or (motion.attitude is None and "attitude" in plant.needs):
             return motion
-        # A fault of omega alone does not read the attitude, which may be None.
+        # Without attitudes the fault is of omega alone.
         state: Any = State(motion.omega, motion.attitude)  # type: ignore[arg-type]
         return replace(motion, **plant.state(state, scene)._asdict())
 
@@ -178,13 +178,13 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
-    """Yield the outcomes without a fault, then with each planted fault.
+    """Yield the outcome without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
-        """Return the results with a fault, the names of the recognised ones, and the failures."""
+        """Return results with a fault, names of the recognised ones, and the number of failures."""
         found = Verdict(command)
         for problem in chosen:
             asking = with_plant(ask, plant, problem.scene) if plant else ask

@@ -1,7 +1,7 @@
 """Faults of a chosen size: which function is faulty, and how its result changes.
 
-A fault is planted in the running process, and removed when its context ends. A Python twin with a
-fault is made from a copy of the sources with one replacement.
+A fault is planted in the running process, and removed when its context ends. A faulty Python twin
+is a copy of the sources with one replacement.
 """
 
 import importlib
@@ -48,7 +48,7 @@ def instead(target: str, faulty: Faulty) -> Fault:
 
     def planted(size: float) -> AbstractContextManager[Any]:
         right = pkgutil.resolve_name(target)
-        # A lambda, unlike a partial function, can replace a method of a class.
+        # A lambda, unlike a partial function, can replace a method.
         return patch(target, lambda *rest, **named: faulty(size, right, *rest, **named))
 
     return planted
@@ -86,7 +86,7 @@ def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, An
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of the attribute `name` of a result; it has no effect on None."""
+    """Return a change of a result's attribute; it has no effect on None."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)

@@ -58,7 +58,7 @@ class Rate:
     method: str
     threads: int
     setting: float | None  # tolerance or number of steps; None for a closed form
-    bodies: int  # of a call
+    bodies: int  # in a call
     seconds: float  # the shortest time of a call
     error: float  # largest relative error of omega in the sample
     note: str = ""  # the fastest of several variants
@@ -224,7 +224,7 @@ class Size:
     """The run times per body of our methods, on one core, in a call for `bodies` bodies."""
 
     bodies: int
-    seconds: dict[str, float]  # by method
+    seconds: dict[str, float]
 
 
 @dataclass(frozen=True)

@@ -59,10 +59,10 @@ class Summary:
     """The ratios over all scenes of a kind, at one target error."""
 
     kind: str
-    bodies: int  # of a call
+    bodies: int  # in a call
     target: float | None  # None for all target errors together
     scenes: int  # pairs of scene and end time in which both solvers reach the error
-    mean: float | None  # geometric
+    mean: float | None  # geometric mean
     smallest: float | None
 
 

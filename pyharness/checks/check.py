@@ -21,7 +21,7 @@ DRAWS = 1000
 RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
 # Begins the note if a method could not solve the problem or reached its work limit.
 REFUSED = "refused: "
-# Their ids name the problem before the method.
+# In their ids the problem precedes the method.
 _CIRCUMSTANCE_FIRST = ("random", "external")
 
 BITS = Basis(
@@ -123,12 +123,12 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the suite of the check."""
+        """Return the kind of the check, the first part of its id."""
         return self.name.suite
 
     @property
     def mark(self) -> str:
-        """Return the mark of the basis: proved, derived or measured; empty without a limit."""
+        """Return how the limit was set: proved, derived or measured; empty without a limit."""
         return self.basis.mark if self.basis else ""
 
     @property
@@ -177,7 +177,7 @@ def make_checks(
 ) -> Iterator[Check]:
     """Yield finished checks, and those deferred ones that `only` requests.
 
-    An exception of a type not in `raised` becomes a failed check. A suite yields any checks.
+    An exception becomes a failed check, unless its type is in `raised`.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -207,10 +207,10 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites; an exception becomes a failed check.
+    """Yield the requested checks of all suites (kinds of checks).
 
-    NotBuiltError is raised again, and InputError in the suites `of_the_user`, whose input is the
-    user's.
+    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
+    InputError, both of which are raised.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -222,7 +222,7 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the suites that may contain a requested check."""
+    """Return the kinds of checks that may contain a requested check."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 

@@ -33,10 +33,10 @@ from pyharness.thesis import collocation
 from pyharness.thesis.equations import omega_rate
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# As a polynomial of omega; each product of stages doubles the degree of a step.
+# Degree of a step as a polynomial of omega; each product of stages doubles it.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
-# Along the longest chain of operations in a step, without linear systems: four stages of a rate and
-# a sum, with seven roundings each, and the result.
+# Roundings along the longest chain of operations in a step, without linear systems: four stages of
+# a rate and a sum, with seven each, and the result.
 _LONGEST = 40.0
 # Largest distance, over omega, of the neighbours from which a derivative is computed.
 _REACH = 2.0**-2
@@ -59,7 +59,7 @@ class Probe:
 
     found: Array  # measured
     derived: Array  # derived, of the same shape
-    limit: float  # on the absolute difference of two elements
+    limit: float  # bound on the absolute difference of two elements
 
     @property
     def difference(self) -> float:
@@ -164,7 +164,7 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     expected, slope = boundary(matrix, direction)
 
     def grows(distance: float) -> bool:
-        # Along -1 it is exactly the eigenvector that decays.
+        # Along -1 the perturbation is exactly the eigenvector that decays.
         second = distance if direction.real else -distance
         start = (1.0, -1.0 if direction.real else 0.0, 1.0)
         top = Scene("top", start, None, (distance, second, 0.0), step_size=1.0)
@@ -280,8 +280,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return two step sizes (s) of divergence, and a bound on their relative difference.
 
-    The body spins about stable axis 3 for `time` (s). The first step is that of
-    `smallest_divergent`. With the second, linear stability lets the wobble about axis 3 double.
+    The body spins about stable axis 3 for `time` (s). The first step is from `smallest_divergent`;
+    with the second, by linear theory, the wobble about axis 3 doubles.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients

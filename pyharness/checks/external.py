@@ -34,7 +34,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 __all__ = ["external_checks", "problems"]
 
-# Elsewhere the finest that a method accepts; here that would take too long.
+# The finest tolerances of these methods would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
 _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
@@ -42,7 +42,7 @@ _SOLVED = (
 )  # fmt: skip
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
-# Once when it is read, and again when a method uses it.
+# A number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
 # `auto` chooses a suitable method, and `closed-form` evaluates a formula.
@@ -91,7 +91,7 @@ def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> It
     Value and limit, in the problem's unit, are for the component with the largest ratio.
     """
     for problem in problems:
-        # Together, so that repeating one check gives the same bits.
+        # Solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):
             values = [value for value in problem.values if float(value.time) * side > 0.0]
             values.sort(key=lambda value: abs(float(value.time)))
@@ -278,7 +278,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # NaN first.
+    # NaN counts as the largest.
     distance, limit, note = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     return name.bounded(distance, limit, _PUBLISHED, note)
 

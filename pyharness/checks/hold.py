@@ -60,7 +60,7 @@ OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
 _TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
-_ROWS = 10  # of a program's run, compared with the true solution
+_ROWS = 10  # rows of a program's run compared with the true solution
 FORMS = ("closed-form", "auto")
 
 
@@ -103,7 +103,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of the trial `suite`."""
+    """Yield deferred checks of all methods in the extreme scenes of a trial."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -174,10 +174,10 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # Without steps; only the rounding of A, B and C is added.
+        # A closed form has no steps; only the rounding of A, B and C is added.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # In such steps the method only conserves energy and momentum.
+        # In steps of this size the method only conserves energy and momentum.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
@@ -207,7 +207,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
         made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
-            # Omega, its sums, and the last iteration.
+            # Each step rounds omega, its sums, and the last iteration.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
         # `conserved` returns at most the error of omega.

@@ -22,9 +22,9 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 
-# Above it, the linearised flow does not predict the error.
+# Relative error above which the linearised flow does not predict the error.
 LINEAR = 0.01
-# Difference of two vectors of the largest magnitude; a larger limit is no restriction.
+# Largest difference of two vectors, over the largest omega; a larger limit is no restriction.
 MOST = 2.0
 
 
@@ -159,7 +159,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a flow of infinite amplification, for closed forms, whose limits do not use it."""
+    """Return an infinite amplification, for closed forms, whose limits do not use it."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 

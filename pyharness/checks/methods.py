@@ -50,7 +50,7 @@ START: Quaternion = (0.5, -0.1, 0.7, 0.5)
 # Times (s): one long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# With a tolerance, and those of them that propagate the attitude. The torques of the cases are not
+# Methods with a tolerance, and those that propagate the attitude. The torques of the cases are not
 # weak.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
@@ -152,9 +152,9 @@ def _same_steps(scene: Scene, name: Name) -> Check:
     return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0, BITS)
 
 
-# Serves as true solution, at its finest tolerance.
+# A method of solve_ivp serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Successive halvings that must show the order, and the largest deficit in the last; .006 occurs.
+# Successive halvings that must show the order, and the accepted deficit in the last; .006 occurs.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(

@@ -174,6 +174,6 @@ class PortProcess:
                 break
         said = self._told.decode(errors="replace").split("\n")
         told = [printable(each.strip()) for each in said if each.strip()]
-        # Not the last line: some interpreters then print their version.
+        # Some interpreters print their version after the error.
         told = [each for each in told if "rror" in each] or told
         return f"it ended {how} before it had answered{f': {told[-1][:200]}' if told else ''}"

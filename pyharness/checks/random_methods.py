@@ -49,11 +49,11 @@ from pyharness.truth.integer_series import integer_series
 
 # A pair of draws is a plain scene and one of a kind in `NASTY`. Because the true solution takes
 # longer, methods run in one of 4 pairs; those in Python or decimal arithmetic in one of 60.
-# Attitudes are in one of 20 draws; one of 20 has a torque that depends on the state, one of 80 with
-# the methods in Python.
+# Attitudes are in one of 20 draws; one of 20 has a torque that depends on the state, one of 80 also
+# runs the methods in Python.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
-# On the work limit of the reference, for an attitude and for such a torque.
+# Factors on the work limit of the reference, for an attitude and for such a torque.
 _EFFORT, _EFFORT_TORQUE = 0.05, 0.2
 ROUNDING = 2e-15  # relative, for an error amplification of 1
 CAMPAIGN = Basis(
@@ -63,12 +63,12 @@ CAMPAIGN = Basis(
 )
 """Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which a series has no reason to refuse
-# May diverge, or be too fast for any true solution and any series.
+# These scenes may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
-# Below it, methods in Python or decimal arithmetic take too long.
+# Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
 _MORE_WORK = "allow more work"
-_EARLIER = 0.4  # of the last time, to judge intermediate output too
+_EARLIER = 0.4  # fraction of the last time, to judge intermediate output too
 
 Entrances = dict[str, Callable[[], MethodRun]]
 

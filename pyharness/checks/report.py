@@ -78,13 +78,13 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return the marks of the checks' limits, as in ``proved, derived``; a dash without limits."""
+    """Return how the checks' limits were set, as in ``proved, derived``; a dash without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, with the number of limits of each; empty without limits."""
+    """Return a legend of the marks, and the number of limits of each; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (

@@ -40,7 +40,7 @@ _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
 # Run also at their finest tolerance, which takes methods in Python too long.
 _FINE = ("auto", "taylor", "closed-form")
 _PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
-_CUT = 0.37  # of the last time, where a motion is divided
+_CUT = 0.37  # fraction of the last time at which a motion is divided
 _REPEATS = 4
 
 Attempting = Callable[[Scene, Name], Attempts]

@@ -1,6 +1,6 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
-Fortran and twin could share a fault too small to change the order. Each step of the corrected
+Fortran and Python could share a fault too small to change the order. Each step of the corrected
 programs is therefore recomputed from the program's previous state; only rounding errors may differ.
 
 The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if a quotient
@@ -27,7 +27,7 @@ from pyharness.model.trajectory import STOP_VARIABLES, Array, Stop, Trajectory
 from pyharness.thesis.cells import listing_name, subsets
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Of a rate with its stages, and of the sum to which it is added.
+# Roundings of a rate with its stages, and of the sum to which it is added.
 _ROUNDINGS = 32.0
 _ONE_STEP = Basis(
     "derived",
@@ -71,7 +71,6 @@ def _compare_steps(scene: Scene, name: Name) -> Check:
 
 
 def _is_whole(scene: Scene, run: Trajectory) -> bool:
-    """Return whether a run has omega and velocity for every step."""
     return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
 
 

@@ -8,8 +8,8 @@ from importlib import import_module
 from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
 from pyharness.model.listing import PROGRAMS, Listing
 
-# Each trial is in a module of pyharness.checks.trials, loaded when requested; these are in others
-# than the one of their name.
+# A trial is in the module of its name in pyharness.checks.trials, except these; it is loaded when
+# requested.
 _ELSEWHERE = {"near-symmetry": "separatrix", "shapes": "separatrix"}
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),

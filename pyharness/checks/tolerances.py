@@ -17,14 +17,14 @@ from pyharness.model.scene import Scene
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
-# Smallest for `quick`.
+# Smallest tolerance for `quick`.
 FEW_DIGITS = 1e-7
-# A middling one, and those to try if a finer one is not possible.
+# A middling tolerance, and those to try if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
 # They take minutes at their finest tolerances, others seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
-# In right-hand sides, and the factor by which the coarsest tolerance may exceed them.
+# Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
 _PATIENCE = 10.0
 _ORDERS = {"dop853": 8, "lsoda": 8, "radau": 5, "rk45": 5}
@@ -32,7 +32,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return a method's tolerances in a case of Table 1; only one if `thin`."""
+    """Return a method's tolerances in a case of Table 1, only one if `thin`."""
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)

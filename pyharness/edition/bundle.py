@@ -12,7 +12,7 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# Remains after replacing the supported forms.
+# An unsupported import or export, which remains after replacing the supported ones.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
 # Readers find the comments in the modules.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
@@ -54,7 +54,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
             constants.append(f"{name}: {alias or name}")
-        # Error messages report line numbers.
+        # The number of lines is kept for error messages.
         lines = "\n" * found[0].count("\n")
         left = found["all"] or f"{{ {', '.join(constants)} }}"
         return f"const {left} = module{list(exports).index(needed)};{lines}"

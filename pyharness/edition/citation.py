@@ -12,7 +12,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 
 _NO_NUMBER = "The number of the report is unknown to us"
-# In CITATION.cff, for an editor to replace.
+# Words of CITATION.cff for an editor to replace.
 _PLACEHOLDERS = ("SURNAME", "GIVEN NAMES", "YYYY-MM-DD", "ADDRESS OF THE REPOSITORY", "DOI OF THE")
 PUBLISH = (
     "These pages have no address of their own yet, so that a citation names the page in the "

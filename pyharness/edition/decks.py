@@ -92,7 +92,7 @@ class CardView(NamedTuple):
     port: list[tuple[Place, str | None, bool]]
     notes: list[Note]
     begins: list[Note]
-    kinds: list[str]  # of the notes, by precedence
+    kinds: list[str]  # kinds of the notes, by precedence
 
 
 class Sheet(NamedTuple):

@@ -19,7 +19,7 @@ from pyharness.views.render import json_text
 
 _PICTURES = (".png", ".svg")
 _BESIDE = (*_PICTURES, ".csv", ".schema.json")
-# For contributors.
+# Folder for contributors, which the site omits.
 _OFF_SITE = "contributing/"
 # Their documents with Python examples also become notebooks.
 _NOTEBOOKS = ("gallery", "tutorials")

@@ -212,7 +212,7 @@ def apparatus() -> dict[str, list[tuple[dict[str, Any], Markup]]]:
     found |= {"several programs": [], "no card": []}
     for entry in entries():
         effects = list(effects_of(entry["id"])) if "flag" in entry else []
-        # As links, on the page.
+        # The page shows the cards as links.
         report = entry_report(entry, effects, [name for name in FIELDS if name != "cards"])
         programs = [*entry["cards"]]
         group = programs[0] if len(programs) == 1 else "several programs" if programs else "no card"

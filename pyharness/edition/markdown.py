@@ -107,7 +107,6 @@ def _walk(tokens: Sequence[Token]) -> Iterator[Token]:
 
 
 def _anchor(tokens: Sequence[Token]) -> None:
-    """Add GitHub's anchors to the headings."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":

@@ -1,6 +1,6 @@
 """The data of the story, the home page: charts and numbers of its seven scenes.
 
-They are from runs of the twins, which a script repeats when a visitor changes a value.
+They are from runs of the Python ports, which a script repeats when a visitor changes a value.
 """
 
 import math
@@ -137,7 +137,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return a twin's run, corrected or as printed without the defects in `without`."""
+    """Return the run of a Python port, corrected or as printed without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -207,7 +207,6 @@ def _race_chart(listing: str) -> Chart:
 
 
 def _fractions(program: str) -> list[float]:
-    """Return the places of a program's collocation points, as fractions of DT."""
     return [n / (TERMS[program] + 1) for n in range(1, TERMS[program] + 1)]
 
 

@@ -302,7 +302,6 @@ def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
-    # Diverging.
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest

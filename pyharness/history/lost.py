@@ -153,7 +153,7 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
         matrix = np.array([[a, b], [c / a, d - c / a * b]])
     if mistake == "unscaled-solver":
         x, y = right.T
-        # So NumPy applies the number's arithmetic to each element.
+        # With the array on the left, NumPy applies the number's arithmetic to each element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())

@@ -33,7 +33,7 @@ _HEAD = (
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
     'schematypens="http://relaxng.org/ns/structure/1.0"?>\n'
 )
-# Of an apparatus entry, in the document.
+# Fields of an apparatus entry in the document.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
 KINDS = {
@@ -76,7 +76,6 @@ def tei_document() -> bytes:
 def _add(
     parent: xml.Element, tag: str, text: str | None = None, id: str | None = None, **more: str
 ) -> xml.Element:
-    """Append an element to a parent and return it."""
     element = xml.SubElement(parent, tag, {} if id is None else {_XML + "id": id}, **more)
     element.text = text
     return element
@@ -121,7 +120,6 @@ def _header() -> xml.Element:
 
 
 def _class_of(taxonomy: str, name: str) -> str:
-    """Return the XML identifier of a category in a taxonomy, as in ``kind.missing-text``."""
     return f"{taxonomy}.{name.replace(' ', '-')}"
 
 

@@ -129,7 +129,7 @@ def _runs(
         pages: list[list[str]] = []
         found: list[WordRun] = []
         for word in (DOUBLE, *words):
-            # Compiled, it has the bits of its Python version in 53 bits.
+            # The compiled program has the bits of its Python version in 53 bits.
             run = in_word.run(scene, listing, word) if found else run_program(scene, listing)
             lines = page(scene, listing.program, run).splitlines()
             pages.append(" ".join(lines[len(lines) - run.steps :]).split())

@@ -116,7 +116,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
     finally:
-        # The chunks in work might never end.
+        # Waiting for unfinished chunks might never end.
         processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:

@@ -25,7 +25,7 @@ from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large enough
 # A larger sample of at most the fraction `_PART` of all scenes, and at most `_LONGEST`, is measured
-# even so: a small one includes too much of a batch's constant cost.
+# anyway: a small one includes too much of a batch's constant cost.
 _PART = 0.01
 _LONGEST = 60.0  # s
 # Fewest values sampled along a dimension in which all scenes of a batch are equal.

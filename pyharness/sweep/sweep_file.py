@@ -41,7 +41,7 @@ _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
 _MOST_SAMPLES = 10_000
 _LONGEST_NAME = 240  # bytes; most file systems take 255
-# With attitudes of many bodies.
+# Methods with attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 

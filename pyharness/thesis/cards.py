@@ -132,7 +132,7 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, and the lines of port and twin for each card."""
+    """The cards of a program by number, with their lines in the Fortran and the Python port."""
 
     def __init__(self, program: str) -> None:
         """Read the program's cards."""
@@ -177,7 +177,7 @@ class Deck:
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, why the port has a statement in another form."""
+        """Return, by card number, why the Fortran port has a statement in another form."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
@@ -190,7 +190,7 @@ class Deck:
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the corresponding lines of the twin."""
+        """Return, by card number, the corresponding lines of the Python port."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
@@ -297,7 +297,7 @@ def port_file(program: str) -> str:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch on which a port's line depends, and whether the line needs it active.
+    """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
     A switch is a defect or reading. Return None if the line depends on no single one.
     """
@@ -315,7 +315,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the line of a twin with this text; raise ValueError unless there is exactly one."""
+    """Return the line of a Python port with this text; raise ValueError unless there is one."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

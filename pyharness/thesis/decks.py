@@ -1,7 +1,7 @@
 """Decks as fixed-form FORTRAN, and runs of them after compilation.
 
 They are a third path from the cards to the results: the author's statements, compiled with a
-separate LEQT1F (`data/cards/leqt1f.f`), share no code with port and twin.
+separate LEQT1F (`data/cards/leqt1f.f`), share no code with the Fortran and Python ports.
 """
 
 import re

@@ -1,7 +1,7 @@
 """Runs of the programs in an arithmetic of `word.py`, such as the 48 bits of the CDC.
 
-The twins run in every arithmetic, the compiled programs in the formats of IEEE 754. Numbers pass to
-and from the extension module as bytes, in this machine's order.
+The Python ports run in every arithmetic, the compiled programs in the formats of IEEE 754. Numbers
+pass to and from the extension module as bytes, in this machine's order.
 """
 
 import copy
@@ -35,7 +35,7 @@ _BITS = {24: 32, 53: 64, 113: 128}
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the twin of a listing in the arithmetic `word`; no argument is checked.
+    """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
     The results are rounded to floats; the attribute `exact` has them as numbers of the word.
     """
@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene, with all numbers except counts converted to `word`."""
+    """Return a copy of a checked scene, with all numbers except counts in the arithmetic `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:
@@ -73,8 +73,8 @@ def run_compiled(
 ) -> Trajectory:
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
-    Raise InputError if the compiler does not support the word, or angles of the torque are too
-    large for its sine; NotBuiltError if the extension is not built.
+    Raise InputError if the compiler does not support it, or angles of the torque are too large for
+    its sine; NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -108,7 +108,7 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the compiled programs support; none if not built."""
+    """Return the arithmetics that the compiled programs support; none if not built."""
     try:
         from pyharness import _build
     except ImportError:

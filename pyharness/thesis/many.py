@@ -30,7 +30,7 @@ from pyharness.thesis.compiled import stop_reads_velocity
 from pyharness.thesis.equations import card_torque
 
 _LEAST_WORK = 100_000  # fewest steps, over all bodies, that are worth a thread
-_PIECES = 8  # for each thread, because some runs may end early
+_PIECES = 8  # kernel calls for each thread, because some runs may end early
 _NOT_REACHED = -1
 
 

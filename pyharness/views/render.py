@@ -91,7 +91,6 @@ def csv_text(table: Table) -> str:
 
 
 def _markdown(report: Report) -> str:
-    """Return a report's page, or else its data with all digits."""
     if report.page is not None:
         return "\n".join(map(_markdown_section, report.page))
     assert report.data is not None

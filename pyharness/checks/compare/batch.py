@@ -162,7 +162,7 @@ class Batch:
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
                 return self._run(self.scene, self.arrays, at)
-            except InputError:  # by at least one scene
+            except InputError:  # raised by at least one scene
                 pass
         return self._run_each(at)
 
@@ -176,7 +176,6 @@ class Batch:
 
     @cached_property
     def _shared(self) -> Scene:
-        """Return `scene`, with an attitude only if the torque needs it."""
         attitude = self.scene.attitude if self.scene.torque.needs_attitude else None
         return replace(self.scene, attitude=attitude)
 

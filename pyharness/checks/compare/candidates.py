@@ -176,7 +176,7 @@ def _turned(solver: Any, found: tuple[Array, Array]) -> End:
 def _answered(solver: Solver, omega: Array) -> End:
     method = solver.plan.method
     each = METHODS[method].evaluations if method in FIXED_STEP else method.startswith("gauss-")
-    # A Taylor series expands the right-hand side instead.
+    # A Taylor series expands the right-hand side instead of evaluating it.
     evaluations = None if method == "taylor" else solver.steps * int(each)
     return End(copied_result(omega), solver.status, solver.steps, evaluations)
 

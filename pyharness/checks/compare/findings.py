@@ -23,13 +23,13 @@ _ROUNDING = 4e-15
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one listing, and their differences from the reference and the twin."""
+    """The results of one listing, compared with the reference and the Python version."""
 
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # None if only the twin was run
-    differences: tuple[str, ...]  # results in which Fortran and twin differ
+    ulps: float | None  # between Fortran and Python; None if only Python ran
+    differences: tuple[str, ...]  # results in which Fortran and Python differ
     order: Order | None  # for a corrected program in binary64 only
     seconds_per_step: float
 
@@ -110,7 +110,7 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs, a result is unexpected if Fortran and twin differ, or a corrected program
+        With programs, a result is unexpected if Fortran and Python differ, or a corrected program
         misses its order. Without programs, it is unexpected if a method's error exceeds the limit
         that follows from its tolerance, or rows are missing.
         """

@@ -27,14 +27,14 @@ ORDER_SLACK = 0.5
 # converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# Halved until so many steps are taken, and at least eight times.
+# The step is halved until so many steps are taken, and at least eight times.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# A program that does not converge is incorrect if a textbook method of its order converges with
-# this factor fewer steps.
+# A program that does not converge is incorrect if a textbook method of its order does, with fewer
+# steps by this factor.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
-# Assumed for omega in a step.
+# Assumed number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
 # With a larger condition number, LEQT1F may report a matrix as singular.
 _CONDITION = 1e15

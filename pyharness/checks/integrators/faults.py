@@ -148,7 +148,6 @@ def _with_doubled_rates(scene: Scene) -> Scene:
 
 
 def _with_fast_torque(scene: Scene) -> Scene:
-    """Return the scene with torques that vary twice as fast."""
     law = scene.law
     rate = [2.0 * x for x in law.rate]
     sines, cosines = ([(a, 2.0 * f) for a, f in waves] for waves in (law.sines, law.cosines))

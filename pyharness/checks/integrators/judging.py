@@ -35,7 +35,7 @@ from pyharness.model.attitude import angle_between
 from pyharness.model.basis import Basis
 from pyharness.model.trajectory import Array
 
-_CONSERVED = 8.0  # in a step of a reversible integrator
+_CONSERVED = 8.0  # rounding errors in a step of a reversible integrator
 _NORM = 1e-3
 
 _SLACK = Basis(
@@ -69,7 +69,7 @@ class Verdict:
     """The results of all checks of an integrator."""
 
     command: str
-    again: Callable[[str], str] = lambda name: ""  # repeats the checks in a scene
+    again: Callable[[str], str] = lambda name: ""  # the command that repeats the checks in a scene
     checks: list[Check] = field(default_factory=list)
     judged: list[Judged] = field(default_factory=list)
     drift: Drift | None = None
@@ -130,8 +130,7 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow of its own motion; a low order explains why a higher one is
-    missing.
+    A fault also explains an overflow of its own motion, and a low order the lack of a higher one.
     """
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}

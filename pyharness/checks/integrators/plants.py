@@ -25,7 +25,7 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
-# From a quaternion, omega at both ends of a step, and its size (s).
+# A function of a quaternion, omega at both ends of a step, and its size (s).
 Advance = Callable[[Any, Array, Array, float], Any]
 
 
@@ -37,7 +37,7 @@ class IntegratorPlant:
     request: Callable[[dict[str, Any]], object] | None = None
     state: Callable[[State, Scene], State] | None = None
     advance: Advance | None = None
-    # What the fault requires of the integrator, of `_possible`.
+    # Conditions for the fault, of `_possible`.
     needs: tuple[str, ...] = ()
 
 

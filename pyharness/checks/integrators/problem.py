@@ -43,8 +43,8 @@ _BETWEEN = 8.0  # s from a row to the next
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
 # Levels of the largest step size (1/32 s) and tolerance (1e-6) of the motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
-_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # larger for attitudes
-_TOTAL = 3.0  # of the limits of all rows: errors of explicit methods may grow
+_MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # the attitude has the larger error
+_TOTAL = 3.0  # largest sum of the limits of all rows: errors of explicit methods may grow
 _MOST = 0.9  # a larger limit would pass a body that stops
 
 CHANGE = Basis(

@@ -16,7 +16,7 @@ from pyharness.checks.integrators.problem import Judged, convergence, drift_of, 
 _UNEXPLAINED = 0.1
 _FALLS = 1.0 - ORDER_SLACK
 _OF_MOTIONS = 1e-10  # errors of the motions of faults
-_CONSERVED = 8.0  # in a step, of a conserved quantity
+_CONSERVED = 8.0  # rounding errors in a step, of a conserved quantity
 
 FIRST_ORDER = {
     "first-order": "omega converges with order 1 only",

@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """A fault in a twin, the Python port of a program: a row of `data/plants.toml`."""
+    """A fault in the Python version of a program: a row of `data/plants.toml`."""
 
     file: str
     right: str
@@ -114,7 +114,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty twin, which also replaces the Fortran program if `both`."""
+    """A program with a faulty Python version, which also replaces Fortran if `both`."""
 
     module: ModuleType
     both: bool = True
@@ -131,7 +131,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return a fault in a program's twin; its context yields the program."""
+    """Return a fault in a program's Python version; its context yields the program."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

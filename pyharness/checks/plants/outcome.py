@@ -21,7 +21,7 @@ class Outcome:
     passed: bool
     failed: int
     note: str
-    has_effect: bool = True  # changed a result
+    has_effect: bool = True  # the fault changed a result
 
     @property
     def check(self) -> Check:

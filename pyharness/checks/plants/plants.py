@@ -90,8 +90,8 @@ def _stale() -> Change:
     return change
 
 
-# Of a prepared solver's kernel: omega, status, number of steps, and an array with the estimated
-# error and the error amplification.
+# Results of a prepared solver's kernel: omega, status, number of steps, and an array with the
+# estimated error and the error amplification.
 _Answer = tuple[Array, int, int, Array]
 
 
@@ -111,7 +111,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which prepared solvers repeat the last result in every second call."""
+    """Return a context in which every second call of a prepared solver repeats the last result."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -269,7 +269,7 @@ PLANTS = (
 )  # fmt: skip
 
 
-# It can't distinguish a fault from an intended change.
+# The golden record can't distinguish a fault from an intended change.
 _NOT_ENOUGH = "golden"
 _DRAWS = 12
 

@@ -87,7 +87,7 @@ def _near_symmetry() -> Iterator[Circumstance]:
             ("small-pair", (1.5, 1.0, near), _SHORT),
             ("large-pair", (1.0, near, 0.6), _SHORT),
             ("large-pair-long", (1.0, near, 0.6), LONG),
-            # Near a sphere omega changes slowly; it changes by the same phase in all these scenes.
+            # Near a sphere omega changes slowly; its phase changes equally in all these scenes.
             ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
         ):
             scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
@@ -126,7 +126,7 @@ def _shapes() -> Iterator[Circumstance]:
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
             a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
-            # Of small motions about the three axes (rad/s); the fastest advances by _RADIANS.
+            # Rates of small motions about the three axes (rad/s); the fastest advances by _RADIANS.
             rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
             time = _RADIANS / max(w * abs(own) for w, own in rates)
             yield _stepped(f"{name}-{order}", scene, time)

@@ -32,7 +32,7 @@ class Draw:
     lipschitz: float  # of the stop test (1/s)
     may_stop: bool
     digits: float  # from 0 (coarsest tolerance) to 1 (a method's finest)
-    backward: bool  # integrates to negative times
+    backward: bool  # whether a method integrates to negative times
     stages: int  # of Gauss collocation
 
     @property

@@ -108,7 +108,6 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
 
 
 def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:
-    """Return a table of 12 values, or 6 pulses."""
     times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
     values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(count)]
     if count == 6:

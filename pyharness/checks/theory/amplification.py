@@ -33,7 +33,7 @@ from pyharness.model.trajectory import Array
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A nearer stability boundary counts as z = 0.
+# A stability boundary nearer to z = 0 counts as being there.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 # Samples of z: smallest, largest, and number. The rectangle of _REAL and _IMAGINARY contains all
@@ -184,10 +184,10 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
 class Region:
     """The spectral radius of an amplification matrix on a grid of z and on the imaginary axis."""
 
-    name: str  # text with the programs and methods of this matrix
-    # shape (imaginary, real); of the matrix from `moving`
+    name: str  # the programs and methods with this matrix
+    # Spectral radius on the grid, of the matrix from `moving`; shape (imaginary, real).
     radius: Array
-    # radius minus 1 at `Regions.distances` on the imaginary axis; 0 if only rounding
+    # Spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if only rounding.
     growth: Array
 
 
@@ -195,10 +195,10 @@ class Region:
 class Regions:
     """The stability regions, where the spectral radius is at most 1, on one grid of z."""
 
-    # parts of z on the grid
+    # Real and imaginary parts of z on the grid.
     real: Array
     imaginary: Array
-    distances: Array  # of samples from 0, along the imaginary axis
+    distances: Array  # of samples of z from 0, along the imaginary axis
     regions: tuple[Region, ...]  # in the order of drawing
 
 

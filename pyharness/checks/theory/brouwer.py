@@ -44,8 +44,8 @@ class Noise:
     """Bounds on the errors of a step, over the largest abs(omega)."""
 
     step: float  # s
-    rounding: float  # sign is random
-    truncation: float  # may have a bias
+    rounding: float  # bound of the rounding error, of random sign
+    truncation: float  # bound of the truncation error, possibly biased
     # truncation conserves energy and momentum, and affects the phase alone
     conserves: bool
 
@@ -54,8 +54,8 @@ class Noise:
 class Orbit:
     """Samples of one torque-free motion, and factors for error bounds."""
 
-    # Along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its derivative by time
-    # (rad/s2), and that derivative's by omega (1/s).
+    # Samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
+    # (rad/s2), and the Jacobian of that (1/s).
     states: Array
     slopes: Array
     jacobians: Array
@@ -64,7 +64,7 @@ class Orbit:
     # Largest factors from an error of omega, over `largest`, to the errors of energy and momentum
     # (both relative) and of the frequency (rad/s).
     gains: dict[str, float]
-    turn: float  # from an error of omega, over `largest`, to a phase error (rad)
+    turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
     def limits(self, noise: Noise, steps: float) -> dict[str, float]:
         """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""

@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
 LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
-are computed in fractions, which floats are.
+are computed in fractions; every float is one.
 """
 
 import math
@@ -21,7 +21,7 @@ Exact = list[list[Fraction]]
 Fractions = NDArray[np.object_]
 
 _UNIT = Fraction(1, 2**53)
-# In units of the step size.
+# Collocation points in units of the step size.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
@@ -91,7 +91,7 @@ class Solved:
     """LEQT1F's accuracy for A X = B with one collocation matrix and six right-hand sides."""
 
     ier: int  # of the compiled solver: 0, or 129 for a singular matrix
-    differing: int  # of X and IER, count of differences between Fortran and twin
+    differing: int  # elements of X, and IER, that differ between Fortran and Python
     # Exact condition numbers in the row-sum norm: of the matrix, and with each column divided by
     # its largest element.
     condition: float
@@ -108,7 +108,7 @@ class Solved:
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    # Over the step size times the largest element of the right-hand side.
+    # Error of the increment, over the step size times the largest element of the right-hand side.
     increment_error: float = math.nan
     yardstick: float = math.nan  # `forward` for `numpy.linalg.solve` instead of LEQT1F
 

@@ -29,10 +29,11 @@ from pyharness.model.tape_arrays import table_values
 from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
-# Bound for a right-hand side of Euler's equations: two roundings in each of A, B, C, two in the
+# Roundings in a right-hand side of Euler's equations, at most: two in each of A, B, C, two in the
 # products, and those of the sums.
 _ROUNDINGS = 8.0
-# In rad, twice the error of a component of the quaternion, which has some twenty roundings.
+# Rounding error of an attitude (rad), twice that of a quaternion's component, which has some twenty
+# roundings.
 ATTITUDE = 40.0 * ROUNDING
 # Up to this amplification a method's error must be at most its tolerance; beyond, the tolerance is
 # amplified.
@@ -122,9 +123,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results there, which are returned
-    for the final times. Raise InputError if more than `most` intervals are needed; `fewest` are
-    tried first.
+    `sample` returns the largest rate (1/s) at given times, and results; those at the final times
+    are returned too. Raise InputError if more than `most` intervals are needed; `fewest` are tried
+    first.
     """
     count = fewest
     while True:
@@ -161,7 +162,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
     found = Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        # Their product might underflow.
+        # The divisors' product might underflow.
         storing=ROUNDING * float(gathered(np.abs(state)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,

@@ -11,7 +11,7 @@ from pyharness.model.trajectory import Array
 # Enough iterations of the arithmetic-geometric mean for ratios of 1e-300: each halves the logarithm
 # of the ratio, and doubles the number of digits once the two numbers are close.
 _LEVELS = 16
-# Of numbers that differ less, the arithmetic mean is the arithmetic-geometric one in binary64.
+# Relative difference below which the arithmetic mean is the arithmetic-geometric one in binary64.
 _NEAR = 2.0**-27
 
 

@@ -115,8 +115,8 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# To the viewer, along the axes of the smallest, middle and largest moment; that of the smallest
-# points upwards.
+# Direction to the viewer, along the axes of the smallest, middle and largest moment; that of the
+# smallest points upwards.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
 _HIDDEN = 0.22  # opacity behind the sphere
@@ -190,7 +190,7 @@ def _square(axes: "Axes", scene: Scene) -> list[list[Any]]:
     growth = growth_of_bodies(first, third)
     shades = axes.contourf(first, third, growth, levels=np.linspace(0.0, 1.0, 11), cmap="Blues")
     axes.figure.colorbar(shades, ax=axes, label="Re Q / spin", shrink=0.85)
-    # Two moments are equal.
+    # On these lines two moments are equal.
     for ends in (([0, 0], [-1, 1]), ([-1, 1], [0, 0]), ([-1, 1], [-1, 1])):
         axes.plot(*ends, color="#505050", linewidth=0.8)
     for place, middle in _MIDDLES.items():
@@ -227,9 +227,9 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
 
     L is the angular momentum along the body axes. The last two curves are the separatrix, in the
-    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j = 1 / I (kg m2), and axis 2 has the
-    middle moment. With two equal moments both planes are perpendicular to the third axis. A sphere
-    has no curves.
+    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), with j = 1 / I and the middle moment about axis
+    2. With two equal moments both planes are perpendicular to the third axis. A sphere has no
+    curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -249,7 +249,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
                 curve = np.outer(to_middle, unit[middle]) + np.outer(to_far, unit[far])
                 name = f"around axis {'+' if sign > 0.0 else '-'}{axis + 1}"
                 yield name, curve + np.outer(sign * up, unit[axis])
-    # Of the separatrix from the axis of the largest 1 / I.
+    # Angle of the separatrix from the axis of the largest 1 / I.
     tilt = math.atan2(math.sqrt(j[high] - j[middle]), math.sqrt(j[middle] - j[low]))
     for sign in (1.0, -1.0):
         across = math.cos(tilt) * unit[high] + sign * math.sin(tilt) * unit[low]
@@ -262,7 +262,7 @@ def growth_of_bodies(first: Array, third: Array) -> Array:
     Q is the fastest rate of equation 32. `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
     """
     a, c = first, -third
-    # A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.
+    # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):
         b = -(a + c) / (1.0 + a * c)
     b = np.where(np.isfinite(b), b, 0.0)

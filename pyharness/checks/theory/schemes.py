@@ -135,8 +135,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the first step of the original program: the third stage starts from the
-    point of the second, and the fourth from the point of the third, instead of both from `omega`.
+    If `punched`, it is the first step of the original program, in which the third and the fourth
+    stage start from the point of the stage before instead of from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first

@@ -59,7 +59,7 @@ class Path:
 class Forecast:
     """Predicted final errors of a fixed-step run, relative to the largest omega."""
 
-    truncation: float  # of the component with the largest one
+    truncation: float  # expected truncation error of the component with the largest one
     # Bound of truncation and rounding together; infinite for too large steps.
     bound: float
     rounding: float  # bound of the rounding error
@@ -155,6 +155,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # Zero by the order of the scheme, except for rounding.
+        # These terms are zero by the order of the scheme, except for rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -144,7 +144,7 @@ def _attempts() -> Iterator[Attempt]:
 def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterator[Check]:
     scene, truth = scene_of(name), known()
     tried = by_rows(name.subject, tolerance, scene, [truth.end])
-    # With their signs, which are continuous in time.
+    # Quaternions are compared with their signs, which are continuous in time.
     yield judge(name.with_quantity("angle"), tried, truth, POLICY)
     answer = tried.answer
     if answer.attitude is None:
@@ -169,7 +169,7 @@ def _montgomery(name: Name) -> Check:
 
     The angle about the angular momentum L is 2 E T/L less a solid angle, with energy E and period
     T. L encloses the solid angle in the body, about the axis along which its component keeps its
-    sign. No other check detects a wrong rate.
+    sign. The angle is not conserved, so no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)

@@ -80,7 +80,7 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
 # and LEQT1F's implicit row scaling powers of the step.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
-    # Methods with products of the next two axes in this order; the others process the axes in a
+    # These methods form products of the next two axes in this order; others process the axes in a
     # fixed order.
     "cyclic": Symmetry(
         lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),

@@ -30,7 +30,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
-# One takes the time 2 pi over the largest component of omega.
+# A revolution takes the time 2 pi over the largest component of omega.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.
@@ -49,12 +49,12 @@ _HALFWAY = 0.25
 # Largest phase error (rad) that is measured accurately.
 _LOST = 0.1
 
-# Of the last two terms of the Taylor series at the finest tolerance, over omega.
+# Bound on the last two terms of the Taylor series at the finest tolerance, over omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
 # Step by number of stages, in radians of the fastest rate. With 8 stages truncation is far below
 # rounding; with 4 it dominates the phase error, but must not change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
-_CLOSED_FORM = 16.0 * brouwer.ROUNDING  # of the closed form at any time
+_CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of the closed form at any time
 CLOSED_FORM = Basis(
     "measured",
     "errors that follow from 16 rounding errors of omega by a closed form",

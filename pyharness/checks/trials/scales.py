@@ -39,7 +39,7 @@ def _bit_for_bit(method: str, kind: str, scene: Scene, powers: Sequence[int]) ->
     plain = cache(lambda: _tried(method, scene, time))
 
     def same(factor: float, name: Name) -> Check:
-        # The original motion first.
+        # The original motion must be computed first.
         first, run = plain(), _tried(method, scene_of(name), time / factor)
         with np.errstate(invalid="ignore"):
             wrong = float(np.abs(run.omega / factor - first.omega).max())

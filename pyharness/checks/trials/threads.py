@@ -46,7 +46,7 @@ SCENES = (
     Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
     Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
-# Needs many steps for its error amplification.
+# Its error amplification needs many steps.
 _BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
 _LATE = 20.0  # s
 

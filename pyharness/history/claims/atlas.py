@@ -58,11 +58,11 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the total points of each start; `reading` and `steps` are indices."""
+        """Return the total points of each initial omega; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether no claim fails."""
+        """Return for each initial omega whether no claim fails."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -90,18 +90,18 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the total points of several claims, for each start."""
+    """Return the total points of several claims, for each initial omega."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of starts with verdicts "reproduced", "in part" and "not reproduced"."""
+    """Return the fractions of codes "reproduced", "in part" and "not reproduced"."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of the verdict on a claim over the starts."""
+    """Return the entropy (bits) of the verdict on a claim over the initial omegas."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0

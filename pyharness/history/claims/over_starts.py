@@ -34,7 +34,7 @@ _EFFORT = 1e9  # in effect none, because a sweep reports its expected time befor
 
 
 class Starts:
-    """A bench of `rules`: runs from n starts, used in the cases without omega(0) in the thesis.
+    """Runs for `rules` from n initial omegas, which serve in cases whose omega(0) the thesis omits.
 
     The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
@@ -96,7 +96,7 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the codes of the verdict on a claim for the starts of a batch, shape (n,).
+    """Return the codes of the verdict on a claim for the scenes of a batch, shape (n,).
 
     All are SILENT if the claims do not apply to the sweep.
     """
@@ -115,7 +115,7 @@ FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the codes FAILS, HOLDS or IN_PART of a claim from n starts, shape (n,)."""
+    """Return the codes FAILS, HOLDS or IN_PART of a claim from n initial omegas, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)

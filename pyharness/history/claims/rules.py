@@ -82,7 +82,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails in a case: ends early and is wrong.
+    """Grade the claim that the Runge-Kutta program ends early and is wrong in a case.
 
     It holds in part if only one of the two is true.
     """

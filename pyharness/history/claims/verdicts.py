@@ -74,7 +74,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the steps of Runge-Kutta from each of `starts`.
+    The numbers include the steps of Runge-Kutta from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -184,7 +184,7 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all `starts`, because the thesis omits some omega(0).
+    The corrected programs run from all initial omegas in `starts`, because the thesis omits some.
     """
     numbers = {}
     for start in starts():

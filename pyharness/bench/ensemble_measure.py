@@ -221,7 +221,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body of our methods, on one core, in a call for `bodies` bodies."""
+    """The run times per body (s), by method, on one core, in a call for `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]

@@ -42,7 +42,7 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, repeatedly in case it is dropped; the third time, end."""
+        """Raise KeyboardInterrupt, repeatedly in case it is dropped; the third ends the process."""
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()

@@ -80,7 +80,7 @@ class CardView(NamedTuple):
     scan's lines after it that belong to no card, each with its entry. `scan` has the scan's blanks,
     or is None. `port` has each line of the Fortran port, with the defect or reading on which it
     depends, if any, and whether it is executed with this switch on. `notes` begin with the most
-    important kind; `begins` has the notes whose range begins here, with this range alone.
+    important kind; `begins` has those whose range of cards begins here, with this range alone.
     """
 
     number: int

@@ -39,7 +39,8 @@ class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
     `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
-    HTML. `cards` has the numbers of the cards that compute it, by program.
+    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is its apparatus
+    entry, or empty.
     """
 
     number: str

@@ -85,7 +85,7 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The run of one listing."""
+    """The run of one listing, drawn as a curve."""
 
     listing: Listing
     trajectory: Trajectory

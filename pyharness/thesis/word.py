@@ -309,7 +309,7 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        It is that of the `_shadow` of each operand; if it is finite and not 0, 0 was added.
+        It is computed from `_shadow`; a finite result other than 0 means that 0 was added.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):

@@ -16,7 +16,7 @@ from pyharness.truth.reference import Reference
 class Accuracy:
     """The errors of a trajectory against the reference, and its drifts of conserved quantities."""
 
-    omega: tuple[float, float, float]  # largest errors (rad/s)
+    omega: tuple[float, float, float]  # largest error of each component (rad/s)
     velocity: float | None  # largest error of any component (m/s)
     # Drifts of the energy and of the squared angular momentum, relative to the initial values; None
     # with a torque, without moments or without rows.

@@ -149,8 +149,8 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    They are proportional to the power `order` of the step size (s) or tolerance; `order` is None if
-    they are rounding.
+    They are proportional to the power `order` of the setting, a step size (s) or tolerance; `order`
+    is None if they are rounding.
     """
 
     part: str
@@ -205,7 +205,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return p for which the ratio `errors` is the ratio `settings` to the power p."""
+    """Return the power p with `errors` = `settings`**p; both are ratios."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)

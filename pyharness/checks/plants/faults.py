@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """A fault in the Python version of a program: a row of `data/plants.toml`."""
+    """A row of `data/plants.toml`: a faulty replacement in the Python version of a program."""
 
     file: str
     right: str

@@ -159,7 +159,8 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 def taylor_3(on: Numbers, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    As F is quadratic, its derivative in the direction F is half of F(omega + F) - F(omega - F).
+    As the right-hand side F is quadratic, its derivative in the direction F is half of F(omega + F)
+    - F(omega - F).
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))

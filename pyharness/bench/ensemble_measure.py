@@ -245,7 +245,7 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    All methods have a torque, except the closed form, measured by `solve_many` and when prepared.
+    All methods have a torque except the closed form, measured both by `solve_many` and prepared.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []

@@ -68,7 +68,7 @@ FORMS = ("closed-form", "auto")
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
 
-    These are Euler's equations with A = B = C = 1 and equal components.
+    This is each of Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))

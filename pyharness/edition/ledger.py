@@ -174,7 +174,7 @@ def formulas() -> dict[str, list[Formula]]:
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
     """Return the figures as SVG and CSV, and Figure 7 with both versions of its programs.
 
-    It also shows the limit of the original program's omega as the step size goes to 0.
+    This figure also has the limit of the original program's omega as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")

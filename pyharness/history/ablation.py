@@ -155,7 +155,7 @@ def _size(found: Effect) -> list[float]:
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
     """Return the report of the critical apparatus, with a line for each entry.
 
-    Unless `are_all_shown`, the text omits all but the defects that change numbers.
+    Unless `are_all_shown`, the text has only the defects that change numbers.
     """
     shown = entries
     head = (

@@ -169,8 +169,8 @@ def rows() -> list[Row]:
 def faults(found: list[Row]) -> list[str]:
     """Return a sentence for each mistake or unexplained disagreement.
 
-    An apparatus entry must be known, and name a card of a row that has it. A card must be known and
-    in exactly one row.
+    An apparatus entry must be known, be in a row, and name a card of its row. A card must be known
+    and in exactly one row.
     """
     told = [f"{row.what}: no entry or reason" for row in found if not row.is_explained]
     known = {entry["id"]: entry for entry in facts("apparatus")["entry"]}

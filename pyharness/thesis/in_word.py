@@ -37,7 +37,7 @@ def run(
 ) -> Trajectory:
     """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
-    The results are rounded to floats; the attribute `exact` has them as numbers of the word.
+    The results are rounded to floats; the attribute `exact` has them in that arithmetic.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)

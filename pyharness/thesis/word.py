@@ -237,7 +237,7 @@ class Number:
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the difference, computed in the word, is zero.
+        """Return whether the difference, computed in this format, is zero.
 
         In a CDC word, two neighbouring numbers may have the difference zero.
         """

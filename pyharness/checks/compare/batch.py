@@ -156,8 +156,8 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        If they differ in `torque_rate`, or the program refuses one, scenes run one by one, without
-        the codes IER. Only refused ones have the status REFUSED.
+        Scenes run one by one, without the codes IER, if they differ in `torque_rate` or the program
+        refuses one. Only refused ones have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:

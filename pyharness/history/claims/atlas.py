@@ -44,7 +44,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
+    """The verdict codes of each claim over a grid of initial omegas, readings and step numbers.
 
     The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
     over the magnitude) and longitude (rad).

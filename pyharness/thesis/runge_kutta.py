@@ -115,7 +115,7 @@ def lipschitz_test(
     last = 6 if velocity_counts else 3
     if listing.has("lipschitz-per-component"):
         found = [*zip(STOP_VARIABLES[:last], change_k, change_u, strict=False)]
-        tests = found[3:] + found[:3]  # velocity first
+        tests = found[3:] + found[:3]  # the velocity first
     else:
         tests = [("UV" if velocity_counts else "U", _norm(change_k[:last]), _norm(change_u[:last]))]
     for variable, change, by in tests:

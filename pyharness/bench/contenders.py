@@ -17,10 +17,8 @@ from pyharness.model.errors import InputError
 from pyharness.model.scene import Scene
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Three tolerances per decade, because methods are compared at equal error, which may be far from
-# the tolerance.
+# Three per decade: methods are compared at equal error, which may be far from the tolerance.
 TOLERANCES = tuple(float(f"{part}e-{digits}") for digits in range(1, 16) for part in (5, 2, 1))
-# A function of the end time (s) and the setting, which returns a prepared integration.
 Maker = Callable[[float, float], Ready]
 
 
@@ -29,8 +27,8 @@ class Contender:
     """A solver in a benchmark; a closed form has no setting."""
 
     name: str
-    setting: str  # quantity that is varied: "tolerance", "steps" or "none"
-    package: str = field(default="", kw_only=True)  # package that the solver needs; empty for ours
+    setting: str  # "tolerance", "steps" or "none"
+    package: str = field(default="", kw_only=True)  # empty for ours
 
     @property
     def is_installed(self) -> bool:
@@ -40,13 +38,13 @@ class Contender:
 
 @dataclass(frozen=True)
 class SceneContender(Contender):
-    """A contender that integrates omega of one scene and, if `attitude`, the attitude."""
+    """A contender that integrates omega of one scene and, where it can, the attitude."""
 
-    # Returns a `Maker` for a scene, after all preparations, including compilation.
+    # Makes all preparations, including compilation.
     prepare: Callable[[Scene], Maker]
     settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
     order: int = 0  # order of convergence of a method with a fixed step
-    attitude: bool = False  # whether the contender can compute the attitude
+    attitude: bool = False
 
 
 def list_own_contenders() -> list[SceneContender]:
@@ -75,7 +73,7 @@ def refuse_rounding(solver: str, setting: float) -> None:
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return what makes a prepared solver of a method ready, with compiled leaves if asked."""
+    """Return the maker of a prepared solver; `compiled` is as in `prepare`."""
 
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None

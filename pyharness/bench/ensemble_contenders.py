@@ -29,14 +29,11 @@ def coefficients() -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class EnsembleLoad:
-    """Many bodies with the moments `MOMENTS`, their omegas and constant torques.
-
-    `torque` is None for torque-free bodies.
-    """
+    """Many bodies with the moments `MOMENTS`."""
 
     name: str
     omega0: Array  # (n, 3), rad/s
-    torque: Array | None  # (n, 3), N m about the body's axes
+    torque: Array | None  # (n, 3), N m about the body's axes; None without torque
     # (n, 4), unit quaternions; None if attitudes are not requested
     attitude0: Array | None = field(default=None, kw_only=True)
     horizon: float = field(default=HORIZON, kw_only=True)  # end time, s
@@ -48,7 +45,7 @@ class EnsembleLoad:
 
     @property
     def scene(self) -> Scene:
-        """Return a scene with the shared moments, at rest and without torque."""
+        """Return the scene that the bodies share, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
@@ -59,7 +56,7 @@ class EnsembleLoad:
         return np.asarray(self.torque / np.array(MOMENTS))
 
     def part(self, rows: "slice | list[int]") -> "EnsembleLoad":
-        """Return the load of the bodies in `rows`."""
+        """Return the load of some of the bodies."""
         given = {name: getattr(self, name) for name in ("omega0", "torque", "attitude0")}
         own: dict[str, Any]
         own = {k: np.ascontiguousarray(x[rows]) for k, x in given.items() if x is not None}
@@ -85,9 +82,9 @@ class EnsembleLoad:
             yield Scene(self.name, start, MOMENTS, torque=law, attitude=attitude)
 
 
-# A function of the bodies, the setting (a tolerance or a number of steps) and the number of
-# threads. It returns a function that integrates the bodies and returns omega at `HORIZON`, shape
-# (n, 3), or the attitudes, shape (n, 4), of a load that requests them.
+# Takes the bodies, the setting (tolerance or number of steps) and the number of threads. Returns a
+# function that integrates to `HORIZON` and returns omega, shape (n, 3), or the attitudes, shape (n,
+# 4), of a load that requests them.
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
@@ -95,11 +92,11 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 class EnsembleContender(Contender):
     """A contender for omega of many bodies at `HORIZON`."""
 
-    prepare: EnsembleMaker  # the first call of the function that it returns may compile code
+    prepare: EnsembleMaker  # the first call of the prepared function may compile code
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
-    torque_free: bool = False  # whether the contender solves only bodies without torque
-    attitude: bool = False  # whether the contender can compute attitudes
-    # Several ways to prepare the solver, by a note. All are timed, and the fastest counts.
+    torque_free: bool = False  # solves only bodies without torque
+    attitude: bool = False
+    # Several ways to prepare the solver, by a note. All are timed; the fastest counts.
     variants: Mapping[str, EnsembleMaker] = field(default_factory=dict, kw_only=True)
 
     @property
@@ -126,7 +123,7 @@ def with_attitudes(loads: list[EnsembleLoad], seed: str) -> list[EnsembleLoad]:
 
 
 def own_ensembles() -> list[EnsembleContender]:
-    """Return our contenders: the closed form, the Taylor method and RK4."""
+    """Return our contenders."""
     one, closed = EnsembleContender, _make_own("closed-form")
     return [
         one("closed-form", "none", closed, torque_free=True, attitude=True),

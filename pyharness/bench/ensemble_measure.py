@@ -1,10 +1,8 @@
 """Measurement of ensembles: speed at a target error, growth with the number of bodies, memory.
 
-The speed is in bodies per second, or in RK4 steps per second.
-
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds. The shortest time counts, because other load can only lengthen it.
-Calls on one core are timed in processor time.
+interleaved in several rounds, and the shortest time counts, because other load can only lengthen
+it. Calls on one core are timed in processor time.
 """
 
 import subprocess
@@ -37,16 +35,16 @@ from pyharness.model.progress import Progress, no_progress
 from pyharness.model.trajectory import Array
 
 TARGETS = (1e-6, 1e-12)
-STEPS = 300  # number of steps of RK4, where the rate is in steps per second
+STEPS = 300  # number of RK4 steps, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). The number of bodies is increased if a call is shorter than the first. It
-# is also increased if a call is shorter than the second and the last increase has raised the bodies
-# per second by more than half.
+# Durations of a call (s). The number of bodies is increased after a call shorter than the first,
+# and after a call shorter than the second if the last increase raised the bodies per second by more
+# than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
 _MOST_STEPS = 1 << 14
-# Setting of each of our methods: a tolerance, or the number of steps of RK4.
+# Tolerances, and the number of steps of RK4.
 SETTINGS = {"closed-form": 1e-12, "taylor": 1e-12, "rk4": float(STEPS)}
 _GROWTH_ROUNDS = 5
 
@@ -56,14 +54,14 @@ class Rate:
     """The speed of one contender, with a number of threads, on one task."""
 
     load: str
-    target: float | None  # requested error; None where the steps were prescribed
+    target: float | None  # None where the steps were prescribed
     method: str
     threads: int
     setting: float | None  # tolerance or number of steps; None for a closed form
-    bodies: int  # number of bodies in a call
+    bodies: int  # in a call
     seconds: float  # the shortest time of a call
     error: float  # largest relative error of omega in the sample
-    note: str = ""  # the fastest variant of a solver that has several
+    note: str = ""  # the fastest of several variants
 
     @property
     def bodies_a_second(self) -> float:
@@ -83,7 +81,7 @@ class Rates:
     seed: str
     bodies: int
     rows: list[Rate] = field(default_factory=list)
-    # Tuples (task, contender, reason) for contenders that could not be measured.
+    # Of contenders not measured: task, contender, reason.
     refused: list[tuple[str, str, str]] = field(default_factory=list)
 
 
@@ -94,7 +92,7 @@ class _Task:
     load: EnsembleLoad
     target: float | None
     sample: EnsembleLoad
-    ends: Array  # omega of the sample at the horizon, (n, 3), or the attitude, (n, 4)
+    ends: Array  # sample at the horizon: omega, (n, 3), or attitude, (n, 4)
 
     @property
     def place(self) -> str:
@@ -102,7 +100,7 @@ class _Task:
         return f"{self.load.name}, {f'{self.target:g}' if self.target else f'{STEPS} steps of RK4'}"
 
     def takes(self, each: EnsembleContender) -> bool:
-        """Return whether a contender accepts the task's torques, attitudes and prescribed steps."""
+        """Return whether a contender can solve the task."""
         torque = self.load.torque is not None and each.torque_free
         if torque or (self.load.attitude0 is not None and not each.attitude):
             return False
@@ -217,38 +215,37 @@ def _enough(
 
 
 def clock_of(threads: int) -> Clock:
-    """Return the clock: processor time for one thread, else wall time."""
+    """Return processor time for one thread, else wall time."""
     return process_time if threads == 1 else perf_counter
 
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body of our methods, on one core, in a call for `bodies` bodies."""
+    """The run times per body (s), by method, on one core, in a call for `bodies` bodies."""
 
     bodies: int
-    seconds: dict[str, float]  # s per body, by method
+    seconds: dict[str, float]
 
 
 @dataclass(frozen=True)
 class Memory:
-    """The memory that one call of a method adds to a process."""
+    """The memory that one call adds to a process."""
 
     method: str
     bodies: int
-    arrays: int  # bytes of the initial omegas, torques and results
-    peak: int | None  # bytes, including the arrays; None where the system does not report it
+    arrays: int  # bytes of initial omegas, torques and results
+    peak: int | None  # bytes with the arrays; None where the system does not report it
 
     @property
     def ratio(self) -> float | None:
-        """Return the peak divided by the size of the arrays, or None."""
+        """Return the peak divided by the size of the arrays."""
         return None if self.peak is None else self.peak / self.arrays
 
 
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    All methods are measured with torque except the closed form, which is measured both by
-    `solve_many` and by a prepared solver.
+    All methods have a torque except the closed form, measured both by `solve_many` and prepared.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -289,7 +286,7 @@ def memory(bodies: int) -> list[Memory]:
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of a call's arrays, and the bytes by which the call increases peak memory."""
+    """Print the bytes of a call's arrays, and the increase of peak memory in bytes."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()

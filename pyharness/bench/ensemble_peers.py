@@ -1,7 +1,6 @@
-"""Third-party solvers for `bench --ensemble`: NumPy, SciPy, heyoka, numba, and a list of all.
+"""Third-party solvers for `bench --ensemble`.
 
-Each returns a function that computes omega (rad/s) at the end time, shape (n, 3). numba compiles at
-the first call.
+Each returns a function that computes omega (rad/s) at the end time, shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -25,7 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
-# Bodies in a batch. heyoka recommends 4 even if a register has 8 numbers, which is slower.
+# Bodies in a batch. heyoka recommends 4, even if a register has 8 numbers.
 BATCHES = (4, 8, 16)
 LANES = 64  # bodies in a block
 _BLOCK = 4096  # bodies whose arrays fit into the cache
@@ -53,9 +52,9 @@ def ensemble_peers() -> list[EnsembleContender]:
 def heyoka_batch(
     load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
 ) -> Callable[[], Array]:
-    """Return an integration by one heyoka batch integrator, `size` bodies at a time.
+    """Return an integration by one heyoka batch integrator; `threads` has no effect.
 
-    It returns attitudes, shape (n, 4), if the load requests them. `threads` has no effect.
+    A batch has `size` bodies. The result is attitudes, shape (n, 4), if the load requests them.
     """
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None
@@ -173,7 +172,7 @@ def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[],
 
 
 def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return an integration by SciPy's `solve_ivp`, body by body; `threads` has no effect."""
+    """Return an integration by SciPy's `solve_ivp`, body by body, on one thread."""
     from scipy.integrate import solve_ivp
 
     refuse_rounding("solve_ivp", setting)
@@ -201,7 +200,7 @@ def _scipy_loop(load: EnsembleLoad, setting: float, threads: int) -> Callable[[]
 
 
 def in_threads(solve: Callable[[slice], None], n: int, threads: int, block: int) -> None:
-    """Call `solve` for slices of at most `block` bodies, distributed over `threads` threads."""
+    """Call `solve` for slices of at most `block` of the n bodies, in `threads` threads."""
     pieces = [slice(first, min(n, first + block)) for first in range(0, n, block)]
     if threads == 1:
         for piece in pieces:
@@ -259,8 +258,7 @@ def _numba_kernels() -> tuple[Any, Any]:
             z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
         )
 
-    # The compiler may contract a product and a sum into one operation, as in our kernels. It may
-    # not change the arithmetic in any other way.
+    # As in our kernels, the compiler may contract a product and a sum, and change nothing else.
     step = numba.njit(inline="always", fastmath={"contract"})(step)
 
     def blocks(

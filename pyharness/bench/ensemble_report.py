@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers, our times by number of bodies, and our memory."""
+    """The speeds of all solvers, and times and memory of our methods."""
 
     rates: Rates
     sizes: Sequence[Size]

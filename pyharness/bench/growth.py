@@ -1,7 +1,7 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-In any method, a relative change of the time t, or of an angular rate, by 2**-53 changes the
-solution by 2**-53 t |omega'|. Errors are compared with this scale.
+Errors are compared with 2**-53 t |omega'|, the change of the solution that rounding the time t (s)
+causes in any method.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,11 @@ class Growth:
     """The Taylor method's error at one time, and the effect of rounding that time."""
 
     time: float  # s
-    # Both are relative to the largest angular velocity. `error` is the largest difference between
-    # the Taylor method and the closed form, over `_STARTS` initial states of the same motion.
-    # `conditioning` is the change caused by one rounding of the time.
+    # Both relative to the largest angular velocity: the largest difference from the closed form,
+    # over `_STARTS` initial states of the same motion, and the change by one rounding of the time.
     error: float
     conditioning: float
-    steps: int  # number of steps of the Taylor method in one integration
+    steps: int  # of one integration
 
 
 def growth(
@@ -43,7 +42,7 @@ def growth(
     series = prepare(scene, "taylor", tolerance)
     exact = prepare(scene, "closed-form")
     rate = scene.right_hand_side()
-    # Several initial states avoid the bias of a favourable phase.
+    # A single initial state might have a favourable phase.
     omega = np.array(scene.omega)
     starts = np.array([exact(omega, 0.37 * k).copy() for k in range(_STARTS)])
     found = []

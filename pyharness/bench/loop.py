@@ -1,4 +1,4 @@
-"""The loop of all measurements: a task's calls are prepared, then timed in interleaved rounds."""
+"""The loop of all measurements: calls are prepared, then timed in interleaved rounds."""
 
 import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -9,11 +9,11 @@ from pyharness.checks.compare.timing import SLOW, Clock, seconds
 from pyharness.model.progress import Progress
 
 _Row = TypeVar("_Row")
-Say = Callable[[str], None]  # receives the current part of a task
+Say = Callable[[str], None]  # receives the name of the current part
 
 
 class Task(Protocol):
-    """A unit of measurement, such as a workload; messages name it by `place`."""
+    """A unit of measurement, such as a workload; `place` is its name in messages."""
 
     @property
     def place(self) -> str: ...  # noqa: D102
@@ -28,7 +28,7 @@ class Call(Generic[_Row]):
 
     run: Callable[[], object] | None  # None if the call failed and is not timed
     clock: Clock
-    row: Callable[..., _Row]  # makes the row from the keyword argument `seconds` (s or None)
+    row: Callable[..., _Row]  # makes the row from the keyword `seconds` (s or None)
 
 
 def timed(
@@ -42,7 +42,7 @@ def timed(
 ) -> Iterator[_Row]:
     """Yield the rows of the calls that `calls` prepares for each task.
 
-    The last four parameters are those of `pyharness.checks.compare.timing.seconds`.
+    The last four parameters are those of `checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

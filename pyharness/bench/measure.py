@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-Every contender has settings from coarse to fine. Each call is prepared, made once, and compared
-with the reference. Batches of all calls are then timed in interleaved rounds, so that other load
-affects all alike; the median counts.
+Every contender has settings from coarse to fine. Each call is made once and compared with the
+reference. Batches of all calls are then timed in interleaved rounds, so that other load affects all
+alike; the median counts.
 """
 
 import math
@@ -30,21 +30,20 @@ from pyharness.truth.reference import Reference, reference
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0  # end times T, s
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
-# Cases that are measured with attitude. Case 6 is not integrated to the long end time, because the
-# reference solution would need too many steps.
+# With attitude. To the long end time, Case 6 would need too many steps of the reference.
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
-_LONGEST_CALL = 1.0  # s; settings for which a call would take longer are left out
-# Longest time (s) to prepare and try a setting. At a coarse tolerance a solver may leave the true
+_LONGEST_CALL = 1.0  # s; settings whose calls take longer are left out
+# Longest time (s) to prepare and try a setting: at a coarse tolerance a solver may leave the true
 # solution, and then take steps that never end.
 _LONGEST_FIRST = 30.0
-# Time (s) for the first calls of a contender in one case, by the quantity that is varied.
+# Time (s) for all first calls of a contender on one workload.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22  # largest number of steps of a call
-_FAILURES = 12  # number of successive settings without result after which finer ones are left out
-# Factor on the work limit of a proof of the reference, which is short beside the measurement.
+_FAILURES = 12  # after so many successive settings without result, finer ones are left out
+# Factor on the work limit; even so, the proof is short beside the measurement.
 _PROOF_EFFORT = 10.0
-_ROUNDS = 9  # number of rounds in which calls are timed
+_ROUNDS = 9
 _BATCH = 1e-3  # s; calls faster than this are batched
 
 
@@ -52,19 +51,18 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 class Workload:
     """A scene, and the time to which its motion is integrated."""
 
-    # For a case its number, followed by `L` if T = 100 s (`3L`), or by any other T that is not 3 s.
-    # For a random scene its number, for a torque term its name.
+    # The number of a case or of a random scene, or the name of a torque term. For a case, `L`
+    # follows if T = 100 s (`3L`), or any other T that is not 3 s.
     label: str
     scene: Scene
     horizon: float  # T, s
-    # Only for a scene that is not a case: its kinds, its solution, its error amplification, and the
-    # number of revolutions of the body.
+    # Only for other scenes than cases: kinds, solution, error amplification, and revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
     turns: float = 0.0
-    # Errors of omega are relative to this angular velocity (rad/s), or to the largest component of
-    # the true omega at T if that is larger.
+    # Errors are relative to this angular velocity (rad/s), or to the largest component of the true
+    # omega at T if that is larger.
     scale: float = 0.0
 
     @property
@@ -74,7 +72,7 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the group over which ratios are averaged.
+        """Return the name of the workload's group; ratios are averaged over groups.
 
         Groups differ in end time and, at 3 s or with attitudes, in whether there is a torque.
         """
@@ -88,16 +86,16 @@ class Row:
     """Run time and error of one contender and setting on one workload."""
 
     workload: Workload
-    method: str  # name of the contender
-    kind: str  # quantity that is varied: "tolerance", "steps" or "none"
-    setting: float | None  # value of this quantity; None if the contender has no setting
-    seconds: float | None  # median time (s) of a call; None if the call failed
-    # Error of omega at T, relative to the largest component of the true omega at T or to the scale
-    # of the workload, or the error of the attitude (rad) if it is larger. None if the call failed.
+    method: str
+    kind: str  # "tolerance", "steps" or "none"
+    setting: float | None  # None if the contender has no setting
+    seconds: float | None  # median, s; None if the call failed
+    # Error of omega at T, relative to the larger of the true omega's largest component and the
+    # workload's scale, or the error of the attitude (rad) if larger. None if the call failed.
     error: float | None
-    evaluations: int | None  # evaluations of the right-hand side in a call, if they are counted
-    note: str = ""  # reason why the call failed
-    # Time (s) in which the call was prepared and, if needed, compiled.
+    evaluations: int | None  # of the right-hand side in a call, if counted
+    note: str = ""
+    # Time (s) to prepare the call, with any compilation.
     preparing: float = field(default=0.0, compare=False)
 
 
@@ -106,7 +104,7 @@ class Refusal:
     """The reason why a contender has no result for a workload."""
 
     workload: Workload
-    method: str  # name of the contender
+    method: str
     setting: float | None
     reason: str
 
@@ -118,24 +116,23 @@ class Finding:
     workloads: list[Workload]
     rows: list[Row]
     refused: list[Refusal]
-    # Time (s) of all preparations, by (number of the case or label of the random scene, contender).
+    # Time (s) of all preparations, by (case number or label of a random scene, contender).
     preparation: dict[tuple[int | str, str], float]
-    # Error estimate of the reference solution, in the measure of `Row.error`, by label of the
-    # workload.
+    # Error estimate of the reference, measured like `Row.error`, by label of the workload.
     doubt: dict[str, float]
-    # The same error as a bound, which is proved if possible.
+    # A bound of this error, proved if possible.
     bounds: dict[str, ErrorBound] = field(default_factory=dict)
 
     @property
     def attitude(self) -> bool:
-        """Return whether the attitude was requested."""
+        """Return whether attitudes were requested."""
         return any(load.scene.attitude is not None for load in self.workloads)
 
 
 def workloads(
     case: int | None = None, horizon: float | None = None, attitude: bool = False
 ) -> list[Workload]:
-    """Return cases of Table 1, each with an end time T.
+    """Return cases of Table 1 with end times T.
 
     By default T is 3 s in Cases 2 to 7, and also 100 s in Cases 3 and 4. With `attitude`, T is 3 s
     in Cases 1 to 7, and also 100 s in all but Case 6; the bodies are initially aligned with the
@@ -212,23 +209,23 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
         return error
     if end.attitude is None or not np.isfinite(end.attitude).all() or not end.attitude.any():
         return None
-    # The quaternion is normalised, because integrators do not preserve its norm. It is scaled
-    # before, so that the squares in the norm neither overflow nor underflow.
+    # Integrators do not preserve the norm. The division by the largest component prevents overflow
+    # and underflow of the squares.
     attitude = end.attitude / np.abs(end.attitude).max()
     attitude /= np.linalg.norm(attitude)
     return max(error, float(angle_between(attitude[None], truth.attitude)[0]))
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega divided by the largest component of `truth`, or None.
+    """Return the error of omega divided by the largest component of `truth`.
 
-    The divisor is `scale` (rad/s) if that is larger. The error is None if it is not finite, or if
-    the reference ends before.
+    The divisor is `scale` (rad/s) if that is larger. The result is None if the error is not finite,
+    or if the reference ends before.
     """
     if len(truth.omega) == 0:
         return None
-    # Near the true solution this subtraction is exact, so that the digits of the reference beyond
-    # binary64, its `remainder`, matter.
+    # Near the true solution this subtraction is exact, so the `remainder`, the reference's digits
+    # beyond binary64, matters.
     difference = omega - truth.omega[0]
     if truth.remainder is not None:
         difference -= truth.remainder[0]
@@ -245,14 +242,13 @@ def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[
     if contender.settings:
         yield from contender.settings
         return
-    # The smallest number of steps is such that the body rotates by at most 16 radians about an axis
-    # per step, at the initial omega; no method works with larger steps. The frequencies of the
-    # torque do not count, since a torque of high frequency may be too weak to require small steps.
+    # By step, the body rotates by at most 16 rad about an axis, at the initial omega; no method
+    # works with larger steps. The frequencies of the torque do not count: a fast torque may be too
+    # weak to require small steps.
     phase = max(map(abs, scene.omega)) * horizon / 16.0
     steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
         yield float(steps)
-        # A method of low order needs many steps, and factors of 2 resolve its error well enough.
         if contender.order > 2:
             yield float(steps * 3 // 2)
         steps *= 2
@@ -262,7 +258,7 @@ def _first_calls(
     load: Workload, contender: SceneContender, make: Maker, truth: Reference,
     refused: list[Refusal], clock: Clock,
 ) -> tuple[list[tuple[Ready, Row]], float]:  # fmt: skip
-    """Return a contender's calls on a workload, each tried, and the time (s) to prepare them.
+    """Return a contender's tried calls on a workload, and the time (s) to prepare them.
 
     Settings that cannot be run are appended to `refused`.
     """
@@ -271,8 +267,7 @@ def _first_calls(
     spent = preparing = last = before = 0.0
     for setting in ladder(contender, load.scene, load.horizon):
         named = None if contender.setting == "none" else setting
-        # The time of the next call is extrapolated from the last two calls. The factor is bounded,
-        # because an interruption may have lengthened one of them.
+        # Extrapolated from the last two calls. The bounds allow for an interruption of one of them.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
         hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:

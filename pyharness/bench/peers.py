@@ -23,11 +23,11 @@ from pyharness.model.tape import Functions, Table, evaluate
 from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 
-# A torque about the body axes (N m), as a function of time, omega, attitude, sine and cosine.
+# A torque about the body axes (N m), from time, omega, attitude, sine and cosine.
 Formula = Callable[..., Sequence[Any]]
 MOST_STEPS = 10_000_000
 Tableau = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
-# Classical Runge-Kutta method: the stage coefficients below the diagonal, the weights, the nodes.
+# Coefficients below the diagonal, weights and nodes of the stages.
 RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0.0, 0.5, 0.5, 1.0]
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
@@ -47,7 +47,7 @@ def peers() -> list[SceneContender]:
 
     return [
         adaptive("heyoka", "heyoka", heyoka_maker),
-        # With the derivatives by the initial state, from which our error amplification comes too.
+        # Derivatives by the initial state, from which our error amplification comes too.
         adaptive("heyoka-variational", "heyoka", partial(heyoka_maker, variational=True)),
         fixed("rk4", 4),
         fixed("dop8", 8),
@@ -150,8 +150,8 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # The call is repeated, because the evaluations are counted only with an option that the
-            # timed call omits.
+            # Repeated, because evaluations are counted only with an option that the timed call
+            # omits.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)
@@ -167,8 +167,8 @@ def _odeint(scene: Scene) -> Maker:
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
     """Return pairs of an unknown and its derivative, for omega and any attitude of the scene.
 
-    `formula`, or else the tape of recorded operations, gives a torque that depends on the state.
-    Raise InputError for an opaque torque or a table.
+    A torque that depends on the state comes from `formula`, or else from the tape of recorded
+    operations. Raise InputError for an opaque torque or a table.
     """
     import heyoka
 
@@ -189,7 +189,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
             "heyoka can't evaluate an opaque torque; allowed: a torque that can be recorded"
         )
     else:
-        # The inputs without attitude are not read.
+        # Without attitude, the None are not read.
         inputs = [heyoka.time, *state, *[None] * (7 - len(state))]
         found = evaluate(system_of(scene, attitude=False), inputs, heyoka_functions())
     found += quaternion_rates((x, y, z), q) if q else ()
@@ -224,7 +224,7 @@ def numba_fixed(method: str, scene: Scene) -> Maker:
 
     formula: Tableau = RK4
     if method != "rk4":
-        # A private module is imported, because no public module of SciPy has these coefficients.
+        # No public module of SciPy has these coefficients.
         from scipy.integrate._ivp import dop853_coefficients as table  # noqa: PLC2701
 
         count = table.N_STAGES
@@ -294,7 +294,7 @@ def steps_source(scene: Scene, formula: Tableau) -> str:
     """Return the Python source of a Runge-Kutta integration with unrolled stages.
 
     Its function takes the initial omega, the end time (s), the number of steps, and the array for
-    omega at the end.
+    the final omega.
     """
     stages, weights, nodes = formula
     step = ["t = step * h"]

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from pyharness.bench.growth import Growth
 
 _FLOOR = 2.0**-53  # relative error of one rounding in double precision
-# The curves can be distinguished without colours: groups of solvers by dashes and line width, and
-# the solvers of a group by their markers.
+# Distinct without colours: dashes and line width show the group of solvers, markers the solver.
 _FAMILIES: dict[str, dict[str, Any]] = {
     "ours": {"linestyle": "-", "linewidth": 1.5, "color": "#1040a0"},
     "gauss": {"linestyle": (0, (6, 1.5)), "linewidth": 0.9, "color": "#3a86c8"},
@@ -24,12 +23,11 @@ _FAMILIES: dict[str, dict[str, Any]] = {
 _MARKERS = "osD^v<>pP*Xhd8"
 _PROGRAMS = ("two-term", "four-term", "runge-kutta")
 _OURS = ("auto", "taylor", "closed-form", "rk4", "improved-euler", "taylor-3")
-# Orders of convergence whose slopes are drawn in the plots of error against right-hand sides.
 _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw error against run time and evaluations, a row for each workload."""
+    """Draw error against run time and right-hand sides, a row for each workload."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -86,8 +84,6 @@ def _styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
             family = "program" if name.startswith(_PROGRAMS) else "peer"
         marker = _MARKERS[used[family] % len(_MARKERS)]
         used[family] += 1
-        # Markers are filled for most of our methods and for the programs, and open for the Gauss
-        # methods and third-party solvers.
         face = _FAMILIES[family]["color"] if family in ("ours", "program") else "white"
         styles[name] = _FAMILIES[family] | {
             "marker": marker, "markersize": 5.0, "markerfacecolor": face, "markeredgewidth": 0.8,
@@ -114,7 +110,7 @@ def draw_slopes(axes: "Axes") -> None:
         end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
         axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
-        # The label has a white background, in case a curve crosses it.
+        # In case a curve crosses the label.
         axes.annotate(
             f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
             fontsize=8, ha="center", va="top", zorder=5,

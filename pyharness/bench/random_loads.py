@@ -24,22 +24,22 @@ from pyharness.truth.reference import Reference
 MOST_TURNS = 300.0
 WAVES = {"one wave": 1, "three waves": 3, "ten waves": 10}
 LAWS = ("no torque", "constant torque", "ramp", *WAVES)
-# Ranges of the frequencies of waves, relative to the initial |omega|.
+# Frequencies relative to the initial |omega|.
 SPEEDS = {"slow waves": (0.01, 0.1), "matched waves": (0.3, 3.0), "fast waves": (3.0, 10.0)}
-# Moments in an arbitrary unit, from a random generator x.
+# Moments in an arbitrary unit, drawn from a generator x.
 BODIES: dict[str, Callable[[Random], list[float]]] = {
     "compact": lambda x: [x.uniform(2.0, 3.0) for _ in range(3)],
     "flat": lambda x: _flat(x, x.uniform(1.0, 3.0), x.uniform(1.0, 3.0)),
     "needle-like": lambda x: [low := x.uniform(0.01, 0.1), 1.0, 1.0 + low * x.uniform(0.0, 1.0)],
     "nearly symmetric": lambda x: [1.0, 1.0 + _log(x, 1e-6, 1e-2), x.uniform(0.2, 1.9)],
 }
-MOST_GROWTH = 1e3  # limit of the error amplification of an accepted scene
+MOST_GROWTH = 1e3  # limit of an accepted scene
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
 
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
-    """Return the workload of a seed and a number (from 1).
+    """Return the workload of a seed and a number, from 1.
 
     Kinds of torque alternate with the number. A scene is drawn again if its error amplification is
     `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
@@ -49,16 +49,14 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
-    # There are four bodies and three speeds, so that twelve successive draws of a kind of torque
-    # contain all pairs.
+    # Twelve successive draws of a kind of torque contain all pairs of four bodies and three speeds.
     body = list(BODIES)[place % len(BODIES)]
     speed = list(SPEEDS)[place % len(SPEEDS)] if law in WAVES else ""
     name = ", ".join(filter(None, (f"{number}: {law}", speed.removesuffix(" waves"), body)))
     while True:
         scene, horizon = by_torque(source, name, law, speed, body)
         try:
-            # This fast estimate rejects scenes with an amplification far above the limit. The
-            # reference decides on scenes near the limit.
+            # A fast estimate rejects scenes far above the limit; near it the reference decides.
             if conditioning(scene, horizon).amplification > 2.0 * MOST_GROWTH:
                 continue
             path = integer_series(scene, [horizon])

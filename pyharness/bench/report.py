@@ -43,7 +43,7 @@ def measured_report(
     """Return the report of a benchmark with its page, machine and build.
 
     `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers. The text
-    of `found` has titled tables, then the notes. The versions of `packages` are listed. `command`
+    of `found` has titled tables, then the notes. The versions of `packages` are listed; `command`
     repeats the benchmark.
     """
     here, built = machine(packages), build()
@@ -83,7 +83,7 @@ def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) ->
 def bench_report(finding: Finding, packages: Iterable[str], command: str) -> Report:
     """Return the report: a table for each workload, mean ratios, and the machine.
 
-    For random scenes, tables of the distribution of ratios replace the others.
+    For random scenes, the tables show distributions of ratios instead.
     """
     drawn, data = _random(finding), _data(finding)
     title = "# Run time against error" + (" of omega and attitude" if finding.attitude else "")
@@ -99,7 +99,7 @@ def _random(finding: Finding) -> bool:
 
 
 def _spread_data(finding: Finding) -> Table:
-    # A spread's fields in their order, the last of which are the quartiles.
+    # The quartiles are a Spread's last field.
     rows = [[*fields, *quartiles] for *fields, quartiles in map(astuple, spreads(finding, KINDS))]
     names = "method kind target scenes reached mean smallest lower_quartile median upper_quartile"
     return numbers(names, rows)
@@ -267,8 +267,7 @@ def _notes(finding: Finding) -> list[str]:
 
 def not_measured(finding: Finding) -> list[str]:
     """Return a line for each reason of missing results, with the first examples."""
-    # Reasons may end with an expected time or with the step at which a run ended, which differ
-    # between cases. These ends are removed, so that equal reasons share a line.
+    # Reasons that differ only in their end, an expected time or a last step, share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

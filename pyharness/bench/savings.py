@@ -15,18 +15,18 @@ from pyharness.model.scene import Scene
 from pyharness.model.scene_file import case_scene
 from pyharness.thesis import compiled
 
-_BATCHES = 9  # number of batches of calls that are timed
-_SECONDS = 2e-3  # duration of a batch
+_BATCHES = 9
+_SECONDS = 2e-3  # of a batch
 
 
 @dataclass(frozen=True)
 class Saving:
-    """Run times with and without a part that a plan can leave out."""
+    """Run times (s) with and without a part that a plan can leave out; medians."""
 
-    part: str  # the part that is left out, as the plan names it
-    where: str  # the scene or program with which it is measured
-    with_it: float  # time (s) with the part, the median over interleaved batches
-    without: float  # time (s) without the part, also a median
+    part: str  # as the plan names it
+    where: str  # scene or program
+    with_it: float
+    without: float
 
     @property
     def ratio(self) -> float:
@@ -79,5 +79,5 @@ def _python(code: str) -> None:
 def measured_saving(
     part: str, where: str, with_it: Callable[[], object], without: Callable[[], object]
 ) -> Saving:
-    """Return the times of calls with and without a part."""
+    """Time calls with and without a part."""
     return Saving(part, where, *seconds([with_it, without], _SECONDS, _BATCHES))

@@ -9,7 +9,7 @@ import numpy as np
 
 from pyharness.bench.measure import TARGETS, Finding, Row, Workload
 
-# The first of these solvers that took part in the benchmark is the baseline of all ratios.
+# The first of these that was measured is the baseline of all ratios.
 YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 
 
@@ -17,13 +17,11 @@ YARDSTICKS = ("heyoka", "solve_ivp-dop853")
 class Score:
     """The times in which a contender reaches target errors on a workload."""
 
-    method: str  # name of the contender
-    # For each target error, the time (s) of the fastest setting that reaches it; None if no setting
-    # does.
+    method: str
+    # For each target error, the time (s) of the fastest setting that reaches it, or None.
     seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
-    # For each error, the baseline's time divided by this contender's time; it is above 1 if this
-    # contender is faster.
+    # Baseline's time divided by `seconds`: above 1 if this contender is faster.
     ratios: tuple[float | None, ...]
 
 
@@ -31,12 +29,12 @@ class Score:
 class Spread:
     """The distribution of a contender's ratios over random scenes of one kind."""
 
-    method: str  # name of the contender
-    kind: str  # kind of the scenes
-    target: float  # error to be reached, measured like `Row.error`
-    scenes: int  # number of scenes of this kind
-    reached: int  # number of scenes in which the contender and the baseline reach the error
-    mean: float | None  # geometric mean of the ratios over these scenes
+    method: str
+    kind: str
+    target: float  # as in `Row.error`
+    scenes: int
+    reached: int  # where contender and baseline reach the error
+    mean: float | None  # geometric, over the scenes reached
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]
 

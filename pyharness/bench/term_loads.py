@@ -29,18 +29,18 @@ from pyharness.truth.reference import reference
 OURS, HEYOKA, DOP853 = "auto", "heyoka", "solve_ivp-dop853"
 VARIATIONAL = "heyoka-variational"
 MANY_OURS, MANY_HEYOKA = "taylor", "heyoka-batch"
-ONE_TOLERANCE = 1e-9  # of solvers that are compared with ours at one tolerance alone
-# Coarser tolerances give errors above all target errors. The finest is the default of heyoka.
+ONE_TOLERANCE = 1e-9  # for solvers compared with ours at one tolerance
+# Coarser tolerances miss every target error. The finest is the default of heyoka.
 _TOLERANCES = (*(each for each in TOLERANCES if each < 1e-4), 2.0**-52)
 
 HORIZONS = (10.0, 100.0)  # end times of a single body, s
 READY, EXPRESSION = "ready term", "expression"
 _MOMENTS: Triple = (1.0, 2.0, 2.5)  # kg m2
 _OMEGA: Triple = (0.3, 0.2, 0.9)  # rad/s
-_SPREAD = 0.2  # largest difference of a component of a body's initial omega from _OMEGA, rad/s
+_SPREAD = 0.2  # largest deviation of a component of a body's initial omega from _OMEGA, rad/s
 _ATTITUDE = (0.6, 0.0, 0.8, 0.0)
 
-# Numbers of the ready terms, which occur in the terms and again in the formulas.
+# Occur in the ready terms and again in the formulas.
 _D = (0.05, 0.1, 0.15)
 _CUBIC = 0.1
 _TARGET = (0.1, 0.2, 0.5)
@@ -55,9 +55,9 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene of the `kind` READY (library term) or EXPRESSION (traced function).
+    """A scene of the `kind` READY (torque of the library) or EXPRESSION (traced Python function).
 
-    `formula` is an independent implementation of a ready term's torque; None for an expression.
+    `formula` is an independent implementation of a ready torque; None for an expression.
     """
 
     kind: str
@@ -69,7 +69,7 @@ class TermScene:
 class TermBodies(EnsembleLoad):
     """Bodies with different initial omegas that share a torque, which depends on the state."""
 
-    body: Scene  # the body, its torque, and the initial attitude of all
+    body: Scene  # body, torque and initial attitude of all
 
     @property
     def scene(self) -> Scene:
@@ -83,7 +83,7 @@ class TermBodies(EnsembleLoad):
 
 
 def term_scenes() -> list[TermScene]:
-    """Return nine scenes with ready terms, then the expressions, with attitudes where needed."""
+    """Return nine scenes with ready terms, then those with expressions."""
     turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
     ready: dict[str, tuple[Any, Formula]] = {
         "damping": (terms.damping(_D), _damping),
@@ -157,8 +157,7 @@ EXPRESSIONS: dict[str, Callable[..., Any]] = {
     "beacon": _beacon,
 }
 
-# The formulas of docs/how-to/torques.md, written out. Their arguments are the time, omega, the
-# attitude, sine and cosine.
+# The formulas of docs/how-to/torques.md; arguments as in `Formula`.
 
 
 def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:

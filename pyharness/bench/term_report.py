@@ -37,7 +37,7 @@ from pyharness.bench.term_loads import (
 )
 from pyharness.model.report import Column, Report, Table, digits, numbers
 
-_COMPARED = {DOP853: "DOP853", VARIATIONAL: "derivs"}  # heads of columns
+_COMPARED = {DOP853: "DOP853", VARIATIONAL: "derivs"}
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
 _TITLES = {READY: "Ready terms", EXPRESSION: "Traced expressions"}
 _WORTH = (
@@ -58,11 +58,11 @@ class Terms:
 class Summary:
     """The ratios over all scenes of a kind, at one target error."""
 
-    kind: str  # `READY` or `EXPRESSION`
-    bodies: int  # number of bodies in a call
-    target: float | None  # error to be reached; None for all target errors together
-    scenes: int  # number of ratios: scenes and end times in which both solvers reach the error
-    mean: float | None  # geometric mean of the ratios
+    kind: str
+    bodies: int  # in a call
+    target: float | None  # None for all target errors together
+    scenes: int  # pairs of scene and end time in which both solvers reach the error
+    mean: float | None  # geometric mean
     smallest: float | None
 
 
@@ -101,7 +101,7 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return heyoka's run time divided by our run time at each target error, or None."""
+    """Return heyoka's run time divided by our run time at each target error."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)
@@ -114,7 +114,6 @@ def _body_row(rates: Rates, name: str, target: float, method: str) -> Rate | Non
 
 
 def _body_ratio(rates: Rates, name: str, target: float) -> float | None:
-    """Return our bodies per second divided by heyoka's, or None."""
     own, other = (_body_row(rates, name, target, each) for each in (MANY_OURS, MANY_HEYOKA))
     return own.rate / other.rate if own and other else None
 
@@ -133,7 +132,7 @@ def _over(finding: Finding, load: Workload, peer: str) -> float | None:
 
 
 def _preparing(finding: Finding, load: Workload, method: str) -> float | None:
-    """Return the time (s) to prepare for a scene's shortest end time, or None."""
+    """Return the time (s) to prepare for a scene's shortest end time."""
     first = next(each for each in finding.workloads if each.label == load.label)
     times = [row.preparing for row in _rows(finding, first, method)]
     return (times[0] if method == OURS else statistics.median(times)) if times else None

@@ -1,11 +1,10 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings.
+A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings. Our
+arithmetic of machine words reproduces a machine's mantissa length and rounding, such as 48 bits for
+the CDC.
 
-Our arithmetic of machine words reproduces a machine's mantissa length and rounding, such as 48 bits
-for the CDC. It is checked by test vectors and by runs of the programs.
-
-The decks, which are compiled from the author's cards, depend on neither the port nor the twins.
+The decks, compiled from the author's cards, depend on neither the Fortran port nor the twins.
 TAPE5, the file of all steps, is compared with the Fortran port bit for bit, the printed page as
 text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
 """
@@ -37,8 +36,8 @@ from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
 from pyharness.thesis.word import WORDS
 
-# Right-hand sides per step: at the start and at each collocation point, or at four stages. The
-# step in which a run overflows is counted as well.
+# Right-hand sides per step: at the start and each collocation point, or at four stages. The step of
+# an overflow counts.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
@@ -55,7 +54,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of a suite's check of one cell."""
+    """Return the name of the check of one cell in a kind of checks."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
@@ -74,7 +73,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and twin agree or, if `is_listed`, that they still differ.
+    """Return the check that Fortran and Python agree or, for a listed difference, still differ.
 
     `options` are the stop test's constant (1/s) and whether the test may end the run.
     """
@@ -104,10 +103,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    Test vectors are CDC instructions with expected results. In each cell (a program, a case,
-    defects and readings), our 53 bits must agree with floats, and the program compiled for each
-    word with the twin in that word. If `chosen.only` is empty, listings are fewer: for the floats
-    those with at most one change, original and corrected; for the words the last two.
+    Test vectors are CDC instructions with expected results. In each cell, our 53 bits must agree
+    with floats, and the program compiled for each word with its Python version. If `chosen.only` is
+    empty, the listings for floats have at most one change; for words they are original and
+    corrected.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -129,7 +128,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of the twin in a word against Fortran or, without a word, against floats."""
+    """Return the check of the Python version in an arithmetic against Fortran or floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:

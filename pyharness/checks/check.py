@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 DRAWS = 1000
 RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
-# Beginning of a check's note if a method could not solve the problem or reached its work limit.
+# Begins the note if a method could not solve the problem or reached its work limit.
 REFUSED = "refused: "
-# Suites whose ids name the problem before the method that solves it.
+# In their ids the problem precedes the method.
 _CIRCUMSTANCE_FIRST = ("random", "external")
 
 BITS = Basis(
@@ -39,7 +39,7 @@ class Name:
 
     `suite` is a kind of checks of `verify` or a trial of `stress`. `subject` is a program or
     method, `circumstance` a problem, `setting` a tolerance, step size or listing, `quantity` the
-    number that is compared. `options` are appended to the command that repeats the check.
+    compared number. The command that repeats the check ends with `options`.
     """
 
     suite: str
@@ -53,7 +53,7 @@ class Name:
 
     @property
     def id(self) -> str:
-        """Return the id, unique in a run; in some suites the circumstance precedes the subject."""
+        """Return the id, unique in a run."""
         who = self.subject, self.circumstance
         who = who[::-1] if self.suite in _CIRCUMSTANCE_FIRST else who
         return "/".join(filter(None, (self.suite, *who, self.setting, self.quantity)))
@@ -100,13 +100,13 @@ class Check:
 
     name: Name
     passed: bool
-    value: float | None  # None if there is no single number
-    limit: float | None  # limit of `value`; None if `value` is not compared with a limit
-    basis: Basis | None  # reason for the limit; None if there is no limit
-    note: str = ""  # the fault or the observation, in a few words
-    again: str = ""  # the command that repeats the check, if the name's command does not
-    # Returns the bound of the error of the reference to which the value refers, in the unit of the
-    # value, if the reference was used. It is computed when it is first reported.
+    value: float | None  # None without a single number
+    limit: float | None  # None if `value` is not compared
+    basis: Basis | None  # reason for the limit
+    note: str = ""  # fault or observation, in a few words
+    again: str = ""  # command that repeats the check, if not the name's
+    # Returns the error bound of the reference, if one was used, in the unit of the value. It is
+    # computed when first reported.
     reference_bound: Callable[[], ErrorBound | None] | None = field(
         default=None, compare=False, repr=False
     )
@@ -118,17 +118,17 @@ class Check:
 
     @property
     def id(self) -> str:
-        """Return the id of the check, as in ``cells/two-term/case-3/original``."""
+        """Return the id, as in ``cells/two-term/case-3/original``."""
         return self.name.id
 
     @property
     def suite(self) -> str:
-        """Return the suite of the check."""
+        """Return the kind of the check, the first part of its id."""
         return self.name.suite
 
     @property
     def mark(self) -> str:
-        """Return the mark of the basis: proved, derived or measured; empty without a limit."""
+        """Return how the limit was set: proved, derived or measured; empty without a limit."""
         return self.basis.mark if self.basis else ""
 
     @property
@@ -137,7 +137,7 @@ class Check:
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a dictionary for JSON, including the fields that a subclass adds."""
+        """Return the check as a dictionary for JSON, with the fields of a subclass."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -151,11 +151,11 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """The result of a check in a random scene, with three quantities by which reports group it."""
+    """A check in a random scene, with three quantities by which reports group it."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
-    tolerance: float = math.nan  # requested tolerance
-    growth: float = math.nan  # error amplification: norm of the state-transition matrix
+    tolerance: float = math.nan
+    growth: float = math.nan  # error amplification (norm of the state-transition matrix)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +175,9 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield the finished checks, and those deferred checks that `only` requests.
+    """Yield finished checks, and those deferred ones that `only` requests.
 
-    An exception becomes a failed check, unless its type is in `raised`. A suite yields any checks.
+    An exception becomes a failed check, unless its type is in `raised`.
     """
     for each in attempts:
         if isinstance(each, Check):
@@ -207,10 +207,10 @@ def run_suites(
     command: str,
     of_the_user: Sequence[str] = (),
 ) -> Iterator[Check]:
-    """Yield the requested checks of all suites; an exception becomes a failed check.
+    """Yield the requested checks of all suites (kinds of checks).
 
-    NotBuiltError is raised again. So is InputError from the suites `of_the_user`, whose input is
-    the user's.
+    An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
+    InputError, both of which are raised.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -222,7 +222,7 @@ def run_suites(
 
 
 def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
-    """Return the names of the suites that may contain a requested check, in the same order."""
+    """Return the kinds of checks that may contain a requested check."""
     return [suite for suite in suites if may_hold(suite, only)]
 
 
@@ -249,13 +249,13 @@ def may_hold(id: str, only: Sequence[str]) -> bool:
 class Selection:
     """The checks that one run of `verify` makes."""
 
-    only: Sequence[str] = ()  # leading parts of names, as in ``cells/two-term``; empty: all
-    seed: str = field(default_factory=weekly_seed)  # of random draws; by default the week
-    draws: int = DRAWS  # number of random draws
-    record: Path = RECORD  # folder of the golden record; by default tests/golden
-    # problems with published results; None selects the problems of the package
+    only: Sequence[str] = ()  # leading parts of ids, as in ``cells/two-term``; empty: all
+    seed: str = field(default_factory=weekly_seed)  # of random draws
+    draws: int = DRAWS
+    record: Path = RECORD  # folder of the golden record
+    # None selects the published problems of the package
     problems: Sequence["Problem"] | None = None
-    thin: bool = False  # only a few checks of every kind, for `verify --self-test`
+    thin: bool = False  # a few checks of every kind, for `verify --self-test`
 
     def may_ask(self, id: str) -> bool:
         """Return whether a check whose id equals or begins with `id` may be requested."""

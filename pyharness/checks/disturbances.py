@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
-A step's amplification is measured by running it. `theory.amplification` derives it exactly from the
-schemes, so that limits allow for rounding only. Step sizes of divergence follow from linear
-stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification of a step, measured by running it, is derived exactly in `theory.amplification`,
+so limits allow for rounding only. Step sizes of divergence follow from linear stability. J is the
+Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -33,17 +33,16 @@ from pyharness.thesis import collocation
 from pyharness.thesis.equations import omega_rate
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Degree of a step as a polynomial of omega: each product of stages doubles it.
+# Degree of a step as a polynomial of omega; each product of stages doubles it.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
-# Roundings along the longest chain of operations in a step, without the solution of linear systems.
-# The chain has four stages of a rate and a sum, with seven roundings each, and the result.
+# Roundings along the longest chain of operations in a step, without linear systems: four stages of
+# a rate and a sum, with seven each, and the result.
 _LONGEST = 40.0
-# Largest distance of the neighbours from which a derivative is computed, as a fraction of omega.
+# Largest distance, over omega, of the neighbours from which a derivative is computed.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
-# Sums of the absolute weights of the collocation points, as bounds for any position of the points.
-# They are largest where rates at points far beyond the step are extrapolated to its beginning, with
-# the weights 2, -1 or 4, -6, 4, -1.
+# Bounds of the sum of absolute weights for any collocation points. The weights are largest, 2, -1
+# or 4, -6, 4, -1, where rates at points far beyond the step are extrapolated to its beginning.
 _WEIGHTS = {"two-term": 3.0, "four-term": 15.0}
 
 ROUNDED = Basis(
@@ -58,8 +57,8 @@ ROUNDED = Basis(
 class Probe:
     """A vector or matrix, measured by running a program and derived from theory."""
 
-    found: Array  # as measured
-    derived: Array  # of the same shape
+    found: Array  # measured
+    derived: Array  # derived, of the same shape
     limit: float  # bound on the absolute difference of two elements
 
     @property
@@ -94,8 +93,8 @@ def eigenvalues(scene: Scene) -> Array:
 def first_step(scene: Scene, listing: Listing) -> Probe:
     """Return the 3 x 3 derivative of a first step at a steady rotation, measured and derived.
 
-    A step is a polynomial of known degree. Its derivative from differences over enough neighbours
-    is therefore exact except for rounding.
+    A step is a polynomial of known degree, so its derivative from differences over enough
+    neighbours is exact except for rounding.
     """
 
     def stepped(omega: Array) -> Array:
@@ -158,8 +157,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
     z, the step size times an eigenvalue of J, is bisected along `direction`, -1 or 1j, over runs of
-    a spinning top. With the defect `base-not-restored`, omega may have a constant part that would
-    hide the growth; therefore its change from step to step is measured.
+    a spinning top. Its change from step to step is measured, because with the defect
+    `base-not-restored` a constant part of omega might hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -246,14 +245,13 @@ def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Arra
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
-        # Each stage of the original program starts from the previous stage, so that its terms are
-        # larger.
+        # In the original program each stage starts from the previous one, so the terms are larger.
         return _LONGEST * runge_kutta_punched(on, sizes)
     first = on.times_step(on.rate(sizes))
     estimate = sizes + moved * first
     rate = on.times_step(on.rate(estimate))
     _, varying = solver_roundings(program)
-    # The solution of the first system has a similar error, which the rates propagate.
+    # The first system's solution has a similar error, which the rates propagate.
     wrong = varying * moved * first
     carried = 0.5 * on.times_step(on.rate(estimate + wrong) - on.rate(estimate - wrong))
     weights = _WEIGHTS[program]
@@ -282,8 +280,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return two step sizes (s) of divergence, and a bound on their relative difference.
 
-    The body spins about stable axis 3 for `time` (s). The first step is that of
-    `smallest_divergent`. With the second, linear stability lets the wobble about axis 3 double.
+    The body spins about stable axis 3 for `time` (s). The first step is from `smallest_divergent`;
+    with the second, by linear theory, the wobble about axis 3 doubles.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -291,14 +289,14 @@ def divergence(
     rate = math.sqrt(-a * b) * spin
     predicted = _doubling(matrix, rate, time, smallest)
     bounds = _bounds(scene, time)
-    # omega3**2 - (C/A) omega1**2 and omega3**2 - (C/B) omega2**2 are constant. Until the wobble has
-    # doubled, they allow the spin, and with it the rate, to change by this fraction at most.
+    # As omega3**2 - (C/A) omega1**2 and omega3**2 - (C/B) omega2**2 are constant, this is the
+    # largest relative change of spin and rate until the wobble has doubled.
     change = 0.0
     if c:
         wobble = 2.0 * max(bounds[:2])
         change = abs(c) / min(abs(a), abs(b)) * wobble**2 / (2.0 * spin * spin)
     low = _doubling(matrix, rate * (1.0 + change), time, smallest)
-    # Between two steps, a peak may be missed by half the angle of a step.
+    # A peak may be missed by half the angle of a step.
     missed = -math.log(math.cos(min(1.5, 0.5 * rate * predicted)))
     high = _doubling(matrix, rate * (1.0 - change), time, smallest, missed)
     limit = max(predicted - low, high - predicted) / predicted + 2.0 * predicted / time

@@ -34,7 +34,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 
 __all__ = ["external_checks", "problems"]
 
-# The finest tolerance that a method claims is used, except where that would take too long.
+# The finest tolerances of these methods would take too long.
 _TOLERANCES = {"radau": 1e-8, "rk45": 1e-11, "quick": 1e-9}
 _SOLVED = (
     "reference", "auto", "taylor", "closed-form", *(f"gauss-{stages}" for stages in range(1, 9)),
@@ -45,8 +45,7 @@ _HALF_ULP = 2.0**-53
 # A number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
-# A method must solve every problem that it accepts: `auto` chooses a suitable method, and
-# `closed-form` evaluates a formula.
+# `auto` chooses a suitable method, and `closed-form` evaluates a formula.
 _MAY_NOT_REFUSE = ("auto", "closed-form")
 
 _PUBLISHED = Basis(
@@ -57,7 +56,7 @@ _PUBLISHED = Basis(
 )
 
 _Row = TypeVar("_Row")
-# Result of a method at one time: omega, and a bound on the error of each component (rad/s).
+# Omega at one time, and a bound on the error of each component (rad/s).
 _Result = tuple[Array, float]
 
 
@@ -89,10 +88,10 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value and limit are in the problem's unit, for the component with the largest ratio.
+    Value and limit, in the problem's unit, are for the component with the largest ratio.
     """
     for problem in problems:
-        # Times of one sign are solved together, so that repeating one check gives the same bits.
+        # Solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):
             values = [value for value in problem.values if float(value.time) * side > 0.0]
             values.sort(key=lambda value: abs(float(value.time)))
@@ -251,17 +250,17 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     while steps <= _MOST_STEPS:
         rows = run(replace(scene, step_size=time / steps, steps=steps))
         if rows.ier is not None and rows.ier.any():
-            # LEQT1F reports the matrices of tiny steps as singular; the program then has order 1.
+            # LEQT1F finds the matrices of tiny steps singular; the program then has order 1.
             break
-        # A run with too long steps may overflow, although it does not with shorter ones.
+        # With too long steps a run may overflow.
         ended = rows.ended
         omega = rows.omega[-1] if ended == "complete" else None
         if omega is not None and before is not None:
             halving = 2.0 * float(np.abs(omega - before).max()) / (2.0**order - 1.0)
             rounding = steps * _HALF_ULP * _scale(scene, omega)
             result = omega, halving + rounding
-            # Two coarse runs may agree by chance, so that the estimate counts only if halving
-            # reduces it.
+            # Two coarse runs may agree by chance, so the estimate counts only if halving reduces
+            # it.
             if halving <= max(0.1 * accuracy, rounding) and 2.0 * halving <= previous:
                 break
             previous = halving
@@ -275,17 +274,17 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
     factor, (omega, error), judged = UNITS[unit], result, []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
-            # Decimals, because the print may have more digits than binary64.
+            # The print may have more digits than binary64.
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
-    # NaN counts as the largest difference, although every comparison with NaN is false.
+    # NaN counts as the largest.
     distance, limit, note = max(judged, key=lambda each: (math.isnan(each[0]), each[0] / each[1]))
     return name.bounded(distance, limit, _PUBLISHED, note)
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at both ends (rad/s), which keeps limits narrow."""
+    """Return the largest abs(omega) at either end (rad/s)."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
@@ -300,7 +299,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
         try:
             return [*_moves(scene, times, "taylor")]
         except InputError:
-            # A closed form solves later times than a series.
+            # A closed form reaches later times than a series.
             return [*_moves(scene, times, "auto")]
 
     rows, _ = _as_far_as_solved(solve, values)

@@ -29,12 +29,11 @@ _LONGEST_PRINT = 100
 
 @dataclass(frozen=True)
 class Figure:
-    """A published number with its digits, its value, and a bound on its error."""
+    """A published number."""
 
-    print: str  # its digits as printed
-    value: Decimal  # the value of these digits
-    # bound on its error: half a unit of the last printed digit, or what the source states if that
-    # is larger
+    print: str  # digits as printed
+    value: Decimal
+    # error bound: half a unit of the last printed digit, or more if the source says so
     accuracy: float
 
 
@@ -43,15 +42,15 @@ class Pointing:
     """A published attitude."""
 
     attitude: Quaternion  # unit quaternion
-    accuracy: float  # bound on its error, rad
+    accuracy: float  # error bound, rad
 
 
 @dataclass(frozen=True)
 class Value:
     """The published results at one time: omega, an attitude, or both."""
 
-    time: str  # time as printed (s); taken as exact
-    # angular velocity in the unit of the problem, None where nothing is printed
+    time: str  # as printed (s); taken as exact
+    # in the unit of the problem; None where nothing is printed
     omega: tuple[Figure | None, ...]
     pointing: Pointing | None = None
 
@@ -60,19 +59,19 @@ class Value:
 class Problem:
     """A published problem: a scene, and its results at several times."""
 
-    name: str  # the name of its file
-    title: str  # the problem as a sentence
-    unit: str  # unit of the printed omega, one of `UNITS`
-    scene: Scene  # its equations and initial state; the step size is not used
-    values: tuple[Value, ...]  # the published results, one element for each time
-    path: str | None = None  # the user's file; None for a problem of the package
+    name: str  # of its file
+    title: str  # as a sentence
+    unit: str  # of the printed omega, one of `UNITS`
+    scene: Scene  # equations and initial state; the step size is not used
+    values: tuple[Value, ...]  # one for each time
+    path: str | None = None  # None for a problem of the package
 
 
 def figure(where: str, text: object, good_to: float = 0.0) -> Figure:
     """Return the published number with the digits `text`, and its accuracy.
 
-    The accuracy is half a unit of the last digit or, if larger, the stated error `good_to`. Raise
-    InputError if `text` is not a number or too large for binary64.
+    The accuracy is half a unit of the last digit or, if larger, `good_to`. Raise InputError if
+    `text` is not a number or too large for binary64.
     """
     if not isinstance(text, str):
         raise InputError(f"{where}: {kind_of(text)}; allowed: the digits as text, '0.606'")

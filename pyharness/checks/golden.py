@@ -55,11 +55,11 @@ _KEYS = ("command", "ended", "steps", "evaluations", "stop", "digest")
 class Recorded:
     """A trajectory of the golden record, and how to compute it."""
 
-    source: str  # the program or method, which is the name of its file
-    name: str  # the last parts of the id of its check, as in ``case-3/original``
+    source: str  # program or method, which is the name of the file
+    name: str  # last parts of the check's id, as in ``case-3/original``
     command: str  # the command that prints it
-    scene: Scene  # the scene that is solved
-    tolerance: float | None  # requested of the method; None if every bit is compared
+    scene: Scene
+    tolerance: float | None  # None if every bit is compared
 
     def run(self) -> Trajectory:
         """Return the trajectory, newly computed."""
@@ -132,7 +132,7 @@ def _compared(
         return name.judged(False, moved, limit=0.0, basis=_RECORD)
     old, new = _rows(entry), _rows(now)
     away = math.inf
-    # No tolerance applies to step, time and TIME.
+    # Step, time and TIME must be equal.
     same_times = old.shape == new.shape and np.array_equal(old[:, :3], new[:, :3])
     if same_times and entry["ended"] == now["ended"]:
         scale = float(np.abs(run.omega).max(initial=0.0)) or 1.0
@@ -164,7 +164,7 @@ def read_record(folder: Path) -> dict[str, dict[str, Any]]:
 def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
     """Return the files of a new golden record, by name, and its differences from the old record."""
     known: dict[str, dict[str, Any]] = {}
-    # If the old record is damaged, every trajectory counts as new.
+    # If the old record is damaged, every trajectory is new.
     with suppress(InputError):
         known = read_record(folder) if folder.is_dir() else {}
     entries = {entry["command"]: entry for file in known.values() for entry in file["trajectory"]}
@@ -183,7 +183,7 @@ def update(folder: Path) -> tuple[dict[str, bytes], list[str]]:
 
 
 def mathematics() -> str:
-    """Return the name of this system's mathematical library, which computes sine and cosine."""
+    """Return the name of this system's mathematical library."""
     return " ".join([*platform.libc_ver(), platform.system(), platform.machine()]).strip()
 
 

@@ -1,8 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the programs of the thesis are reported without a bound. The `flow` of a scene is its
-error amplification and rounding errors. Methods without a tolerance, `auto` and `quick` run as
-prepared solvers, whose refusals are returned; other methods raise InputError.
+error amplification and rounding. Methods without a tolerance, `auto` and `quick` run as prepared
+solvers, whose refusals are returned; other methods raise InputError.
 """
 
 import math
@@ -55,13 +55,12 @@ STEPS = Basis(
 """Basis of limits from the promised errors of the steps."""
 
 
-# Our methods that run at two tolerances: a middling one, and one near the finest, where rounding
-# shows.
+# Run at two tolerances: a middling one, and one near the finest, where rounding shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
 _TOO_MANY_RADIANS = 1e8  # phase of a torque wave beyond which a Taylor series may refuse
-_ROWS = 10  # rows of a program's run that are compared with the true solution
+_ROWS = 10  # rows of a program's run compared with the true solution
 FORMS = ("closed-form", "auto")
 
 
@@ -69,7 +68,7 @@ FORMS = ("closed-form", "auto")
 def _series(name: str) -> tuple[float, ...]:
     """Return the coefficients of powers of the step in one step of y' = y**2, y(0) = 1.
 
-    This is one of Euler's equations with A = B = C = 1 and equal components.
+    This is each of Euler's equations with A = B = C = 1 and equal components.
     """
     ones = np.ones(3)
     equal = Scene("equal", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0))
@@ -94,8 +93,8 @@ def _is_free(scene: Scene) -> bool:
     return scene.torque.is_zero and scene.moments is not None
 
 
-# A function that returns the checks of one method, from the true solution, a tolerance (None for
-# the scene's step size) and the name of the checks.
+# Returns the checks of one method from the true solution, a tolerance (None for the scene's step
+# size) and the name of the checks.
 Judged = Callable[[Truth, float | None, Name], Iterable[Check]]
 
 
@@ -104,7 +103,7 @@ def check_all(
     checks: Callable[[Name, float], Iterable[Attempt]] | None = None,
     has_programs: Callable[[Circumstance], bool] = lambda each: True,
 ) -> Iterator[Attempt]:
-    """Yield deferred checks of all methods in the extreme scenes of the trial `suite`."""
+    """Yield deferred checks of all methods in the extreme scenes of a trial."""
     for each in EXTREMES[suite]():
         name = named(suite, "", each.name, scene=each.scene)
         yield from (checks or check_methods)(name, each.time)
@@ -126,7 +125,7 @@ def check_methods(
     and the error of the true solution. For a fixed step without torque, a bound from the order
     replaces the tolerance. There is no limit if neither is known, or if the sum leaves fewer than
     two digits of omega. Without torque, energy and momentum always have a limit, because the flow
-    does not amplify their errors. A method fails if it refuses a scene that it must solve.
+    does not amplify their errors. Refusing a scene that it must solve is a method's failure.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -156,8 +155,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `closed-form` may if there is no closed form, `quick` always, and series if the phase of a
-    torque's wave exceeds 1e8 radians.
+    `closed-form` may without a closed form, `quick` always, and series if the phase of a torque's
+    wave exceeds 1e8 rad.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -175,11 +174,10 @@ def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """
     made = promised_sum(tried, truth)
     if truth.exact and tried.method in FORMS:
-        # A closed form has no errors of steps; only the rounding of A, B and C is added to its
-        # error.
+        # A closed form has no steps; only the rounding of A, B and C is added.
         return min(MOST, (made or 0.0) + truth.data + truth.relative_error)
     if made is None:
-        # In steps of this size the method bounds no error; it only conserves energy and momentum.
+        # In steps of this size the method only conserves energy and momentum.
         return None
     growth, steps = truth.flow.amplification, _roundings(tried, truth)
     return linear(allowed(truth, made, growth, steps=steps))
@@ -292,6 +290,6 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest absolute difference over the rows that both arrays have."""
+    """Return the largest absolute difference over the common rows."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

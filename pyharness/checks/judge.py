@@ -22,10 +22,9 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.bounded import ErrorBound, bound_of
 from pyharness.truth.reference import Reference, reference
 
-# Relative error beyond which the linearised flow no longer predicts the error.
+# Relative error above which the linearised flow does not predict the error.
 LINEAR = 0.01
-# Relative to the largest omega, the difference of two vectors of this magnitude; a larger limit is
-# no restriction.
+# Largest difference of two vectors, over the largest omega; a larger limit is no restriction.
 MOST = 2.0
 
 
@@ -34,12 +33,12 @@ class Answer:
     """A method's results, at all times or the last, or its refusal."""
 
     omega: Array = field(default_factory=lambda: np.empty((0, 3)))  # shape (n, 3), rad/s
-    attitude: Array | None = None  # shape (n, 4), where it was requested
-    ended: str = "complete"  # how the run ended
+    attitude: Array | None = None  # shape (n, 4), if requested
+    ended: str = "complete"
     steps: int = 0
-    evaluations: int | None = None  # number of right-hand sides, if it is counted
-    refusal: str = ""  # why the method refused the scene; empty if it did not
-    is_whole: bool = True  # whether the method reached the last time, with every row
+    evaluations: int | None = None  # of right-hand sides, if counted
+    refusal: str = ""  # why the method refused the scene, if it did
+    is_whole: bool = True  # reached the last time, with every row
 
 
 def of_end(method: str, end: End) -> Answer:
@@ -70,10 +69,7 @@ class MethodRun:
 
 
 def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
-    """Return a deferred run of a method by `solve`, with results at all `times` (s).
-
-    It has attitudes if the scene has one.
-    """
+    """Return a deferred run of a method by `solve` at all `times` (s), with any attitude."""
     candidate = method_candidate(method, tolerance)
 
     def ask() -> Answer:
@@ -163,7 +159,7 @@ class Truth:
 
 
 def unknown_flow(largest: float) -> Conditioning:
-    """Return a flow of infinite amplification, for closed forms, whose limits do not use it."""
+    """Return an infinite amplification, for closed forms, whose limits do not use it."""
     return Conditioning(math.inf, MOST, MOST, MOST, largest)
 
 
@@ -178,8 +174,7 @@ def reference_truth(
     Raise InputError if it does not reach them.
     """
     flow = flow or conditioning_at(scene, times)
-    # The reference's steps have errors of 1e-22, too large if the flow amplifies them by more than
-    # 1e3.
+    # The steps' errors of 1e-22 are too large for an amplification above 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution grows without bound")
@@ -224,7 +219,6 @@ def tolerance_of(tried: MethodRun) -> float:
 def has_no_form(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether `closed-form` or `quick` refuses a scene for which its formula fails."""
     if tried.method == "quick":
-        # `quick` requires that A, B and C are not 0.
         return why == "quick: refused" and not all(tried.scene.euler_coefficients)
     return tried.method == "closed-form" and closed_form(tried.scene) is None
 
@@ -251,7 +245,7 @@ def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
     """Return the check that a method's error is within its limit, or its refusal permitted.
 
     Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
-    without closed form.
+    without one.
     """
     answer = tried.answer
     if why := answer.refusal:

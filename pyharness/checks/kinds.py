@@ -26,39 +26,38 @@ _THIN_EXTERNAL = [
 
 _RANDOM = (random_programs, random_methods, random_attitudes, random_torques)
 KINDS: dict[str, Callable[[Selection], Attempts]] = {
-    # Fortran against the Python twin for every cell: all bits of the trajectory, the counters, and
-    # the stop.
+    # Fortran against the Python twin: all bits of the trajectory, the counters, and the stop.
     "cells": cells,
-    # Our arithmetic of machine words: test vectors of the CDC, binary64 against the processor, and
-    # the compiled programs against the Python twins in other words.
+    # Machine words: test vectors of the CDC, binary64 against the processor, and compiled programs
+    # against twins in other words.
     "words": words,
     # The decks, compiled from the author's cards, against the Fortran port: TAPE5 and the page.
     "decks": decks,
-    # Every step of the corrected programs against its scheme, within rounding.
+    # Each step of the corrected programs against its scheme, within rounding.
     "schemes": schemes,
-    # The step and the reason of the Runge-Kutta program's stop, against the formula of its test.
+    # Step and reason of the Runge-Kutta program's stop, against the formula of its test.
     "stops": stops,
-    # Methods against the reference, within the requested tolerance.
+    # Against the reference, within the requested tolerance.
     "methods": methods,
     "prepared": prepared,
-    # Attitudes against the reference, in the cases and by prepared solvers.
+    # Against the reference, in the cases and by prepared solvers.
     "attitudes": attitudes,
-    # The power with which the error decreases as the step is halved: of corrected programs against
-    # `solve_ivp`, of methods with a fixed step against the reference.
+    # Corrected programs against `solve_ivp`, fixed-step methods against the reference, as the step
+    # is halved.
     "orders": orders,
-    # Programs, methods and attitudes in scenes drawn from a seed, half of them of the difficult
-    # kinds in `NASTY`; methods under torques that depend on omega or attitude.
+    # In scenes drawn from a seed, half of them of the difficult kinds in `NASTY`; methods also
+    # under torques that depend on omega or attitude.
     "random": lambda chosen: chain.from_iterable(each(chosen) for each in _RANDOM),
-    # Methods and programs against published results that were not computed here.
+    # Against published results that were not computed here.
     "external": _external,
-    # Trajectories against the golden record of an earlier run.
+    # Against trajectories of an earlier run.
     "golden": golden,
 }
-# These kinds read files that the user may specify.
+# They read files that the user may specify.
 _OF_THE_USER = ("external", "golden")
 
 
 def verify(chosen: Selection) -> Iterator[Check]:
-    """Yield the results of the requested checks, each computed when it is reached."""
+    """Yield the results of the requested checks."""
     suites = {kind: partial(attempts, chosen) for kind, attempts in KINDS.items()}
     return run_suites(suites, chosen.only, "verify", _OF_THE_USER)

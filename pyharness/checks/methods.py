@@ -1,7 +1,6 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
 Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad).
-`prepare` sets up a prepared solver once, for many calls on one scene.
 
 Orders are powers of the step size with which errors decrease. Programs are compared with
 `solve_ivp`. Methods with a fixed step are compared with the reference, and so is the programs'
@@ -48,11 +47,11 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-# Times (s): one long after the end of the cases, and the times for prepared solvers.
+# Times (s): one long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
-# Methods with a tolerance, and those that also propagate the attitude. The torques of the cases are
-# not weak.
+# Methods with a tolerance, and those that propagate the attitude. The torques of the cases are not
+# weak.
 _TOLERANT = {x: each for x, each in METHODS.items() if each.finest < 1.0 and x != "reference"}
 _SOLVED = tuple(name for name, each in _TOLERANT.items() if not each.weak_torque)
 _TURNED = tuple(name for name in _SOLVED if METHODS[name].attitude)
@@ -125,7 +124,7 @@ def _prepared(
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run by `solve` at all `times` (s), with a tolerance that SciPy can meet."""
     if method in SCIPY_METHODS and scene.attitude:
-        # SciPy's methods can't reach such a small error over a long time.
+        # SciPy's methods can't meet a smaller one over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
     return by_rows(method, tolerance, scene, times)
 
@@ -153,10 +152,9 @@ def _same_steps(scene: Scene, name: Name) -> Check:
     return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0, BITS)
 
 
-# The method of solve_ivp that serves as true solution, at its finest tolerance.
+# A method of solve_ivp serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Number of successive halvings that must show the order, and the largest deficit in the last. The
-# largest deficit that occurs is .006.
+# Successive halvings that must show the order, and the accepted deficit in the last; .006 occurs.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(
@@ -164,7 +162,7 @@ _SLACK = Basis(
     "order of a method with a fixed step: at most 0.2 below the theoretical one",
     "`pyharness verify --only orders`, where the largest deficit is .006",
 )
-# Numbers of steps in the coarsest and the finest run from which an order is measured.
+# Steps in the coarsest and the finest run.
 _FEWEST, _MOST = 16, 4096
 
 
@@ -193,7 +191,7 @@ def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> C
 
     def velocity(scene: Scene) -> Array:
         found = run(scene).velocity
-        # A run without velocity counts as one without rows, whose order is undecided.
+        # Without velocity the order is undecided, as without rows.
         return np.empty((0, 3)) if found is None else found
 
     due, known = PROGRAM_REGISTRY[name.subject].order, truth(velocity=True)
@@ -211,15 +209,15 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return a scene with `_FEWEST` steps until `time` (s), the coarsest run for an order."""
+    """Return a scene with the coarsest steps for an order, `_FEWEST` until `time` (s)."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    The order is only reported if the scene is too fast or sensitive for at most 4096 steps, or the
-    torque has a table. Steps do not end where a table changes, which lowers the order.
+    The order is only reported if the scene is too fast or sensitive for 4096 steps, or the torque
+    has a table: steps across its changes lower the order.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)

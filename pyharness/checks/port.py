@@ -1,8 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-A twin is our port to Python. Results must agree bit for bit in all cells (a program, a case,
+A twin is our Python version. Results must agree bit for bit in all cells (a program, a case,
 defects and readings) and in random scenes. `docs/how-to/ports.md` describes the protocol.
-The report has the first differing steps, and the times of the answers.
 """
 
 import math
@@ -59,14 +58,14 @@ class Cell:
         return request(self.scene, self.listing, self.lipschitz, self.may_stop)
 
     def twin(self) -> Trajectory:
-        """Return the trajectory of the Python port of the program."""
+        """Return the trajectory of the Python version."""
         run = PROGRAM_REGISTRY[self.listing.program].run
         return run(self.scene, self.listing, "python", self.lipschitz, self.may_stop)
 
 
 @dataclass(frozen=True)
 class PortCheck(Check):
-    """The comparison of a port with the Python twin in one run.
+    """The comparison of a port with the Python version in one run.
 
     `difference` has the first step that differs, with the value of each variable; `seconds` is the
     time until the port's answer.
@@ -91,7 +90,7 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has leading parts of names, and is empty for all. Its numbers may exceed `draws`.
+    `cells` has leading parts of names, and is empty for all; its numbers may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -107,7 +106,7 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port, started by `command`, returns the twin's bits in all runs.
+    """Yield checks that a port, started by `command`, returns the Python version's bits.
 
     An invalid answer fails and ends the comparison. `patience` is the longest wait (s) for an
     answer. Raise InputError if `command` is empty.
@@ -155,7 +154,7 @@ def compared(
 
 
 def differences(twin: Trajectory, answer: Answer) -> list[str]:
-    """Return descriptions of how a port's answer differs from the twin's run."""
+    """Return descriptions of how a port's answer differs from the Python version's run."""
     wanted, given = _rows(twin), answer.rows
     found = []
     if difference := _difference(wanted, given):
@@ -196,7 +195,7 @@ def _rows(twin: Trajectory) -> Array:
     return np.column_stack([twin.recorded_time, twin.omega, twin.velocity])
 
 
-_MOST_STEPS = 3  # failed checks whose step is shown in full
+_MOST_STEPS = 3  # failed checks shown in full
 _UNITS = {"T": "s", "U": "rad/s", "V": "m/s"}
 _STEP = (*words("variable unit ours theirs"), Column("ulp"))
 _TIMES = (
@@ -214,7 +213,7 @@ def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str
     seconds = sum(check.seconds or 0.0 for check in checks)
     steps = [step_section(check) for check in checks if check.difference][:_MOST_STEPS]
     text = summary(title, checks, depth=2, more=_times(checks))
-    # Sections for steps follow the list of failures, the second section.
+    # Steps follow the list of failures, the second section.
     text[2:2] = steps
     page = summary_page("verify --port", checks, title, depth=2, more=[*steps, _times(checks)])
     known = {"seed": seed} if seed else {}

@@ -16,20 +16,19 @@ from typing import Self
 
 from pyharness.model.errors import InputError, printable
 
-PATIENCE = 60.0  # s for a run, including the start of an interpreter that compiles
+PATIENCE = 60.0  # s, including the start of an interpreter that compiles
 _LARGEST = 1 << 26  # most bytes of an answer
 _PIECE = 1 << 16
-_TO_END = 1.0  # s that a port may take to end after it has closed its input or output
-# Limit on the rounds of searching for a port's child processes, and of reading its last output.
+_TO_END = 1.0  # time (s) to end after closing input or output
+# Rounds of searching for child processes, and of reading the last output.
 _ROUNDS = 100
-_PROBE = 10.0  # s for the answer to a single request of the other protocol
-# An example of a command, for each option that has one.
+_PROBE = 10.0  # s, for one request of the other protocol
 _EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
 _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
 
 
 class PortError(Exception):
-    """An error raised if a port or integrator gives no valid answer; its message is one line."""
+    """A port or integrator gave no valid answer; the message is one line."""
 
 
 def split_command(command: str, option: str = "--port") -> list[str]:
@@ -54,10 +53,10 @@ def refuse_other(
 
 
 def _processes_with(mark: str) -> list[int]:
-    """Return the ids of live processes with `mark` in their environment; none without /proc."""
+    """Return the live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # A process may have ended, or belong to another user. An ended process that waits for its
+        # The process may have ended, or belong to another user. An ended process that waits for its
         # parent has no environment.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
@@ -66,7 +65,7 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """The process of a port, a context manager that raises PortError if it can't start."""
+    """The process of a port; as a context manager, it raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
         """Store the command, the longest wait (s), and the option that named the command."""
@@ -76,7 +75,7 @@ class PortProcess:
     def __enter__(self) -> Self:
         """Start the port in its own process group, so that child processes can be ended too."""
         self._mark = f"{_MARK}={os.urandom(16).hex()}"
-        self._told = b""  # the last part of what the port wrote to stderr
+        self._told = b""  # end of the output to stderr
         try:
             self._process = subprocess.Popen(
                 self._words,
@@ -101,11 +100,10 @@ class PortProcess:
 
     def __exit__(self, *error: object) -> None:
         """End the port's process and all its child processes."""
-        # A group whose processes have all ended is not found, which macOS reports as
-        # PermissionError.
+        # An empty group is not found, which macOS reports as PermissionError.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        # A process may have left the group for its own session, and may be starting another.
+        # A process may have left the group, and may be starting another.
         for _ in range(_ROUNDS):
             marked = _processes_with(self._mark)
             if not marked:
@@ -170,13 +168,12 @@ class PortProcess:
         except subprocess.TimeoutExpired:
             return "it closed its input or output before it had answered"
         how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
-        # The pipe may still have output of the ended process. A child process may continue to
-        # write.
+        # The ended process may have left output in the pipe; a child process may continue to write.
         for _ in range(_ROUNDS):
             if not self._hear():
                 break
         said = self._told.decode(errors="replace").split("\n")
         told = [printable(each.strip()) for each in said if each.strip()]
-        # The last line that names an error, because some interpreters print their version after it.
+        # Some interpreters print their version after the error.
         told = [each for each in told if "rror" in each] or told
         return f"it ended {how} before it had answered{f': {told[-1][:200]}' if told else ''}"

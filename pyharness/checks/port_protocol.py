@@ -111,7 +111,7 @@ def _stop(stop: object) -> Stop:
 
 
 def read_list(where: str, value: object) -> list[Any]:
-    """Return a JSON list; raise PortError, naming `where`, for any other value."""
+    """Return a JSON list; raise PortError, naming `where`, for another value."""
     if not isinstance(value, list):
         raise PortError(f"{where}: {kind_of(value)} where a list belongs")
     return value
@@ -133,14 +133,14 @@ def read_name(field: str, value: object, allowed: Sequence[str]) -> str:
 
 
 def read_whole(where: str, value: object) -> int:
-    """Return a whole number; raise PortError, naming `where`, for any other value."""
+    """Return a whole number; raise PortError, naming `where`, for another value."""
     if type(value) is not int:
         raise PortError(f"{where}: {kind_of(value)} where a whole number belongs")
     return value
 
 
 def read_number(where: str, value: object) -> float:
-    """Return a number, from JSON or from decimal or hexadecimal text; raise PortError otherwise."""
+    """Return a number from JSON, or from decimal or hexadecimal text; else raise PortError."""
     if type(value) is float:
         return value
     try:

@@ -47,10 +47,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.truth.integer_series import integer_series
 
-# The draws of a pair are a plain scene and a scene of a kind in `NASTY`. Methods run in one of 4
-# pairs, because the true solution takes longer than the methods. Methods in Python or decimal
-# arithmetic take longer still, and run in one of 60 pairs; attitudes in one of 20 draws. One of 20
-# draws has a torque that depends on the state; one of 80 also runs the methods in Python.
+# A pair of draws is a plain scene and one of a kind in `NASTY`. Because the true solution takes
+# longer, methods run in one of 4 pairs; those in Python or decimal arithmetic in one of 60.
+# Attitudes are in one of 20 draws; one of 20 has a torque that depends on the state, one of 80 also
+# runs the methods in Python.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
 # Factors on the work limit of the reference, for an attitude and for such a torque.
@@ -62,8 +62,8 @@ CAMPAIGN = Basis(
     "`pyharness verify --only random --draws 12000 --seed campaign-1`, and seeds of each week",
 )
 """Basis of the limits in random scenes."""
-_CALM = 10.0  # error amplification below which the series has no reason to refuse
-# Kinds of random scenes that may diverge, or be too fast for any true solution and any series.
+_CALM = 10.0  # error amplification below which a series has no reason to refuse
+# These scenes may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 # Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
@@ -91,8 +91,8 @@ def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
     `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64. The
-    others may for the kinds in `_MAY_REFUSE` (diverging or too fast), and if the amplification
-    exceeds `_CALM`; SciPy's also for too fine a tolerance.
+    others may for the kinds in `_MAY_REFUSE` and if the amplification exceeds `_CALM`; SciPy's also
+    for too fine a tolerance.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -145,7 +145,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # Without true solution, the motion diverges or is too fast.
+            # Then the motion diverges or is too fast.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.name_draw(number, "no-truth")
             again = chosen.name_draw(number).replay
@@ -178,7 +178,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return None if the motion diverges, or is too fast or long for any true solution."""
+    """Return the true solution, or None for a motion that diverges, or is too fast or long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:
@@ -236,7 +236,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
         if not chosen.may_ask(f"random/{number}"):
             continue
         source = Random(f"torque {chosen.seed}/{number}")
-        # Both kinds of torque occur in the draws that run all methods.
+        # Both kinds occur in the draws that run all methods.
         kind = (number // _EVERY_TORQUE + number // _EVERY_SLOW_TORQUE) % 2
         scene, time = (state_scenes.draw, state_scenes.draw_ready)[kind](source)
         is_slow = number % _EVERY_SLOW_TORQUE == 0 and not chosen.thin

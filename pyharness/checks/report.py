@@ -14,7 +14,7 @@ from pyharness.truth.bounded import ESTIMATED, PROVED, joined
 
 _MOST_FAILURES = 50
 _MOST_ON_PAGE = 10
-_FEW = 10  # up to this number of checks, passed checks are shown too
+_FEW = 10  # up to so many, passed checks are shown too
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
     *words("basis"),
@@ -65,7 +65,7 @@ def summary_page(
 
 
 def _code(text: str) -> str:
-    """Return a text as Markdown code, in which a port can't write links or tags."""
+    """Return a text as Markdown code, which prevents links or tags from a port."""
     return f"`{text.replace('`', chr(39))}`"
 
 
@@ -78,13 +78,13 @@ def _failure(check: Check) -> str:
 
 
 def marks(checks: Sequence[Check]) -> str:
-    """Return the marks of the checks' limits, as in ``proved, derived``; a dash without limits."""
+    """Return how the checks' limits were set, as in ``proved, derived``; a dash without limits."""
     found = {check.mark for check in checks}
     return ", ".join(mark for mark in MARKS if mark in found) or "-"
 
 
 def basis_note(checks: Sequence[Check]) -> list[str]:
-    """Return a legend of the marks, with the number of limits of each; empty without limits."""
+    """Return a legend of the marks, and the number of limits of each; empty without limits."""
     counts = Counter(check.mark for check in checks if check.mark)
     told = ", ".join(f"{counts[mark]} {mark}" for mark in MARKS)
     legend = (
@@ -119,7 +119,7 @@ def listed_singly(checks: Sequence[Check]) -> list[str]:
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
-        # The command is not shortened, so that it can be copied.
+        # Not shortened, so that the command can be copied.
         lines += [f"FAILED {check.id}{_format_outcome(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")

@@ -1,7 +1,6 @@
 """Stress trials of a user's scene, with any torque that can be recorded.
 
-They apply to every scene: errors against the reference, and transformations that must not change
-the motion.
+They compare errors with the reference, and apply transformations that must not change the motion.
 """
 
 from collections.abc import Callable, Iterator
@@ -38,7 +37,7 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
-# Methods that also run at their finest tolerance, for which methods in Python take too long.
+# Run also at their finest tolerance, which takes methods in Python too long.
 _FINE = ("auto", "taylor", "closed-form")
 _PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
@@ -150,8 +149,8 @@ def _invariance(scene: Scene, name: Name) -> Iterator[Attempt]:
             yield Attempt(own, partial(_compared, scene, tolerance, make))
 
 
-# A function of a scene, a method and its tolerance. It returns two states that must agree, and a
-# bound of their relative difference.
+# From a scene, a method and its tolerance: two states that must agree, and a bound of their
+# relative difference.
 Way = Callable[[Scene, str, float], tuple[State, State, float]]
 
 
@@ -204,7 +203,7 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     start = _from(scene, there, time)
     again = _end(start, -time, method, tolerance)
     back = conditioning_at(start, [-time])
-    # The error of the forward run is an initial error of the backward run.
+    # The forward run's error is an initial error of the backward run.
     limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification
     limit += back.limit(tolerance)
     attitude = None if scene.attitude is None else np.array(scene.attitude)

@@ -1,13 +1,12 @@
 """Checks of the programs' steps and stops, by recomputing every step from its scheme.
 
-Fortran and twin could share a fault too small to change the order. Each step of the corrected
-programs is therefore recomputed from the program's previous state; only its rounding errors may
-differ.
+Fortran and Python could share a fault too small to change the order. Each step of the corrected
+programs is therefore recomputed from the program's previous state; only rounding errors may differ.
 
 The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if a quotient
 exceeds the stop constant: the change of K (right-hand side) divided by the change of U (state)
-within a step. As Fortran and twin could both test a wrong quotient, all quotients are recomputed
-from the scheme. The program is run with constants just below and above each new maximum.
+within a step. All quotients are recomputed too, and the program is run with constants just below
+and above each new maximum.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -44,7 +43,7 @@ class _Stage:
     # shape (n, 6); arguments (rad/s, m/s) and values (rad/s2, m/s2) of the right-hand sides
     state: Array
     rate: Array
-    rounding: Array  # shape (n, 6); bound on the difference of two computations of the rate
+    rounding: Array  # shape (n, 6): bound on the difference of two computations of the rate
 
 
 _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
@@ -72,7 +71,6 @@ def _compare_steps(scene: Scene, name: Name) -> Check:
 
 
 def _is_whole(scene: Scene, run: Trajectory) -> bool:
-    """Return whether a run has omega and velocity for every step of the scene."""
     return run.velocity is not None and len(run.omega) == len(run.velocity) == scene.steps
 
 
@@ -100,10 +98,10 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
         parts = np.array([float(part) for part in PARTS[name]])
         powers = np.arange(1, len(parts) + 1)
         matrix = np.power.outer(parts, powers - 1)
-        # The weights integrate the polynomial through the rates at the collocation points.
+        # They integrate the polynomial through the rates at the collocation points.
         weights = np.linalg.solve(matrix.T, 1.0 / powers)
         points = [_stage(scene, part, first.state + part * h * first.rate) for part in parts]
-        # This matrix is the programs': they solve for the coefficients of t, t**2, ...
+        # The programs' matrix: they solve for the coefficients of t, t**2, ...
         condition = float(np.linalg.cond(powers * matrix, np.inf))
     else:
         points = _stages(scene, run)
@@ -128,7 +126,7 @@ def _stage(scene: Scene, part: float, state: Array) -> _Stage:
     times = scene.step_size * (np.arange(len(state), dtype=np.float64) + part)
     torque = np.array([scene.normalized_torque(time) for time in times.tolist()])
     products = scene.euler_coefficients * np.roll(omega, -1, axis=1) * np.roll(omega, -2, axis=1)
-    pull = np.divide(scene.forces, scene.masses[0])  # one mass, as in the corrected programs
+    pull = np.divide(scene.forces, scene.masses[0])  # as in the corrected programs
     rate = np.hstack([torque + products, pull + np.cross(velocity, omega)])
     u, v = np.abs(omega), np.abs(velocity)
     crossed = np.roll(v, -1, axis=1) * np.roll(u, -2, axis=1)
@@ -150,8 +148,8 @@ class _Quotients:
     """The quotients that the program compares with its stop constant, in the program's order."""
 
     values: Array  # shape (n, m) for n steps, 1/s
-    rounding: Array  # shape (n, m); bound on the difference of two computations, 1/s
-    names: list[str]  # names of the m quotients of a step
+    rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
+    names: list[str]  # of the m quotients
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:
@@ -205,7 +203,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
     columns = [3, 4, 5, 0, 1, 2] if velocity else [0, 1, 2]
     k, u = np.abs(fourth.rate - first.rate)[:, columns], np.abs(after - first.state)[:, columns]
     k_rounding = (first.rounding + fourth.rounding)[:, columns]
-    # U4 and the result are the sum of the previous state and an increment, each rounded.
+    # The sum of the previous state and an increment, each rounded.
     stored = 2.0 * ROUNDING * (np.abs(first.state) + np.abs(after))
     u_rounding = (stored + scene.step_size * (first.rounding + fourth.rounding))[:, columns]
     names = [STOP_VARIABLES[column] for column in columns]
@@ -215,7 +213,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
             np.linalg.norm(each, axis=1, keepdims=True) for each in (k, u, k_rounding, u_rounding)
         )
     with np.errstate(divide="ignore", invalid="ignore"):
-        # A quotient of 0 over 0 never stops a run.
+        # 0 over 0 never stops a run.
         values = np.where(k > 0.0, k / u, 0.0)
         relative = np.where(k > 0.0, k_rounding / k + u_rounding / u, 0.0)
     return _Quotients(values, values * relative, names)

@@ -8,14 +8,14 @@ from importlib import import_module
 from pyharness.checks.check import Attempts, Check, Name, run_suites, severity
 from pyharness.model.listing import PROGRAMS, Listing
 
-# Each trial is in a module of pyharness.checks.trials, loaded when it is requested: the one of its
-# name, except for these.
+# A trial is in the module of its name in pyharness.checks.trials, except these; it is loaded when
+# requested.
 _ELSEWHERE = {"near-symmetry": "separatrix", "shapes": "separatrix"}
 TRIALS = (
     *("separatrix", "near-symmetry", "shapes", "scales", "torque", "length", "step-size"),
     *("regions", "invariance", "attitude", "matrices", "threads"),
 )
-# The trials that can be made of any scene (`pyharness.checks.scene_trials`).
+# For any scene (`pyharness.checks.scene_trials`).
 SCENE_TRIALS = ("length", "step-size", "invariance", "threads")
 LISTINGS = tuple(f(program) for program in PROGRAMS for f in (Listing.original, Listing.corrected))
 
@@ -53,7 +53,7 @@ def stress(only: Sequence[str] = (), trials: Mapping[str, Trial] | None = None) 
 
 
 def worst(checks: Iterable[Check]) -> dict[str, Check]:
-    """Return the worst check by ``trial/method``, among checks with a limit and a scene."""
+    """Return the worst check with a limit and a scene, by ``trial/method``."""
     found: dict[str, Check] = {}
     for check in checks:
         if check.name.scene is None or check.limit is None:

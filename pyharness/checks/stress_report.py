@@ -1,7 +1,4 @@
-"""The report of `stress`: for each trial a description, a table by method, and a picture.
-
-There are pictures of values and limits, of Brouwer's law, and of regions of linear stability.
-"""
+"""The report of `stress`: for each trial a description, a table by method, and a picture."""
 
 import re
 import textwrap
@@ -33,7 +30,7 @@ _NOTE = (
     "bounded: number of checks with a bound; the others only describe. ratio: value over limit of "
     "the worst check, with its value, limit and basis (without a bound: the largest value)."
 )
-_FLOOR = 1e-18  # smaller values, and 0, are drawn at this value
+_FLOOR = 1e-18  # smaller values, and 0, are drawn here
 _TOP = 3.0
 _COLORS = {"fine": "#1040a0", "coarse": "#c02020", "steps": "#107040", "original": "#806000"}
 _MARKERS = {"error": "o", "drift": "v"}
@@ -90,8 +87,8 @@ def _size(check: Check) -> float:
 class _Mark(NamedTuple):
     """A plotted check, with the properties that determine its position and style.
 
-    `kind` is the circumstance's name before its first number. Marks with equal `rank` and `what`
-    form a series.
+    `kind` is the circumstance's name before its first number. Equal `rank` and `what` form a
+    series.
     """
 
     method: str
@@ -112,7 +109,7 @@ def _mark(check: Check) -> _Mark:
     kind = re.split(r"[-^]?\d", name.circumstance, maxsplit=1)[0].rstrip("-")
     rank = name.setting or name.quantity
     with suppress(ValueError):
-        # All coarse tolerances form one series of marks, and all fine tolerances another.
+        # One series for all coarse, another for all fine tolerances.
         rank = "coarse" if float(rank) >= _COARSE else "fine"
     what = name.quantity if name.quantity in _MARKERS else ""
     return _Mark(name.subject, kind, name.circumstance, rank, what, check)
@@ -121,8 +118,7 @@ def _mark(check: Check) -> _Mark:
 def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
     """Return the picture of a trial, with values and limits in a panel for each method.
 
-    Problems are in the order of the trial, grouped by kind. Raise InputError if no check has a
-    value.
+    Problems are in the order of the trial, by kind. Raise InputError if no check has a value.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -144,7 +140,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         _panel(axes, name, [mark for mark in marks if mark.method == name], places)
     for axes in grid.flat[len(methods) :]:
         axes.set_visible(False)
-    # The label of a circumstance omits the name of its kind.
+    # Without the name of the kind.
     labels = [name[len(kind) :].lstrip("-") or name for kind, name in places]
     for axes in grid[-1]:
         axes.set_xticks(list(places.values()), labels, rotation=90)
@@ -161,7 +157,7 @@ def stress_picture(trial: Trial, checks: Sequence[Check]) -> Picture:
         f"Coarse: tolerances of {_COARSE:g} and more, fine: below.",
     )
     lines = [line for each in told for line in textwrap.wrap(each, int(13.0 * inches))]
-    # The legend has the title, because a separate title would overlap it.
+    # A separate title would overlap the legend.
     figure.legend(
         handles=handles, loc="outside upper center", ncols=min(len(handles), int(inches)),
         frameon=False, fontsize=8, title="\n".join(lines), title_fontsize=9,
@@ -205,7 +201,7 @@ def _panel(
             at = [places[kind, mark.circumstance] for mark in own]
             axes.plot(at, [_inside(mark.check.limit) for mark in own], **line)
     axes.set_yscale("log")
-    # The names of the kinds are below the title.
+    # The names of the kinds are below.
     axes.set_title(name, fontsize=9, loc="left", fontweight="bold", pad=14)
     axes.grid(visible=True, axis="y", linewidth=0.3)
     axes.tick_params(labelsize=7)
@@ -245,8 +241,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
             for each in own:
                 style, many = _OF_METHODS[each.method], each.starts > 1
                 marked = {"label": each.method, "markersize": 4, **style}
-                # Errors of a single start have open markers, and are not joined to errors over
-                # several starts.
+                # A single start: open markers, not joined to errors over several starts.
                 alone = style | {"markersize": 5, "linestyle": "", "markerfacecolor": "none"}
                 for shown, look in ((many, marked), (~many, alone)):
                     one.loglog(each.steps[shown], each.error[shown], **look)
@@ -273,7 +268,7 @@ def length_picture(found: Sequence["Drift"]) -> Picture:
     return Picture(figure, numbers("motion method what steps error limit starts", rows))
 
 
-# Dashes and widths distinguish the curves without colour.
+# Distinct without colour.
 _OF_REGIONS: tuple[dict[str, Any], ...] = (
     {"color": "#000000", "linestyle": "solid", "linewidth": 2.2},
     {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.2},

@@ -13,16 +13,16 @@ from pyharness.engine.scipy_ivp import steps_sum
 from pyharness.engine.solve import finest as finest_of
 from pyharness.model.scene import Scene
 
-# Tolerances in the cases. SciPy's methods run only at tolerances that take less than a second.
+# SciPy's methods run only at tolerances that take less than a second.
 OF_CASES = (1e-3, 1e-6, 1e-9, 1e-12)
 _SCIPY_OF_CASES = (1e-6, 1e-9)
 _OF_SELF_TEST = 1e-9
-# The smallest tolerance at which `quick` is checked.
+# Smallest tolerance for `quick`.
 FEW_DIGITS = 1e-7
-# A middling tolerance, and the tolerances to try if a finer one is not possible.
+# A middling tolerance, and those to try if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
-# Methods that take minutes at their finest tolerances, whereas others take seconds.
+# They take minutes at their finest tolerances, others seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
 # Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
@@ -32,7 +32,7 @@ _STAGES = {"dop853": 12, "lsoda": 2, "radau": 20, "rk45": 6}
 
 
 def of_case(name: str, thin: bool) -> list[float]:
-    """Return a method's tolerances in a case of Table 1; only one if `thin`."""
+    """Return a method's tolerances in a case of Table 1, only one if `thin`."""
     finest = METHODS[name].finest
     if name in SCIPY_METHODS:
         return [_SCIPY_OF_CASES[0]] if thin else list(_SCIPY_OF_CASES)
@@ -68,8 +68,8 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
         return [METHODS["closed-form"].finest]
     least = FEW_DIGITS if name == "quick" else finest(name, scene, time)
     if name in GAUSS:
-        # Gauss collocation compares two solutions, which can't agree within the tolerance if
-        # amplified rounding errors exceed it.
+        # Gauss collocation compares two solutions; amplified rounding must not exceed the
+        # tolerance.
         meetable = [each for each in _LADDER if each >= 4.0 * flow.rounding]
         least = max(least, min(meetable, default=math.inf))
     radians = speed(scene, flow.largest) * abs(time)

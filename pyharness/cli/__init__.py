@@ -6,10 +6,10 @@ from typing import Any, TextIO
 
 from pyharness.model.errors import printable
 
-# Control characters that are not escaped, because they separate lines, columns and pages. TAPE6, a
-# printer page of the programs, may contain a form feed.
+# Not escaped, because they separate lines, columns and pages. TAPE6, a printer page of the
+# programs, may contain a form feed.
 _LAYOUT = "\n\t\f"
-_bar: Any = None  # the progress bar on the terminal; None if there is none
+_bar: Any = None  # None if no progress bar is shown
 
 
 def shown(text: str) -> str:
@@ -54,7 +54,7 @@ def progress(done: int, total: int, what: str) -> None:
         end_progress()
         from tqdm import tqdm
 
-        # Otherwise tqdm would start a monitor thread, but this process may start other processes.
+        # No monitor thread of tqdm: this process may start other processes.
         tqdm.monitor_interval = 0
         _bar = tqdm(total=total, leave=False, dynamic_ncols=True, file=_Terminal())
     _bar.set_description_str(shown(what), refresh=False)

@@ -27,17 +27,14 @@ LINE = "pyharness: interrupted\n"
 
 
 class _Interruption:
-    """The state of interruption, and the signal handlers.
-
-    `count` is the number of interrupts; `is_reported` is whether their line was printed.
-    """
+    """The number of interrupts, whether their line was printed, and the signal handlers."""
 
     def __init__(self) -> None:
         self.count = 0
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """Print the line, unless printed before, and end the process with 130, without cleanup."""
+        """Print the line, unless printed before, and end the process without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -45,10 +42,7 @@ class _Interruption:
             os._exit(CODE)
 
     def interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt, and repeatedly by a timer in case it is dropped.
-
-        The third interrupt ends the process.
-        """
+        """Raise KeyboardInterrupt, repeatedly in case it is dropped; the third ends the process."""
         self.count += 1
         if self.count >= _MOST:
             self.leave_at_once()

@@ -9,7 +9,7 @@ from pyharness.model.facts import facts_folder
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of the output of every verb; part `verb-NAME` is that of a verb."""
+    """Return the JSON Schema of all verbs' output; its part `verb-NAME` describes one verb."""
     found: dict[str, Any] = json.loads((facts_folder() / "output.schema.json").read_text())
     return found
 

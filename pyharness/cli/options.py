@@ -153,7 +153,7 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
 
     Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
     matrix, a torque about the axes of space or dependent on the state, or a changing inertia,
-    unless `allowed` has the argument of `checked_scene` that accepts it.
+    unless `allowed`, passed to `checked_scene`, accepts it.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -226,7 +226,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the stop test's limit (1/s), by default 500 as on the cards, and if it may stop."""
+    """Return the limit of the stop test (1/s; default 500, as on the cards), and if it is on."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -238,7 +238,7 @@ def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
 def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
     """Raise InputError if an option of `names` is given besides `chosen`.
 
-    The names are those of attributes, such as "no_stop", or keys such as "--case N".
+    A name is an attribute, such as "no_stop", or a key, such as "--case N".
     """
     for name in names:
         option = name.partition(" ")[0].removeprefix("--").replace("_", "-")

@@ -69,16 +69,15 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be new or empty, or contain only the JSON file `mark`, of a kind in `SCHEMAS`,
-    and the files that `mark` lists.
+    The folder may be new or empty, or contain only the JSON file `mark`, of schema `kind`, and the
+    files that it lists.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, mark, kind)
-        # A temporary folder is made, because permissions do not show that a name is too long, or
-        # that the file system accepts no file.
+        # As in `_why_not_made`, permissions alone do not tell.
         if not reason:
             new.mkdir()
             try:
@@ -148,7 +147,6 @@ def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
                     raise
             finally:
                 shutil.rmtree(new, ignore_errors=True)
-            # The previous folder is kept until the new folder has its name.
             shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise InputError(f"{option} '{path}': {error.strerror or error}") from None

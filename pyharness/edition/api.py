@@ -64,7 +64,7 @@ def _entry(name: str, of: Any, of_class: str = "") -> Entry:
 
 
 def _methods(owner: str, of: type) -> Iterator[Entry]:
-    # A class inherits some of its methods from base classes of this package.
+    # Some methods are inherited from base classes of this package.
     named: dict[str, Any] = {}
     for base in of.__mro__:
         if base.__module__.startswith(pyharness.__name__):
@@ -83,7 +83,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # Types are written without their modules, and array types as in the source files.
+    # Types without their modules; array types as in the source files.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

@@ -38,7 +38,7 @@ It bounds each component of the attitude, and the error of omega relative to its
 SPEEDS = (0.1, 0.25, 0.5, 1, 2, 10, 100, 1000)
 """The speeds that the page offers, in seconds of motion per second."""
 
-_FLIPS = 3.0  # length of the motion in the picture, in times between flips
+_FLIPS = 3.0  # length of the motion, in times between flips
 _POINTS = 601
 _COLOURS = ("#1040a0", "#b02018", "#107040")
 _STYLES = ("-", "--", "-.")
@@ -86,7 +86,7 @@ def moments_of_box(edges: list[float], mass: float) -> list[float]:
 
 
 def files() -> dict[str, bytes]:
-    """Return the picture and its numbers by file name."""
+    """Return the picture and its numbers, by file name."""
     return saved(_picture(_first()), "body.svg")
 
 

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page opened from a file. In the script, every module is a
-function that returns its exports, and follows the modules that it imports. Only the project's forms
-of import and export are supported.
+function that returns its exports, and follows its imports. Only the project's forms of import and
+export are supported.
 """
 
 import re
@@ -12,9 +12,9 @@ _IMPORT = re.compile(
     r'^import (?:\{(?P<names>[^}]*)\}|\* as (?P<all>\w+)) from "(?P<path>\.\.?/[\w./-]+)";$', re.M
 )
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
-# An unsupported form of import or export, which remains after replacing the supported ones.
+# An unsupported import or export, which remains after replacing the supported ones.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
-# A comment line. Readers find the comments in the modules.
+# Readers find the comments in the modules.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
@@ -54,7 +54,7 @@ def _add(
             if name not in exports[needed]:
                 raise _error(path, text, found.start(), f"{needed.name} exports no {name}")
             constants.append(f"{name}: {alias or name}")
-        # Replacements keep the number of lines, which error messages report.
+        # The number of lines is kept for error messages.
         lines = "\n" * found[0].count("\n")
         left = found["all"] or f"{{ {', '.join(constants)} }}"
         return f"const {left} = module{list(exports).index(needed)};{lines}"

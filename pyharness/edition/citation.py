@@ -12,7 +12,7 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import facts, shipped
 
 _NO_NUMBER = "The number of the report is unknown to us"
-# The words of CITATION.cff that an editor replaces.
+# Words of CITATION.cff for an editor to replace.
 _PLACEHOLDERS = ("SURNAME", "GIVEN NAMES", "YYYY-MM-DD", "ADDRESS OF THE REPOSITORY", "DOI OF THE")
 PUBLISH = (
     "These pages have no address of their own yet, so that a citation names the page in the "
@@ -21,7 +21,7 @@ PUBLISH = (
 )
 """The text for pages without an address."""
 
-# The properties of `codemeta.json` that schema.org defines for source code.
+# Properties that schema.org defines for source code.
 _OF_SOURCE_CODE = (
     "name", "description", "version", "license", "author", "copyrightHolder", "copyrightYear",
     "keywords", "programmingLanguage", "runtimePlatform", "codeRepository", "datePublished",
@@ -36,7 +36,7 @@ def codemeta() -> dict[str, Any]:
 
 
 def release_date() -> str:
-    """Return the date of publication or, before publication, the year of the copyright."""
+    """Return the date of publication or, before it, the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
@@ -97,7 +97,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return what the script of the citations needs; it fills in the place and the path."""
+    """Return the data of the citation script, which fills in the place and the path."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),

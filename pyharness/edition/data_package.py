@@ -1,7 +1,6 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate. Its files contain neither times nor paths of the machine, so that two
-runs write the same bytes.
+The package is an RO-Crate. Without times and paths, two runs write the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -68,18 +67,18 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
     mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
-    # The manifest has this file's checksum, so that its identifier is not known here.
+    # The manifest has this file's checksum, so its identifier is not known here.
     files = {**listed, MANIFEST: None}
     mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
-    # The form that `sha256sum -c` reads.
+    # For `sha256sum -c`.
     lines = (f"{sha256(content[path]).hexdigest()}  {path}\n" for path in sorted(content))
     content[MANIFEST] = "".join(lines).encode()
     return dict(sorted(content.items()))
 
 
 def archive(content: Mapping[str, bytes], folder: str) -> bytes:
-    """Return a ZIP file of files by path, in `folder`; it has no times, as the package."""
+    """Return a ZIP file, without times, of files by path in `folder`."""
     found = BytesIO()
     with ZipFile(found, "w") as packed:
         for path, each in content.items():
@@ -190,17 +189,16 @@ def _rows(case: int) -> Iterator[list[Any]]:
             yield [*names, step, *state]
 
 
-# The machine's arithmetics, one for each option of its compiler.
+# One for each option of the machine's compiler.
 _MACHINE = ("cdc48", "cdc48-rounded")
 _PAGES = "program case listing word steps card_steps page"
 _SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}
 
 
 def machine_parts() -> Iterator[Part]:
-    """Yield the files of the folder."""
+    """Yield the files for runs on the original machine."""
     texts: dict[str, str] = {}
     rows: list[list[Any]] = []
-    # The machine's arithmetics are the first.
     words = [*_MACHINE, *(word for word in WORD_NAMES if word not in _MACHINE)]
     for program, case in facts("cases")["published"].items():
         steps = case_scene(case).steps, card_steps(program)
@@ -209,7 +207,7 @@ def machine_parts() -> Iterator[Part]:
             text = our_page(listing, case, card_steps(program), word)
             name = _name(program, case, title, word)
             first = first_with.setdefault(text, name)
-            # Equal pages are stored once, but predictions for the machine under their own names.
+            # Equal pages are stored once, except predictions for the machine.
             if title != "original" or word not in _MACHINE:
                 name = first
             texts[name] = text

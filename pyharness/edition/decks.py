@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-The port is in modern Fortran, the twin in Python. A note is a numbered entry of the critical
-apparatus; `entry` and `switch` are identifiers of entries.
+The port is in modern Fortran. A note is a numbered entry of the critical apparatus; `entry` and
+`switch` are identifiers of entries.
 """
 
 import math
@@ -26,8 +26,7 @@ TITLES = {
 }
 """The names of the programs in headings."""
 
-# Kinds of apparatus entries by precedence, which determines the colour of a card with several
-# kinds.
+# By precedence: the first kind of a card determines its colour.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -35,9 +34,9 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """A run of characters of a card or its scanned line.
+    """Successive characters of a card or its scanned line.
 
-    `entry` explains a difference of card and scan in it; None if they agree.
+    `entry` explains their difference, if card and scan differ.
     """
 
     text: str
@@ -47,8 +46,7 @@ class Run(NamedTuple):
 class Note(NamedTuple):
     """A numbered entry of the apparatus, with the cards of one program to which it applies.
 
-    Defects have the first numbers, those first that change most. `cards` is text, as in ``860-910,
-    1040-1090``.
+    Defects come first, by what they change. `cards` is text, as in ``860-910, 1040-1090``.
     """
 
     number: int
@@ -64,8 +62,8 @@ class Note(NamedTuple):
 class Corrected(NamedTuple):
     """The corrected form of a card.
 
-    `text` is None if the correction deletes the card; `changes` is whether it deletes or replaces
-    it. `inserted` has number and text of cards inserted after it.
+    `text` is None for a deleted card; `changes` is whether the card is deleted or replaced.
+    `inserted` has number and text of cards inserted after it.
     """
 
     text: str | None
@@ -77,13 +75,12 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is in brackets if the scan lacks it; `witness` is the card with the names of the print
-    where ours are uniform, empty if the scan lacks it, or None if `card` has the same text. `after`
-    are the scan's lines after it that belong to no card, each with its entry. `scan` has the scan's
-    blanks, or is None. `port` has
-    each line of the Fortran port, with the defect or reading on which it depends, if any, and
-    whether it is executed with this switch on. `notes` begin with the most important kind; `begins`
-    has the notes whose range begins here, with this range alone.
+    `card` is in brackets if the scan lacks it. `witness` is the card with the names of the print
+    where ours are uniform, empty if the scan lacks it, or None if it equals `card`. `after` are the
+    scan's lines after it that belong to no card, each with its entry. `scan` has the scan's blanks,
+    or is None. `port` has each line of the Fortran port, with the defect or reading on which it
+    depends, if any, and whether it is executed with this switch on. `notes` begin with the most
+    important kind; `begins` has those whose range of cards begins here, with this range alone.
     """
 
     number: int
@@ -95,7 +92,7 @@ class CardView(NamedTuple):
     port: list[tuple[Place, str | None, bool]]
     notes: list[Note]
     begins: list[Note]
-    kinds: list[str]  # kinds of the notes by precedence; the first determines the colour
+    kinds: list[str]  # kinds of the notes, by precedence
 
 
 class Sheet(NamedTuple):
@@ -110,10 +107,7 @@ class Sheet(NamedTuple):
 
 
 def sheets(program: str) -> list[Sheet]:
-    """Return the pages of a program, ordered by card.
-
-    A page begins with its lowest card in the scan.
-    """
+    """Return the pages of a program, in the order of their lowest cards in the scan."""
     pages = [page for page in facts("cards/scan")["page"] if page["program"] == program]
     found = sorted((first_card(page["lines"]), page.get("moved")) for page in pages)
     ends = [*(first for first, _ in found[1:]), max(deck(program).cards) + 1]
@@ -138,7 +132,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return the largest changes in omega and velocity (errors) if an entry alone is corrected."""
+    """Return the largest changes of the errors of omega and velocity if an entry is corrected."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]
@@ -170,7 +164,6 @@ def card_views(program: str) -> list[CardView]:
         ranges = [each._replace(cards=part) for each in about for part in each.cards.split(", ")]
         inserted = [pair for pair in corrected.items() if n < pair[0] < after]
         defects = (changed.get(number, ()) for number in (n, *(number for number, _ in inserted)))
-        # Each name once, ordered by first occurrence.
         names = list(dict.fromkeys(chain.from_iterable(defects)))
         own = Corrected(text, text != card.text.rstrip(), inserted, names)
         witness = "" if card.lost else card.text_with_scanned_names
@@ -194,7 +187,7 @@ def _card(card: Card) -> list[Run]:
     """Return a card's text as runs, in brackets if the scan lacks it."""
     if card.lost:
         statement = card.text.lstrip()
-        # The bracket replaces a blank, so that the statement keeps its columns.
+        # The bracket replaces a blank; the statement keeps its columns.
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]
@@ -232,7 +225,6 @@ def _with_blanks(runs: Sequence[Run], line: str) -> list[Run]:
             missing -= not line[at].isspace()
             at += 1
         blanks = len(line[begin:at]) - len(line[begin:at].lstrip())
-        # Blanks before a marked passage are not marked.
         found += [Run(line[begin : begin + blanks])] if blanks else []
         found.append(Run(line[begin + blanks : at], run.entry))
     return found

@@ -17,21 +17,20 @@ from pyharness.model.errors import InputError
 from pyharness.model.facts import shipped
 from pyharness.views.render import json_text
 
-# Suffixes of pictures, and of all files that the site copies with the documents.
 _PICTURES = (".png", ".svg")
 _BESIDE = (*_PICTURES, ".csv", ".schema.json")
-# The folder of documents for contributors, which the site omits.
+# Folder for contributors, which the site omits.
 _OFF_SITE = "contributing/"
-# Folders of documents that also become notebooks if they have Python examples.
+# Their documents with Python examples also become notebooks.
 _NOTEBOOKS = ("gallery", "tutorials")
-# Documents that the site's other pages link.
+# The site's other pages link them.
 _LINKED = (
     "index.md",
     "article/article.md",
     "explanation/about-the-text.md",
     "explanation/methods.md",
 )
-# An example with its output, or a picture in the folder of the document.
+# An example with its output, or a picture.
 _PART = re.compile(
     r"```python\n(?P<code>.*?)```(?:\n*```output\n(?P<output>.*?)```)?"
     r"|!\[[^]]*\]\((?P<picture>[^)/]+\.(?P<form>svg|png))\)",
@@ -43,7 +42,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 def documents_folder(given: str | None = None) -> Path:
     """Return `given` or the checkout's `docs`; raise InputError if documents are missing.
 
-    An installed package does not include them.
+    An installed package lacks them.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _LINKED if not (folder / name).is_file()]
@@ -84,7 +83,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def with_notebooks(folder: Path) -> list[Path]:
-    """Return the documents with Python examples, which also become notebooks."""
+    """Return the documents that also become notebooks."""
     files = [path for name in _NOTEBOOKS for path in sorted((folder / name).glob("*.md"))]
     return [path for path in files if "```python\n" in path.read_text(encoding="utf-8")]
 

@@ -41,7 +41,7 @@ def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
     `switches` has defects, readings and conjectures by heading. `first` is the run of `DEFAULTS`.
-    `titles` are the names of the cases.
+    `titles` are the cases' names.
     """
     titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
     by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}
@@ -89,7 +89,7 @@ def _deck_data() -> dict[str, Any]:
     """Return the cards that are executed in a step, and how corrections alter them.
 
     A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
-    are joined; alterations for compilers are omitted.
+    are joined; alterations for compilers are left out.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}

@@ -1,7 +1,7 @@
 """The data of the pages on claims, thesis, figures and apparatus.
 
-A claim is a statement of the thesis that we test. A judgement has our verdicts on it, for original
-and corrected programs; `judged` has the judgements of all claims, `told` those of all sentences.
+A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
+and corrected programs. `judged` has the judgements of all claims, `told` those of all sentences.
 `figures` has Figures 6 to 12, drawn from computed curves, by file name without suffix.
 """
 
@@ -28,7 +28,7 @@ from pyharness.views.pictures import saved
 
 
 class SentenceVerdicts(NamedTuple):
-    """A sentence of the thesis, with its anchor and the judgements of its claims."""
+    """A sentence of the thesis, with the judgements of its claims."""
 
     sentence: Sentence
     judged: list[Judgement]
@@ -68,9 +68,10 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return the verdicts to show, each with its programs; a claim not on results has one alone.
+    """Return the verdicts to show, each with its programs.
 
-    Of a design it is that of the programs as printed, else that without their faults.
+    A claim about results has two. Another has one: on a design that of the programs as printed,
+    else that of the corrected ones.
     """
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
@@ -88,7 +89,7 @@ def assumption(case: int, programs: Iterable[str] = (), listing: str = "original
 
 
 def counted(judged: Sequence[Judgement]) -> str:
-    """Return the sentence that counts the verdicts."""
+    """Return a sentence with the counts of verdicts."""
     results = counts(judged)
     others = [verdicts(each)[0][1] for each in judged if each.claim["kind"] != "result"]
     number = Counter(others)
@@ -171,10 +172,9 @@ def formulas() -> dict[str, list[Formula]]:
 
 
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
-    """Return the figures, and Figure 7 with its limit, as SVG and CSV.
+    """Return the figures as SVG and CSV, and Figure 7 with both versions of its programs.
 
-    Figure 7 with its limit shows the original and the corrected programs, and the limit of omega of
-    the original one as the step size goes to 0.
+    This figure also has the limit of the original program's omega as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
@@ -188,8 +188,8 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, each with its number, caption and place.
 
-    `drawn` has our drawings. `says` has the thesis's sentences on the figure, each with its anchor,
-    which is empty for sections I to IV. `ours` is the text for a figure that is not drawn.
+    `drawn` has our drawings. `says` has the thesis's sentences on the figure, with anchors, which
+    are empty for sections I to IV. `ours` is the text for a figure that is not drawn.
     """
     found = []
     for each in facts("figures")["printed"]:

@@ -36,14 +36,13 @@ class Document(NamedTuple):
 def document(text: str, link: Callable[[str], str | None]) -> Document:
     """Return a document, whose first line is its title, as HTML.
 
-    `link` maps a target to the site's target or None. With None, a link becomes plain text, and a
+    `link` maps a target to the site's target, or to None: then a link becomes plain text, and a
     picture raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):
         if token.type == "link_open":
             target = link(str(token.attrs["href"]))
-            # Without a target, the text of the link remains.
             token.attrs = {} if target is None else {"href": target}
         elif token.type == "image":
             source = link(str(token.attrs["src"]))
@@ -53,7 +52,6 @@ def document(text: str, link: Callable[[str], str | None]) -> Document:
     _anchor(tokens)
     title = tokens[1].content
     html = _parser().renderer.render(tokens[3:], _parser().options, {})
-    # The empty cell in a table's corner is not a column head.
     html = html.replace("<th></th>", "<td></td>")
     return Document(_strip_markup(title), Markup(html), _split(tokens))
 
@@ -109,7 +107,6 @@ def _walk(tokens: Sequence[Token]) -> Iterator[Token]:
 
 
 def _anchor(tokens: Sequence[Token]) -> None:
-    """Add GitHub's anchors to the headings."""
     seen: dict[str, int] = {}
     for opening, content in pairwise(tokens):
         if opening.type == "heading_open":

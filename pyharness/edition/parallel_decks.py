@@ -1,7 +1,6 @@
 """The data of the page that compares the cards of the three decks, and explains disagreements.
 
-Within an operation of `data/cards/collation.toml`, cards are aligned by the similarity of their
-statements.
+Within an operation of `data/cards/collation.toml`, cards are aligned by similarity.
 """
 
 import difflib
@@ -16,12 +15,12 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import collation
 from pyharness.thesis.cards import Card, deck, numbers
 
-# Parts of a statement, by kind; an operator may be a relation such as .GT., or a power.
+# By kind; an operator may be a relation such as .GT., or a power.
 _PART = re.compile(
     r"(?P<operator>\.[A-Z]+\.|\*\*|[-+*/=]|\.(?!\d))|(?P<name>[A-Z][A-Z0-9]*)"
     r"|(?P<number>\d+\.?\d*|\.\d+)|(?P<punctuation>\S)"
 )
-# Cards with a smaller ratio of equal parts are not aligned.
+# Least ratio of equal parts of aligned cards.
 _ALIKE = 0.5
 _LABEL = "statement number"
 KINDS = (_LABEL, "name", "number", "operator", "punctuation")
@@ -44,10 +43,7 @@ class Cell(NamedTuple):
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards by program, None where missing, and the kinds of their differences.
-
-    The kinds are elements of `KINDS`.
-    """
+    """Corresponding cards by program, None where missing; kinds of differences, of `KINDS`."""
 
     cells: dict[str, Cell | None]
     differences: list[str]
@@ -85,7 +81,7 @@ def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict
 
     The alignment keeps the order and has the largest sum of similarities.
     """
-    # best[i][j]: the largest sum for the rows from i on and the cards from j on.
+    # largest sum for the rows from i and the cards from j on
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
     pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]
     for i in reversed(range(len(rows))):

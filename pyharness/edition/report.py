@@ -1,4 +1,4 @@
-"""The reports of `edition`, and the check of the libraries that it needs.
+"""The reports of `edition`, and the check of its libraries.
 
 `content` maps paths of written files to their content.
 """
@@ -14,18 +14,17 @@ from pyharness.model.distribution import check_package, install_command
 from pyharness.model.records import build_record
 from pyharness.model.report import Column, Line, Report, Section, Table, digits, words
 
-# The optional third-party libraries for writing the pages.
 LIBRARIES = (
     "docstring_parser", "jinja2", "latex2mathml", "markdown_it", "markupsafe", "matplotlib",
     "mdit_py_plugins",
 )  # fmt: skip
-# The file that marks a folder as written by `edition`, and lists the site's files.
+# Marks a folder as written by `edition`, and lists the site's files.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 
 
 def check_libraries() -> None:
-    """Raise InputError, with the command to install them, if a library is missing."""
+    """Raise InputError, with the command to install it, if a library is missing."""
     for name in LIBRARIES:
         check_package(name, "edition", install_command("edition"))
 

@@ -45,7 +45,7 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck, parallels
 from pyharness.views.render import json_text
 
-# The pages of each section, path by title.
+# By section, path by title.
 MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="utf-8"))
 
 
@@ -66,7 +66,7 @@ class Page(NamedTuple):
     template: str
     context: Mapping[str, Any] = {}
     found: Sequence[Found] = ()
-    menu: str = ""  # path of the menu entry to highlight; if empty, the page's own path
+    menu: str = ""  # path of the menu entry to highlight, by default the page's own
 
 
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
@@ -199,7 +199,7 @@ def _sections(path: str, html: str) -> Iterator[Found]:
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
     section = next(name for name, of in MENU.items() if here in of.values())
-    # The relative path from the page to the site's root, so that the site works under any path.
+    # Relative, so that the site works under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": here, "section": section,
@@ -231,7 +231,7 @@ def _assets(places: Sequence[Found]) -> dict[str, bytes]:
 
 
 def script(name: str, value: Any) -> bytes:
-    """Return JavaScript that assigns `value`, because pages opened from files can't load JSON."""
+    """Return JavaScript that assigns `value`; pages opened from files can't load JSON."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
     return f"window.{name}={text};\n".encode()
 

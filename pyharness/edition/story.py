@@ -1,7 +1,6 @@
 """The data of the story, the home page: charts and numbers of its seven scenes.
 
-They are from runs of the twins. In the browser, a script repeats the runs when a visitor changes a
-value.
+They are from runs of the Python ports, which a script repeats when a visitor changes a value.
 """
 
 import math
@@ -25,16 +24,16 @@ from pyharness.model.scene_file import case_scene
 from pyharness.model.trajectory import Array, Trajectory
 from pyharness.thesis.programs import run_program
 
-# The letters of the first scene, which hides the names of the programs at first.
+# The first scene hides the names of the programs.
 LETTERS = {"A": "two-term", "B": "runge-kutta", "C": "four-term"}
 BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
-# The plot area of every chart in its units: left, top, right, bottom.
+# Plot area in the chart's units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-# The step that is shown at first: the two-term program overflows in it.
+# Shown at first: the two-term program overflows in it.
 POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
-_LOG_STEP = 2  # powers of ten from one label to the next
+_LOG_STEP = 2  # powers of ten between labels
 Range = tuple[float, float]
 Names = tuple[str, ...]
 
@@ -50,8 +49,8 @@ class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
     `x` and `y` are ranges, in exponents of ten for a logarithmic `y`. Ticks are pairs of position
-    and label. If `is_marked`, points are marks without lines.
-    `marks` tell apart curves that coincide.
+    and label. If `is_marked`, points are marks without lines. `marks` tell apart curves that
+    coincide.
     """
 
     name: str
@@ -67,7 +66,7 @@ class Chart(NamedTuple):
 
 
 def data() -> dict[str, Any]:
-    """Return the values that the script needs to run the programs."""
+    """Return the values with which the script runs the programs."""
     cases = sorted({*BLIND_CASES, *RACE_CASES})
     scenes = {number: requested_scene(case_scene(number)) for number in cases}
     original = {name: list(switches(name)) for name in PROGRAMS}
@@ -138,7 +137,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return a twin's run, corrected or as printed without the defects in `without`."""
+    """Return the run of a Python port, corrected or as printed without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -158,7 +157,7 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return the errors of the corrected collocation programs over that of Runge-Kutta."""
+    """Return the corrected collocation programs' errors over the corrected Runge-Kutta error."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
@@ -208,7 +207,6 @@ def _race_chart(listing: str) -> Chart:
 
 
 def _fractions(program: str) -> list[float]:
-    """Return the places of a program's collocation points, as fractions of DT."""
     return [n / (TERMS[program] + 1) for n in range(1, TERMS[program] + 1)]
 
 
@@ -253,7 +251,7 @@ def _across(chart: Chart, x: float) -> float:
 
 
 def _up(chart: Chart, y: float) -> float:
-    """Return the height of a value in the picture, limited to near the plot area."""
+    """Return the height of a value in the picture, kept near the plot area."""
     _, top, _, bottom = BOX
     value = math.log10(y) if chart.is_logarithmic else y
     share = (value - chart.y[0]) / (chart.y[1] - chart.y[0])

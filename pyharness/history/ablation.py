@@ -39,8 +39,8 @@ for _a in "abcd":
 class Effect:
     """The outcome of one listing on one scene.
 
-    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`, and
-    `common` those over the steps that all compared listings completed; NaN if not compared.
+    `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`; `common`
+    has both over the steps that all compared listings completed, or NaN.
     """
 
     listing: Listing
@@ -56,7 +56,7 @@ class Effect:
 class CaseEffects:
     """The outcomes of four listings in one program and case, which show the effect of one entry.
 
-    In `corrected_alone` only this entry is corrected; in `kept_alone` only this one is kept.
+    `corrected_alone` corrects only this entry; `kept_alone` keeps only this one.
     """
 
     program: str
@@ -122,10 +122,10 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
 def lattice(
     scene: Scene, program: str, readings: tuple[str, ...] = (), effort: float = 1.0
 ) -> list[Effect]:
-    """Return a program's outcomes with every subset of its defects.
+    """Return a program's outcomes with every subset of its defects, the largest error first.
 
-    The largest error over the steps that all runs completed comes first. The `readings` and, under
-    a varying torque, the conjectures vary too. A reading has no effect if a defect in the same
+    The order is by the error over the steps that all runs completed. The `readings` and, under a
+    varying torque, the conjectures vary too. A reading has no effect if a defect in the same
     statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
@@ -148,14 +148,14 @@ def switched(scene: Scene, program: str) -> tuple[str, ...]:
 
 
 def _size(found: Effect) -> list[float]:
-    # Rounded to three digits, so that rounding errors do not affect the order.
+    # To three digits, so that rounding errors do not affect the order.
     return [float(f"{each:.2e}") for each in (*found.common, found.omega, found.velocity)]
 
 
 def apparatus_report(entries: Sequence[dict[str, Any]], are_all_shown: bool = True) -> Report:
     """Return the report of the critical apparatus, with a line for each entry.
 
-    The text has the defects that change numbers alone, unless `are_all_shown`.
+    Unless `are_all_shown`, the text has only the defects that change numbers.
     """
     shown = entries
     head = (
@@ -233,7 +233,7 @@ def _effects(effects: Sequence[CaseEffects], is_reading: bool) -> list[Section]:
 
 
 def lattice_report(scene: Scene, found: Mapping[str, Sequence[Effect]]) -> Report:
-    """Return the report of the outcomes with every subset of defects, which letters stand for."""
+    """Return the report on every subset of defects, named by letters."""
     text: list[Section] = []
     rows = []
     for program, effects in found.items():

@@ -1,4 +1,4 @@
-"""The reports of `cards`: cards with their lines in scan, port and twin, and comparisons."""
+"""The reports of `cards`: cards with their lines in scan, Fortran and Python, and comparisons."""
 
 import textwrap
 from collections import Counter
@@ -27,13 +27,13 @@ _DISAGREEMENTS = (
     *words("disagreement in equation origin certainty"), Column("entries", left=True, fit="wrap"),
 )  # fmt: skip
 _SHORT = dict(zip(PROGRAMS, ("2", "4", "R"), strict=True))
-HALF = 48  # width, in characters, of each of two texts printed side by side
+HALF = 48  # width, in characters, of each of two texts side by side
 
 
 def cards_report(
     cards: Sequence[Card], title: str = "cards", only_contents: bool = False
 ) -> Report:
-    """Return the report of `cards`, each with its lines in scan, port and twin, and its entries.
+    """Return the report of `cards`, each with its lines and apparatus entries.
 
     With `only_contents` the text has a table of contents instead.
     """
@@ -44,7 +44,7 @@ def cards_report(
 
 
 def _contents(cards: Sequence[Card]) -> list[Section]:
-    """Return a table of the parts of each program, as its comment cards name them."""
+    """Return a table of contents by the programs' comment cards."""
     parts: list[str] = []
     ranges: dict[tuple[str, str], list[int]] = {}
     for program in PROGRAMS:
@@ -87,7 +87,7 @@ def card_record(card: Card) -> dict[str, Any]:
 def scan_report(
     faults: Sequence[str], undeclared: Sequence[str], lines: int, digest: str
 ) -> Report:
-    """Return the report on whether our text of the programs explains every line of a scan.
+    """Return the report on whether our text explains every line of a scan.
 
     `faults` are unexplained lines, `undeclared` disagreements of cards and apparatus.
     """
@@ -159,7 +159,7 @@ def _block(card: Card) -> Section:
 
 
 def beside(left: Iterable[str], right: Iterable[str]) -> list[Line]:
-    """Return the lines of two texts side by side; those of the left one have at most `HALF`."""
+    """Return the lines of two texts side by side; the left ones have at most `HALF` characters."""
     pairs = zip_longest(left, right, fillvalue="")
     return [Line(f"{a.ljust(HALF)}   {b}".rstrip()) for a, b in pairs]
 

@@ -31,21 +31,20 @@ WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")
 MOST_TERMS = 12
 MOST_CORRECTIONS = 100
-# Above this condition number the points are so close that half the digits are lost.
+# With a larger one the points are so close that half the digits are lost.
 _WORST_CONDITION = 1e8
 SCHEMES: tuple[tuple[str, str | None], ...] = (
     *(("collocation", points) for points in POINTS),
     *((other, None) for other in WEIGHTINGS[1:]),
 )
-# `_LADDER` has the numbers of steps from 0 to the horizon; each is twice the number two places
-# before. A horizon is a fraction of the scene's end time. The first is so short that the leading
-# term of the error dominates even at large steps. Longer horizons follow for members whose error
-# over the first is mostly rounding. The last three, for long scenes, are shorter than the first.
+# Numbers of steps to the horizon, each twice the number two places before, and horizons as
+# fractions of the end time. Over the first, the leading term of the error dominates even at large
+# steps. Longer ones serve members whose error is then mostly rounding; the last three serve long
+# scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
-# Range of the errors, relative to the largest omega at the horizon, from which an order is
-# computed. Above it, higher terms of the error matter; below it, rounding error (at most 1e-15
-# here).
+# Orders are from errors in this range, relative to the largest omega at the horizon: above it,
+# higher terms matter; below it, rounding error (at most 1e-15).
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -55,7 +54,7 @@ MOST_STEPS = 2_000
 
 @dataclass(frozen=True)
 class Member:
-    """A weighted residual method of the thesis; the constructor raises InputError for wrong fields.
+    """A weighted residual method of the thesis.
 
     The weights of least squares are i t**(i-1), the derivatives of the residual with f held
     constant (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1)
@@ -104,7 +103,7 @@ class Member:
 
     @property
     def points_label(self) -> str:
-        """Return the collocation points as text for a table; a dash for other weightings."""
+        """Return the collocation points as text; a dash for other weightings."""
         if self.points is None:
             return "-"
         if isinstance(self.points, str):
@@ -160,7 +159,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
     width = max(len(scheme.nodes) for scheme in schemes)
-    # Padding nodes are at the beginning of the step, with weight 0.
+    # Padding nodes have weight 0.
     nodes = np.zeros((len(members), width))
     matrix = np.zeros((len(members), width, width))
     weights = np.zeros((len(members), 1, width))
@@ -235,7 +234,7 @@ def _torque(scene: Scene, times: Array) -> Array:
 class OrderFinding:
     """The derived and measured order of convergence of a method in a scene, and its error.
 
-    `measured` is None if all errors are too large or only rounding. It is `settled` if its last two
+    `measured` is None if all errors are too large or only rounding, and `settled` if its last two
     values differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
     """
 

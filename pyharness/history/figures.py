@@ -1,6 +1,6 @@
 """Figures 6 to 12 of the thesis, redrawn: omega of the programs against the reference.
 
-One set has the curves of the original programs, another those of the corrected programs.
+One set shows the original programs, another the corrected ones.
 """
 
 import textwrap
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 SETS = {"original": Listing.original, "corrected": Listing.corrected}
 ENDINGS = ("svg", "png", "csv")
-# The collocation programs, with the terms after x(0) of their trial functions.
+# Terms after x(0) in the trial functions.
 TERMS = {"two-term": 2, "four-term": 4}
 _POINTS_STEPS = 10
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# Dash, width, marker and marker position distinguish the curves without colour.
+# Distinct without colour.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -52,7 +52,7 @@ _END: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class FigurePlan:
-    """The plan of a redrawn figure of the thesis: its case and programs.
+    """The plan of a redrawn figure of the thesis.
 
     `source` supports the choice of programs; `caption` is ours.
     """
@@ -64,7 +64,7 @@ class FigurePlan:
     programs: tuple[str, ...]
     caption: str
     source: str
-    limit_of: str  # the program whose limit is drawn, or ""
+    limit_of: str  # program whose limit is drawn, or ""
 
     @property
     def stem(self) -> str:
@@ -85,7 +85,7 @@ class FigurePlan:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The run of one listing, drawn as a curve of omega over time."""
+    """The run of one listing, drawn as a curve."""
 
     listing: Listing
     trajectory: Trajectory
@@ -100,13 +100,13 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the curve's label in a legend: the program, and any early end."""
+        """Return the program and any early end, for a legend."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
 @dataclass(frozen=True, eq=False)
 class FigureFinding:
-    """A figure's data: the scene, the reference solution and the curves."""
+    """A figure's plan, scene, reference solution and curves."""
 
     plan: FigurePlan
     scene: Scene
@@ -146,7 +146,7 @@ def findings() -> Iterator[FigureFinding]:
 
 
 def figures_report(findings: Sequence[FigureFinding]) -> Report:
-    """Return the report on the drawn files, with a line for each figure."""
+    """Return the report on the drawn files."""
     rows = []
     for each in findings:
         curves = ", ".join(curve.label for curve in each.curves)
@@ -221,8 +221,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Return omega1 of an original and of a corrected figure in one picture.
 
-    The limit in `first` shows how a run that ended early would have continued. The curves of
-    `second` coincide, so that only the last is drawn.
+    The limit in `first` continues a run that ended early. The curves of `second` coincide, so only
+    the last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -248,13 +248,13 @@ def points_picture() -> Picture:
     """
     from matplotlib.figure import Figure
 
-    scene = case_scene(2)  # the points are the same in every case
+    scene = case_scene(2)  # any case: the points are the same
     figure = Figure(figsize=(7.2, 3.2), dpi=110, layout="constrained")
     both = figure.subplots(1, len(TERMS), sharex=True, sharey=True)
     rows: list[list[Any]] = []
     for axes, (program, terms) in zip(both, TERMS.items(), strict=True):
         run = run_program(scene, Listing.original(program))
-        # What DT is in each step, because TIME=TIME+DT.
+        # DT of each step, because TIME=TIME+DT.
         dt = np.diff(_from_zero(run.recorded_time[:_POINTS_STEPS]))
         color, _, _, marker, _ = _STYLES[program]
         axes.axvspan(0.0, scene.step_size, color="#d8d8d8", linewidth=0.0)
@@ -274,7 +274,7 @@ def points_picture() -> Picture:
 def _draw_panel(
     axes: "Axes", finding: FigureFinding, row: int, curves: Iterable[tuple[Curve, dict[str, Any]]]
 ) -> None:
-    """Draw one omega component of the known solutions and of curves, each with its own style."""
+    """Draw one omega component of the known solutions and of curves with their styles."""
     time, start = _from_zero(finding.reference.time), np.array(finding.scene.omega)
     for (label, omega), style in zip(finding.known, (_REFERENCE, _LIMIT), strict=False):
         axes.plot(time, _from_zero(omega, start)[:, row], label=label, **style)
@@ -302,7 +302,6 @@ def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())
-    # Such a curve counts as diverging.
     far = float(np.abs(truth).max())
     near = max(0.6 * (largest - least), 0.01 * far)
     low, high = least, largest

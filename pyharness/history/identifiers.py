@@ -1,7 +1,7 @@
 """Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
 
-A SWHID (ISO/IEC 18670) of a file, a folder or a card is git's SHA-1 hash of the content, as a blob
-or tree. Anyone can recompute it from the content, and the archive finds a copy by it.
+A SWHID (ISO/IEC 18670) is git's SHA-1 hash of a file or folder. Anyone can recompute it from the
+content, and the archive finds a copy by it.
 """
 
 import json
@@ -72,7 +72,7 @@ def card_lines(content: bytes) -> dict[int, int]:
 
 
 def _hash(kind: str, content: bytes) -> bytes:
-    # The standard prescribes SHA-1; its resistance to attacks does not matter here.
+    # SHA-1 by the standard; its resistance to attacks does not matter here.
     return sha1(f"{kind} {len(content)}\0".encode() + content, usedforsecurity=False).digest()
 
 
@@ -94,7 +94,7 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return a digest of the cards and the apparatus, which identifies their text in citations.
+    """Return a digest of cards and apparatus, which identifies their text in citations.
 
     It is 12 hexadecimal digits of the SHA-256 of `TABLES`, without comments.
     """

@@ -2,8 +2,7 @@
 
 An original program may converge to the solution of Euler's equations, to another function of time,
 or to no function (docs/article/article.md). Each limit is computed independently of the programs,
-and compared with their runs as the step is halved. `effort` multiplies the work limit of some ten
-seconds.
+and compared with their runs as the step is halved. `effort` multiplies the work limit.
 """
 
 import math
@@ -26,7 +25,7 @@ from pyharness.thesis.programs import run_program
 from pyharness.truth.reference import Reference, reference
 
 _TOLERANCE = 1e-11
-_MOST_EVALUATIONS = 1_000_000  # right-hand sides; they take about ten seconds
+_MOST_EVALUATIONS = 1_000_000  # right-hand sides, some ten seconds
 
 TENDS_TO = {
     "two-term": "the solution of w' = F(w) - (2/9) t^2 Q(F(w)), Q the quadratic part of F",
@@ -64,8 +63,8 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the convergence.
 
-    `order` is from the last two halvings. It is None if one of them overflows or has only rounding
-    errors, and if there is no limit or the limit is unbounded at `blow_up` (s).
+    `order`, from the last two halvings, is None if one of them overflows or has only rounding
+    errors, if there is no limit, or if the limit is unbounded at `blow_up` (s).
     """
 
     program: str
@@ -86,7 +85,7 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Return the convergence of an original program, without stop test, to its limit.
+    """Return the convergence of an original program to its limit, without stop test.
 
     Under a varying torque only the Runge-Kutta program has a limit, which is integrated. Raise
     InputError above the work limit.
@@ -109,7 +108,7 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
         found.append(Halving(finer.step_size, *distances))
     last, before = found[-1].from_limit, found[-2].from_limit
     scale = float(np.abs(truth.omega).max(initial=0.0))
-    # Bound on the rounding errors of all steps, for numbers of the size of omega.
+    # Bound on the rounding errors of all steps.
     noise = 2.0**-50 * scale * scene.steps * 2**halvings
     finite = math.isfinite(before) and math.isfinite(last) and last > noise
     order = math.log2(before / last) if finite else None
@@ -121,7 +120,8 @@ def limit_solution(
 ) -> tuple[Array, str, float | None]:
     """Return the limit of an original program's omega (rad/s), shape (times, 3), or NaN.
 
-    Also return what the program tends to, and the time (s) at which the limit is unbounded or None.
+    Also return what the program tends to, and the time (s) at which the limit is unbounded, or
+    None.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -211,7 +211,7 @@ def _solved(
     rows = np.full((len(times), len(start)), math.nan)
     if len(result.t):  # without any time, y is an empty list
         rows[: len(result.t)] = result.y.T
-    # The solver ends at the bound, or just before it if its step becomes too small.
+    # The solver may end just before the bound, if its step becomes too small.
     return rows, latest if result.status else None
 
 

@@ -1,7 +1,4 @@
-"""Comparison of a page from any machine with our programs' pages.
-
-The digits show the arithmetic in which a program ran.
-"""
+"""Comparison of a page from any machine with our pages, to find its arithmetic from the digits."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -19,7 +16,7 @@ from pyharness.thesis.decks import card_steps
 from pyharness.thesis.printer import page
 from pyharness.thesis.programs import BINARY64, WORD_NAMES, run_program
 
-_LARGEST = 1 << 24  # largest size of a page's file, in bytes
+_LARGEST = 1 << 24  # bytes of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:

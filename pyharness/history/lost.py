@@ -30,7 +30,6 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.reference import reference
 
 WEIGHTINGS = ("subdomain", "galerkin", "least-squares")
-# The cases with a known solution.
 CASES = (1, 2)
 TERMS = 2
 
@@ -50,7 +49,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A mistake, with its description and the attempts of all methods."""
+    """A mistake, with the attempts of all methods."""
 
     mistake: str
     summary: str
@@ -58,12 +57,12 @@ class Ranked:
 
     @property
     def in_both(self) -> int:
-        """Return the number of methods that fail with this mistake in both cases."""
+        """Return the number of methods that fail in both cases."""
         return sum(len(each.failed) == len(CASES) for each in self.attempts)
 
     @property
     def in_either(self) -> int:
-        """Return the number of methods that fail with this mistake in at least one case."""
+        """Return the number of methods that fail in at least one case."""
         return sum(bool(each.failed) for each in self.attempts)
 
 
@@ -100,10 +99,10 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     torque = np.array(scene.normalized_torque(0.0))
     state = np.array(scene.omega)
     rows = np.full((scene.steps, 3), np.nan)
-    weighted_over: float | None = None  # interval length (s) for which the matrix was computed
+    weighted_over: float | None = None  # length (s) for which the matrix was computed
     with np.errstate(all="ignore"):
         for step in range(scene.steps):
-            # The residual is weighted over (0, length); omega is always evaluated at h.
+            # omega is evaluated at h whatever the length.
             length = {"dt-accumulates": h * (step + 1), "unit-interval": 1.0}.get(mistake, h)
             if weighted_over is None or length != weighted_over:
                 matrix = _matrix(weighting, length)
@@ -149,12 +148,12 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
         matrix = matrix.T
     (a, b), (c, d) = matrix.tolist()
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites its matrix with the L and U factors of Crout's method, which the second
-        # call uses as the matrix.
+        # LEQT1F overwrites its matrix with Crout's L and U factors, which the second call takes for
+        # the matrix.
         matrix = np.array([[a, b], [c / a, d - c / a * b]])
     if mistake == "unscaled-solver":
         x, y = right.T
-        # With the array as left operand, NumPy applies the number's arithmetic to each element.
+        # With the array on the left, NumPy applies the number's arithmetic to each element.
         second = (y - x * (c / a)) / (d - c / a * b)
         return np.array([(x - second * b) / a, second])
     solutions, _ = leqt1f(matrix.tolist(), right.tolist())
@@ -163,7 +162,7 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
 
 def _weighted(weighting: str, length: float, residual: Array) -> list[Any]:
     """Return the integrals over (0, length) of a polynomial times each of the two weights."""
-    # NumPy's polynomials of machine words take several times as long.
+    # NumPy's polynomials of machine words are several times slower.
     coefficients = residual.tolist()
     found = []
     for k in range(TERMS):

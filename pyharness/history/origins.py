@@ -18,8 +18,8 @@ class Disagreement(NamedTuple):
 
     `steps` are from `data/cards/collation.toml`, `equations` are formulas of the thesis. `where` is
     a place in the thesis, and `says` its words. `cards` are texts by program and number. `known` is
-    from the sources; `suggests` and `origin` are our inferences. `unnoticed` is the reason why the
-    test cases do not show the fault.
+    from the sources; `suggests` and `origin` are our inferences. `unnoticed` tells why the test
+    cases do not show the fault.
     """
 
     id: str
@@ -57,7 +57,7 @@ def origins() -> dict[str, str]:
 
 
 def unexplained_defects() -> dict[str, str]:
-    """Return the reasons why no disagreement explains some defects, by identifier."""
+    """Return, by identifier, the reasons why no disagreement explains some defects."""
     return dict(facts("disagreements")["unexplained"])
 
 

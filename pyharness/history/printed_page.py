@@ -1,8 +1,8 @@
 """Compare a page that a machine printed with the pages that our programs print.
 
-The module needs only Python's standard library. It is also the script `machine/judge.py` beside the
-pages in the data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0
-if a page is equal, 1 if all differ, and 2 if FILE has no page of this form.
+The module, which needs only Python's standard library, is also the script `machine/judge.py` in the
+data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0 if a page is
+equal, 1 if all differ, and 2 if FILE has no page of this form.
 """
 
 import csv
@@ -18,14 +18,14 @@ PAGES = "pages.csv"
 
 # A number as FORMAT writes it: asterisks if too long, R or I (CDC) if not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
-_LEAST = 6  # every row of results has at least six numbers, and no line of the heading has
+_LEAST = 6  # least count of numbers in a row of results; no line of the heading has so many
 SHOWN = 5
 """The number of differences shown if no page is equal."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A printed number that differs between two pages; row and place are from 1."""
+    """A number that differs between two pages; row and place are from 1."""
 
     row: int
     place: int
@@ -121,7 +121,7 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to the page in file `path`, else the nearest."""
+    """Return lines that name our pages equal to the page in file `path`, or the nearest."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]

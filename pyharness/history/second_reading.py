@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards. The second is a random sample that was read
-again (`data/cards/second-reading.toml`). The numbers of misreadings that one or both readings
-correct give an estimate of the uncorrected ones.
+again (`data/cards/second-reading.toml`). The numbers of misreadings that one reading or both
+correct give an estimate of the others.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from pyharness.model.report import Column, Report, Table, counted, digits, words
 from pyharness.thesis.cards import Card, deck, tight
 from pyharness.thesis.collation import witness_lines
 
-_TAIL = 0.025  # probability beyond each end of a 95 % interval
+_TAIL = 0.025  # beyond each end of a 95 % interval
 _COLUMNS = (
     *words("unit"), Column("first"), Column("second"), Column("both"),
     Column("estimate", digits(".1f")), Column("lower"), Column("upper"), Column("uncorrected"),
@@ -24,7 +24,7 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample, with texts without blanks; `first` has the scan's names."""
+    """A card of the sample, with texts without blanks; `first` is ours, with the scan's names."""
 
     card: Card
     scan: str
@@ -38,10 +38,10 @@ def chapman(first: int, second: int, both: int) -> float:
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
-    """Return the limits of the 95 % confidence interval of the size of a population.
+    """Return the limits of the 95 % confidence interval of a population's size.
 
     For independent samples, the number in both is hypergeometric. At a size in the interval,
-    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, when there is no
+    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, which gives no
     upper limit.
     """
     if both < 1:
@@ -87,7 +87,6 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
         if what == "insert":
             found[begin - 1] = reading[first:last]
         elif what != "equal":
-            # The last place has any additional characters.
             for place in range(begin, end):
                 at = first + place - begin
                 found[place] = reading[at : last if place == end - 1 else min(at + 1, last)]
@@ -95,9 +94,9 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 
 
 def recaptures() -> Table:
-    """Return the estimates with places (characters) and with whole cards as units.
+    """Return the estimates with characters and with whole cards as units.
 
-    A machine repeats its misreading of a letter, which makes places dependent, but not cards.
+    A machine repeats its misreading of a letter, so characters are dependent, but not cards.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

@@ -33,7 +33,7 @@ _HEAD = (
     f'<?xml-model href="{SCHEMA}" type="application/xml" '
     'schematypens="http://relaxng.org/ns/structure/1.0"?>\n'
 )
-# The fields of an apparatus entry in the document.
+# Fields of an apparatus entry in the document.
 _TOLD = ("summary", "scan", "adopted", "original", "corrected", "evidence", "why")
 
 KINDS = {
@@ -66,7 +66,7 @@ def tei_document() -> bytes:
     _write_apparatus(_add(back, "div", type="apparatus"))
     _write_places(_add(back, "div", type="places"))
     _write_bibliography(_add(back, "div", type="bibliography"))
-    # Indentation adds blanks, which are significant in cards; these are therefore filled in later.
+    # Indentation adds blanks, which are significant in cards; their texts therefore follow later.
     xml.indent(root)
     for block, card in blocks:
         _fill(block, card)
@@ -76,14 +76,13 @@ def tei_document() -> bytes:
 def _add(
     parent: xml.Element, tag: str, text: str | None = None, id: str | None = None, **more: str
 ) -> xml.Element:
-    """Return an element appended to a parent, with a text, an identifier and attributes."""
     element = xml.SubElement(parent, tag, {} if id is None else {_XML + "id": id}, **more)
     element.text = text
     return element
 
 
 def _header() -> xml.Element:
-    """Return the header: a template, with the values and lists that the data have."""
+    """Return the header: a template filled with values and lists from the data."""
     edition, scan, version = facts("edition"), facts("cards/scan"), pyharness.__version__
     released = edition["released"].get(version, "") or "no date"
     values = {
@@ -121,7 +120,6 @@ def _header() -> xml.Element:
 
 
 def _class_of(taxonomy: str, name: str) -> str:
-    """Return the XML identifier of a category in a taxonomy, as in ``kind.missing-text``."""
     return f"{taxonomy}.{name.replace(' ', '-')}"
 
 
@@ -213,7 +211,7 @@ def _write_apparatus(div: xml.Element) -> None:
         classes += [_class_of("ground", siglum) for siglum in entry["grounds"]]
         ana = " ".join(f"#{each}" for each in classes)
         note = _add(div, "note", id=entry["id"], type="entry", ana=ana, resp=_RESPONSIBLE)
-        # The text is a source of an entry based on it or on results, or that names no card.
+        # The appendix is a source unless the entry names no card.
         parts = ["appendix"] if entry["cards"] else []
         if not parts or {"T", "R"} & set(entry["grounds"]):
             parts.append("text")

@@ -16,10 +16,9 @@ CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "rem
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, or empty without a date; `why` explains an
-    uncertain one. The date is ``certain`` if the source names it, ``probable`` if the source
-    reports the event and the date follows from another entry, and ``unknown`` if no source dates
-    the event.
+    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
+    The date is ``certain`` if the source names it, ``probable`` if it follows from another entry,
+    and ``unknown`` if no source dates the event.
     """
 
     id: str
@@ -61,7 +60,7 @@ def _in_words(month: str) -> str:
 class Revision(NamedTuple):
     """A change of the edition's text: the cards and the apparatus.
 
-    `digest` identifies the text after the change, and is empty if the cards were not yet data.
+    `digest` identifies the text after the change; it is empty for cards that were not yet data.
     `cards` has numbers by program, as in ``750-770, 800``.
     """
 

@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
-# With 113 bits, rounding is negligible, so that the error is the method's truncation error.
+# With 113 bits rounding is negligible, and the error is the method's truncation error.
 DOUBLE, WIDEST = Word(53), Word(113)
-# Multiple of the error with 113 bits above which an error counts as rounding.
+# Above this multiple of the error with 113 bits, an error counts as rounding.
 ROUNDS = 2.0
-_VISIBLE = 1e-9  # least error (rad/s) that is compared between arithmetics
-_SMALL = 0.01  # largest change of an error, relative, that leaves a result as it is
+_VISIBLE = 1e-9  # least error (rad/s) compared between arithmetics
+_SMALL = 0.01  # largest relative change of an error that leaves a result as it is
 _MACHINE = (("cdc48", 48, "FX"), ("rounded", 48, "RX"))
 _SHORT = {"nearest-even": "ne", "chop": "chop", "FX": "FX", "RX": "RX"}
 _STYLES: dict[str, dict[str, Any]] = {
@@ -57,7 +57,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 
 
 class WordRun(NamedTuple):
-    """A run of a program in one arithmetic, compared with binary64.
+    """A run in one arithmetic, compared with binary64.
 
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
     rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
@@ -79,10 +79,10 @@ class WordRun(NamedTuple):
 
 @dataclass(frozen=True)
 class WordCell:
-    """The runs of one listing on one case: in binary64, with 113 bits, and in other arithmetics."""
+    """The runs of one listing on one case, in several arithmetics."""
 
     double: WordRun
-    widest: WordRun | None  # not computed for a verdict
+    widest: WordRun | None  # 113 bits; not computed for a verdict
     runs: tuple[WordRun, ...]
 
     def find_run(self, p: int, rule: str) -> WordRun | None:
@@ -112,7 +112,7 @@ def cells(
 def machine_cells(
     cases: Sequence[int], programs: Sequence[str] = PROGRAMS, progress: Progress = no_progress
 ) -> list[WordCell]:
-    """Return the runs of each original program on each case in the CDC's arithmetic alone."""
+    """Return the runs of each original program on each case in the CDC's arithmetic."""
     words = [Word(p, rule) for _, p, rule in _MACHINE]
     found = _runs(cases, list(map(Listing.original, programs)), words, progress)
     return [WordCell(double, None, tuple(runs)) for double, *runs in found]
@@ -129,7 +129,7 @@ def _runs(
         pages: list[list[str]] = []
         found: list[WordRun] = []
         for word in (DOUBLE, *words):
-            # The compiled program has the bits of the twin in 53 bits.
+            # The compiled program has the bits of its Python version in 53 bits.
             run = in_word.run(scene, listing, word) if found else run_program(scene, listing)
             lines = page(scene, listing.program, run).splitlines()
             pages.append(" ".join(lines[len(lines) - run.steps :]).split())
@@ -211,7 +211,7 @@ def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
 
 
 def _head(cell: WordCell) -> list[Any]:
-    """Return case, program and listing, with marks on what is assumed."""
+    """Return case, program and listing, with marks of assumptions."""
     case, program, listing, *_ = cell.double
     on_cards = mark(case_scene(case), subset(program, listing))
     return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]

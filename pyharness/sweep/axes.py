@@ -1,4 +1,4 @@
-"""Axes of a sweep's grid: each varies one field, a number or a name, of the scene or the solver."""
+"""Axes of a sweep's grid: each varies one field of the scene or the solver."""
 
 import math
 import zlib
@@ -17,7 +17,7 @@ from pyharness.model.values import finite, integer
 
 Floats = NDArray[np.float64]
 
-# Fields whose values are names, with the allowed values.
+# Fields whose values are names.
 CHOICES = {
     "program": "a program of the appendix",
     "method": "a method",
@@ -30,9 +30,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `takes` returns whether a value is allowed; `allowed` describes the allowed values. If `looped`,
-    all scenes of a batch share the value; step size and Lipschitz constant are exceptions for the
-    thesis's programs. If `whole`, values are rounded to integers.
+    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch share
+    the value, except step size and Lipschitz constant for the thesis's programs. If `whole`, values
+    are rounded to integers.
     """
 
     units: str
@@ -43,11 +43,10 @@ class Field:
     whole: bool = False
 
 
-# Prefix of fields that are constants of a torque's expressions, as in `torque.constants.k`. Their
-# units depend on the expressions.
+# Prefix of the constants of a torque's expressions, as in `torque.constants.k`, whose units depend
+# on the expressions.
 CONSTANTS = "torque.constants."
 INERTIA = "body.inertia."
-# The elements of an inertia matrix by row and column; those below the diagonal follow.
 ELEMENTS = {f"{i + 1}{j + 1}": (i, j) for i, j in INERTIA_ELEMENTS}
 ATTITUDE = tuple(f"attitude.{number}" for number in range(4))
 
@@ -94,8 +93,8 @@ NUMBERS = {
     "lipschitz": Field("1/s", "constant of the stop test", *_FROM_ZERO, looped=True),
 }
 _POLAR = ("omega.magnitude", "tilt", "azimuth", "height", "longitude")
-# Pairs of groups of fields, by the beginnings of their names, that exclude each other, mostly
-# because they describe the same quantity.
+# Groups of fields, by the beginnings of their names, that exclude each other, mostly because they
+# describe the same quantity.
 RIVALS = (
     (("omega.1", "omega.2", "omega.3"), _POLAR),
     (("tilt", "azimuth"), ("height", "longitude")),
@@ -127,7 +126,7 @@ def units_of(field: str) -> str:
 # Most values on one axis: all are in memory at once, and in one file.
 MOST_VALUES = 30_000_000
 SPACINGS = ("linear", "log")
-# Random distributions, each with the keys of its parameters in a sweep file.
+# Random distributions, with the keys of their parameters in a sweep file.
 DRAWS = {
     "uniform": ("from", "to"),
     "log-uniform": ("from", "to"),
@@ -209,14 +208,14 @@ def _between(first: float, last: float, made: Callable[[float, float], Floats]) 
     """Return ``made(first, last)`` without an overflow of `last - first`."""
     if math.isfinite(last - first):
         return made(first, last)
-    # Numbers of that size are far from underflow; halving and doubling are therefore exact.
+    # So far from underflow, halving and doubling are exact.
     with np.errstate(over="ignore"):
         doubled = 2.0 * made(0.5 * first, 0.5 * last)
     return np.clip(doubled, min(first, last), max(first, last))
 
 
 def check_name(what: str, name: object, allowed: Iterable[str], where: str = "") -> str:
-    """Return a name that a sweep file gives; raise InputError if it is not `allowed`."""
+    """Return a name from a sweep file; raise InputError if it is not `allowed`."""
     if not isinstance(name, str) or name not in allowed:
         raise unknown(what, name, allowed, where)
     return name
@@ -304,7 +303,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError, with `where`, if its extremes are not allowed."""
+    """Return `axis`; raise InputError if its extremes are not allowed."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

@@ -1,6 +1,6 @@
-"""Batches: scenes of a sweep that are solved in one call with the same settings; chunks of them.
+"""Batches: scenes of a sweep that are solved in one call with the same settings.
 
-`scene` has the values that all share; `own` maps each field that varies in the batch to n values.
+The scenes share the values in `scene`; `own` maps each field that varies to n values.
 """
 
 import tomllib
@@ -30,7 +30,7 @@ Columns = dict[str, Array]
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """Solve chunk number `chunk`, from 0, in any executor.
 
-    Arrays have the shape of the chunk, and another dimension for several components.
+    Arrays have the shape of the chunk, and one more dimension for several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -39,7 +39,7 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Solve the scenes that `where` selects, an index array per dimension.
+    """Solve the scenes that `where` selects by an index array per dimension.
 
     The first dimension of the results runs over the scenes.
     """
@@ -76,10 +76,7 @@ def looped_fields(sweep: Sweep) -> list[str]:
 
 
 def batches(sweep: Sweep, where: list[Indices]) -> Iterator[tuple[Indices, Batch]]:
-    """Yield the batches of selected scenes, each with its positions in `where`.
-
-    `where` has the indices of the scenes, an array for each dimension of the grid.
-    """
+    """Yield the batches of the scenes that `where` selects, each with its positions in `where`."""
     columns = value_columns(sweep, where)
     looped = looped_fields(sweep)
     for members, values in groups([columns[name] for name in looped], len(where[0])):
@@ -149,8 +146,8 @@ def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
     if "body.square.1" in own or "body.square.2" in own:
         middle = own.get("body.square.1", np.ones(n))
         least = own.get("body.square.2", np.ones(n))
-        # The integrals of x^2, y^2 and z^2 over the mass, here in units of the largest, determine
-        # the moments of a real body.
+        # The integrals of x^2, y^2 and z^2 over the mass determine the moments of a real body; here
+        # in units of the largest.
         x2, y2, z2 = np.ones(n), middle, middle * least
         size = max(scene.moments) / (x2 + y2)
         return "moments", np.stack([(y2 + z2) * size, (x2 + z2) * size, (x2 + y2) * size], axis=1)

@@ -29,10 +29,10 @@ from pyharness.sweep.sweep import Arrays, Sweep
 EXECUTORS = ("here", "processes", "dask")
 Results = Generator[tuple[int, Arrays], None, None]
 
-# Deaths of processes, without a completed chunk in between, at which the sweep ends.
+# Successive deaths of processes, without a completed chunk, at which the sweep ends.
 _ATTEMPTS = 3
 _AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
-_ANSWER = 4.0  # s, in which a scheduler must answer and have a worker
+_ANSWER = 4.0  # time (s) in which a scheduler must answer and have a worker
 _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(?P<port>\d{1,5})")
 
 
@@ -52,7 +52,7 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start an executor, and yield it as an `Engine`.
+    """Start an executor, and yield it.
 
     `executor` is ``here``, ``processes`` or ``dask``; `workers` is by default the number of
     processors. Without the `address` of a scheduler, ``dask`` starts a cluster here. Raise
@@ -68,7 +68,7 @@ def engine(
         yield Engine(count, partial(_by_processes, count))
         return
     dask: Any = import_module("distributed")
-    # Dask's log of workers is meant for the administrators of a cluster.
+    # The log is meant for the administrators of a cluster.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with _local_cluster(dask, count) if address is None else _connected(dask, address) as client:
         yield Engine(max(1, sum(client.nthreads().values())), partial(_by_client, client))
@@ -88,7 +88,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
                 left.remove(chunk)
                 yield chunk, found
         except BrokenProcessPool:
-            # A killed process breaks the pool; chunks that are not completed are lost.
+            # A killed process breaks the pool; uncompleted chunks are lost.
             deaths = 1 if len(left) < before else deaths + 1
             if deaths == _ATTEMPTS:
                 raise InputError(
@@ -98,8 +98,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 
 
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
-    # Processes are spawned and not forked, because a fork of a process with threads may hang, and
-    # NumPy and Zarr start threads.
+    # A fork of a process with threads, as of NumPy and Zarr, may hang.
     context = multiprocessing.get_context("spawn")
     # The pool creates semaphores, with which Python would otherwise start its own tracker.
     with deaf_children():
@@ -117,7 +116,7 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 yield waiting.pop(future), future.result()
     finally:
-        # Waiting for the chunks that are being computed might never end.
+        # Waiting for unfinished chunks might never end.
         processes = list((pool._processes or {}).values())
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
@@ -194,8 +193,8 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
         except Exception as error:
             errors.append(error)
 
-    # The start takes seconds. In another thread, it leaves this one free to receive Ctrl-C, which
-    # is blocked in the threads and processes of the cluster.
+    # The start takes seconds. This thread stays free to receive Ctrl-C, which is blocked in the
+    # threads and processes of the cluster.
     thread = threading.Thread(target=start, daemon=True)
     thread.start()
     try:
@@ -237,7 +236,7 @@ def _connected(dask: Any, address: str) -> Any:
 async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
     """Wait until the Dask scheduler has workers; the caller limits the time.
 
-    Each answer without workers appends True to `answered`, which thus differs from no answer.
+    Each answer without workers appends True to `answered`.
     """
     # A Dask client would wait half a minute for a server that accepts the connection but does not
     # answer; the scheduler is therefore called directly.
@@ -257,8 +256,7 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # Each task includes the sweep, which could otherwise be lost with the workers that have
-            # received it.
+            # In each task, because the sweep could be lost with the workers that received it.
             future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)

@@ -1,7 +1,7 @@
 """Reductions: the quantities that a sweep can store for each scene.
 
-The parameter `samples` is the number of times at which states are read; `of` names a principal axis
-by the rank of its moment.
+`samples` is the number of times at which states are read; `of` names a principal axis by the rank
+of its moment.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -113,7 +113,6 @@ def _unit(vectors: Array) -> Array:
 
 
 def _angles(ours: Array, theirs: Array) -> Array:
-    """Return the angles (rad) between unit vectors."""
     # The arc cosine of the scalar product would lose half of the digits of a small angle.
     across, along = (np.linalg.norm(each, axis=-1) for each in (ours - theirs, ours + theirs))
     return np.asarray(2.0 * np.arctan2(across, along))
@@ -298,7 +297,7 @@ def empty(asked: ReductionSpec, n: int) -> Found:
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a reduction of a batch: a value, or a row of components, for each scene."""
+    """Return a reduction of a batch: a value, or a row of components, per scene."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

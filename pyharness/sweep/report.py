@@ -1,7 +1,4 @@
-"""Report of the verb `sweep`: the axes, statistics of the stored quantities, and a picture.
-
-The panels of the picture differ in the values along the dimensions that it does not show.
-"""
+"""Report of the verb `sweep`: the axes, statistics of the stored quantities, and a picture."""
 
 import itertools
 from collections import Counter
@@ -136,8 +133,7 @@ _MOST_PANELS = 6
 _MOST_PLACES = 200  # values along an axis of a map; more would not be visible
 _MOST_DOTS = 5000  # values in a panel with a line or dots
 _COLUMNS = 3  # of panels
-# A logarithmic scale is used if no value is negative, and the positive values extend over more than
-# this number of orders of magnitude.
+# Above so many orders of magnitude, a scale without negative values is logarithmic.
 _ORDERS = 3.0
 # The ends of a scale for all panels, and whether it is logarithmic.
 Scale = tuple[float, float, bool]
@@ -159,7 +155,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
     It is a map over the last two dimensions with several values that are numbers and not random;
-    with fewer such dimensions it is a line or dots.
+    with fewer, it is a line or dots.
     """
     from matplotlib.figure import Figure
 
@@ -206,7 +202,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
 ) -> list[tuple[str, Array]]:
-    """Return title (values along other dimensions, component) and values of each panel."""
+    """Return title and values of each panel; panels differ in the dimensions not shown."""
     choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
     for dimension in (d for d in store.sweep.dimensions if d not in places):

@@ -1,7 +1,4 @@
-"""Runs of a sweep: check of its size, forecast, computation of missing chunks.
-
-The forecast is from samples of the scenes and files.
-"""
+"""Runs of a sweep: check of its size, forecast from samples, computation of missing chunks."""
 
 import contextlib
 import math
@@ -24,18 +21,16 @@ from pyharness.sweep.store import Store, check_store, opened
 from pyharness.sweep.store_layout import filled
 from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 
-# Numbers of scenes in the samples, which are evenly spread over the grid; the smallest is measured
-# first.
+# Scenes in the samples, evenly spread over the grid; the smallest sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
 _ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large enough
-# A larger sample is nevertheless measured if it is at most the fraction `_PART` of all scenes and
-# takes at most `_LONGEST`, because a small sample overestimates the cost of a scene by the constant
-# cost of a batch.
+# A larger sample of at most the fraction `_PART` of all scenes, and at most `_LONGEST`, is measured
+# anyway: a small one includes too much of a batch's constant cost.
 _PART = 0.01
 _LONGEST = 60.0  # s
-# Fewest distinct values in a sample along a dimension in which all scenes of a batch are equal.
+# Fewest values sampled along a dimension in which all scenes of a batch are equal.
 _PLACES = 5
-_FILES = 20  # most chunks that are solved, or written and read, for a measurement
+_FILES = 20  # most chunks solved, or written and read, for a measurement
 
 
 class Estimate(NamedTuple):
@@ -77,7 +72,7 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
                     break
     except OSError:
         return 0.0, 0.0
-    # The first chunk does not count, because Zarr imports modules meanwhile.
+    # Without the first chunk, during which Zarr imports modules.
     write, read = np.mean(times[1:] or times, axis=0)
     return float(write), float(read)
 
@@ -136,7 +131,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
     Dimensions along which a batch is constant keep five distinct indices, or more if the batches of
-    a chunk are small. Thus the batches of the sample are about as large as real ones.
+    a chunk are small, so that the sample's batches are about as large as real ones.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -151,8 +146,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     return found
 
 
-# Ratio of the memory of a process to the size of a chunk: it has several chunks at once, and needs
-# more memory to compute them.
+# Memory of a process over the size of a chunk; it holds several, and their computation needs more.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 

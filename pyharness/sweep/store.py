@@ -2,7 +2,7 @@
 
 A chunk of the grid has one file for each array, and a file with their checksums, which is written
 last. Every file is written under a temporary name and renamed. A chunk with checksums is therefore
-complete, even if the process was killed.
+complete.
 """
 
 import contextlib
@@ -234,7 +234,7 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make an empty store and rename it to `folder`, which is therefore never incomplete."""
+    """Make an empty store and rename it to `folder`, which is thus never incomplete."""
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)

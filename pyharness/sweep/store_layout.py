@@ -1,8 +1,8 @@
 """Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
 
-Checksums detect damaged and exchanged files. `sha256sum --check` reads a file of checksums. Its
-first line names the version of pyharness, the sweep and the part of the store, so that an exchanged
-file fails; the others have SHA-256 and path. `folder` is the store's, and `name` a path in it.
+`sha256sum --check` reads a file of checksums. Its first line names the version of pyharness, the
+sweep and the part of the store, which reveals an exchanged file; the others have SHA-256 and path.
+`folder` is the store's, and `name` a path in it.
 """
 
 import contextlib
@@ -151,7 +151,7 @@ def place_checksums(
         raise OSError(errno.EIO, f"{damage}, though it was written now") from None
     path = folder / checksums
     path.parent.mkdir(parents=True, exist_ok=True)
-    # Renaming a temporary file means that the file is never incomplete.
+    # Renamed when complete.
     new = path.with_name(f"{path.name}.{os.urandom(8).hex()}.partial")
     try:
         new.write_bytes(content)
@@ -176,9 +176,9 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the identities in a store's metadata and in the checksums of the metadata.
+    """Return the readable identities in a store's metadata and in the checksums of the metadata.
 
-    An unreadable one is omitted. In an undamaged store both are equal.
+    In an undamaged store both are equal.
     """
     found = []
     with contextlib.suppress(
@@ -269,8 +269,7 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
     if reduction.flags:
         names = (each.replace(" ", "_") for each in reduction.flags.values())
         attributes |= {"flag_values": list(reduction.flags), "flag_meanings": " ".join(names)}
-    # Fixed, because a chunk that is computed again must have the same bytes, and another version of
-    # Zarr may have another default.
+    # Fixed: a recomputed chunk must have the same bytes, whatever Zarr's default.
     form: dict[str, Any] = {"compressors": ZstdCodec(level=0, checksum=False)}
     form |= {"dtype": reduction.dtype, "fill_value": reduction.fill}
     form |= {"dimension_names": dimensions, "attributes": attributes}

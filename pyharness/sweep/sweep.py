@@ -70,7 +70,7 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers some last dimensions completely, and the one before in part. It has length 1
+        A chunk covers some last dimensions completely, and in part the one before. It has length 1
         along programs, methods, listings and readings, so that its scenes have the same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
@@ -136,8 +136,7 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    A group has its indices in ascending order, and a value from each column. Without columns there
-    is one group.
+    A group has ascending indices, and a value from each column. Without columns there is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

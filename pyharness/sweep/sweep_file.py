@@ -41,7 +41,7 @@ _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
 _MOST_SAMPLES = 10_000
 _LONGEST_NAME = 240  # bytes; most file systems take 255
-# Methods that propagate the attitudes of many bodies.
+# Methods with attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
@@ -152,10 +152,7 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
-    """Return the reduction of an entry, a name or a table; raise InputError if it is invalid.
-
-    `claims` maps each claim to the function that checks it.
-    """
+    """Return the reduction of an entry, a name or a table; raise InputError if it is invalid."""
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:
         raise InputError("reductions: allowed: names, and tables with name and parameters")

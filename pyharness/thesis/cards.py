@@ -2,7 +2,7 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
 number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
-the twin's lines for each card; the Fortran port names its cards in comments.
+for each card the lines of the Python port, the twin; the Fortran port names its cards in comments.
 `data/apparatus.toml`, the critical apparatus, explains the deviations of the scan.
 """
 
@@ -24,9 +24,9 @@ PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage of a card that differs between our text and the scan.
+    """A passage of a card that differs between our text and the scan, without blanks.
 
-    `ours` and `scans` are without blanks. `entry` identifies the explanation in the apparatus.
+    `entry` identifies the explanation in the apparatus.
     """
 
     ours: str
@@ -35,7 +35,7 @@ class Difference(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A line of a source file: name of the file, number from 1, and text."""
+    """A line of a source file, with its number from 1."""
 
     file: str
     line: int
@@ -46,9 +46,8 @@ class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
     `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
-    occurrence of its characters after the one before. `printed` is the number in the scan, if it is
-    another, and the apparatus entry that explains it. `lost` is the entry about a card that the
-    scan lacks, else None.
+    occurrence of its characters after the one before. `printed` is another number in the scan, and
+    the apparatus entry that explains it. `lost` is the entry on a card that the scan lacks.
     """
 
     program: str
@@ -92,7 +91,6 @@ class Card(NamedTuple):
 
         Raise ValueError if the text does not have all differences in order.
         """
-        # Differences ignore blanks.
         places = [n for n, letter in enumerate(self.text) if not letter.isspace()]
         letters = tight(self.text)
         done = at = 0
@@ -134,10 +132,10 @@ class Card(NamedTuple):
 
 
 class Deck:
-    """The cards of a program by number, and the lines of port and twin for each card."""
+    """The cards of a program by number, with their lines in the Fortran and the Python port."""
 
     def __init__(self, program: str) -> None:
-        """Read the table of cards of the program from `data/cards`."""
+        """Read the program's cards."""
         self.program = program
         self._places = facts("cards/places")[program]
         self.cards = {
@@ -179,7 +177,7 @@ class Deck:
 
     @cached_property
     def otherwise(self) -> dict[int, str]:
-        """Return, by card number, why the port has a statement in another form."""
+        """Return, by card number, why the Fortran port has a statement in another form."""
         return {n: why for cards, why in self._places["otherwise"] for n in numbers(cards)}
 
     @cached_property
@@ -192,7 +190,7 @@ class Deck:
 
     @cached_property
     def twin(self) -> dict[int, list[Place]]:
-        """Return, by card number, the corresponding lines of the twin."""
+        """Return, by card number, the corresponding lines of the Python port."""
         places = self._places["twin"]
         return _by_card((cards, twin_line(file, text)) for cards, file, text in places)
 
@@ -294,14 +292,14 @@ def tight(text: str) -> str:
 
 
 def port_file(program: str) -> str:
-    """Return the name of a program's port in the folder `PORT`."""
+    """Return the name of a program's Fortran port."""
     return f"{program.replace('-', '_')}.fypp"
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the defect or reading on which a port's line depends, and whether it is active.
+    """Return the switch on which a Fortran line depends, and whether the line needs it active.
 
-    Return None if the line depends on no single switch.
+    A switch is a defect or reading. Return None if the line depends on no single one.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])
@@ -317,7 +315,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the line of a twin with this text; raise ValueError unless there is exactly one."""
+    """Return the line of a Python port with this text; raise ValueError unless there is one."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

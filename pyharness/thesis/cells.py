@@ -1,4 +1,4 @@
-"""Combinations of a listing and a case, for which Fortran port and twin are compared.
+"""Combinations of a listing and a case, for which Fortran and Python ports are compared.
 
 A listing is a program with a choice of defects, readings and conjectures; a case is a scene of
 Table 1.

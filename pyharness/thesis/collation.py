@@ -90,8 +90,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    Each deviation must name an entry that declares it, and each declared deviation must exist. A
-    lost card must name an entry of the kind ``missing text``.
+    Each deviation must name an entry that declares it, and conversely. A lost card must name an
+    entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
@@ -129,11 +129,11 @@ def undeclared() -> list[str]:
 class Row(NamedTuple):
     """An operation, and whether the decks and the thesis agree on it.
 
-    `what` names the operation. `cards` has the numbers by program, as in ``750-770, 800``. `decks`
-    is ``agree`` if all decks with the operation have the same statements. It is ``names`` if only
-    names differ, ``order`` if only names and order, else ``differ``; ``-`` if no deck has it.
-    `thesis` is ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, and `says`
-    its statement. `entries` of the apparatus, or `reason`, explain a disagreement.
+    `cards` has the numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all decks
+    with the operation have the same statements. It is ``names`` if only names differ, ``order`` if
+    only names and order, else ``differ``; ``-`` if no deck has it. `thesis` is ``agrees``,
+    ``differs`` or ``silent``; `text` is the place in the thesis, and `says` its statement.
+    `entries` of the apparatus, or `reason`, explain a disagreement.
     """
 
     what: str

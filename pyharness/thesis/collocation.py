@@ -1,9 +1,9 @@
 """Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
 
-In a step, the interval, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its
-derivative equals the right-hand side at as many collocation points as there are terms after x(0)
-(eq. 36). A first estimate assumes a constant right-hand side; one correction evaluates it at the
-points along the estimate.
+In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative equals
+the right-hand side at as many collocation points as there are terms after x(0) (eq. 36). A first
+estimate assumes a constant right-hand side; one correction evaluates it at the points along the
+estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,7 +64,7 @@ def integrate(
 def interval(
     start: Vector, points: Sequence[float], end: float, rates: Rates
 ) -> tuple[list[float], int]:
-    """Return all unknowns after one interval, and the error code IER of the correction.
+    """Return all unknowns after one step, and the error code IER of the correction.
 
     `points` and `end` are in seconds from the `start`. `rates` returns the right-hand sides at
     point k (0 for the start), from k and the unknowns.
@@ -93,7 +93,7 @@ def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
 def values(start: Vector, coefficients: Sequence[Vector], t: float) -> list[float]:
     """Return every unknown's polynomial x(0) + c1 t + c2 t**2 + ... at the time `t` (s).
 
-    The terms are added in this order, on which the rounding errors depend.
+    The rounding errors depend on this order of the terms.
     """
     t2 = t * t
     powers = [t, t2, t2 * t, t2 * t2, t2 * t2 * t]

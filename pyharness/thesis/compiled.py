@@ -56,10 +56,9 @@ def program_arguments(
 ) -> tuple[Any, ...]:
     """Return the arguments of the compiled function `run_program`, in its order.
 
-    They are the program, a bit mask of defects, readings and conjectures, and whether the body has
-    moments; then seven triples: moments (kg m2), or A, B and C of Euler's equations; omega, masses,
-    forces, constant and rate of the torque, and the initial torque divided by the moments (1/s2),
-    or zeros; then whether the torque varies, its sines and cosines, and the other arguments.
+    Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
+    m2), or A, B and C of Euler's equations; omega, masses, forces, constant and rate of the torque,
+    and the initial torque divided by the moments (1/s2), or zeros.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):

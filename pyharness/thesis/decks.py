@@ -1,7 +1,7 @@
 """Decks as fixed-form FORTRAN, and runs of them after compilation.
 
-They are a third, independent path from the cards to the results: the author's statements, compiled
-with a separate LEQT1F (`data/cards/leqt1f.f`), share no code with port and twin.
+They are a third path from the cards to the results: the author's statements, compiled with a
+separate LEQT1F (`data/cards/leqt1f.f`), share no code with the Fortran and Python ports.
 """
 
 import re
@@ -24,8 +24,8 @@ from pyharness.thesis.printer import TAPE5
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-# Numbers of terms of two further collocation programs, used in V.2 of the thesis for Case 6, whose
-# decks it does not print.
+# Terms of two more collocation programs, which V.2 of the thesis uses for Case 6, but whose decks
+# it does not print.
 MODELS = (3, 5)
 COMPILER = "gfortran"
 # REAL is binary64, variables are 0 until they are set, and no operations are fused.
@@ -53,7 +53,7 @@ def deck_text(
 ) -> str:
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
-    By default it is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
+    The default is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
     with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
     DO statement.
 
@@ -180,7 +180,7 @@ def model_cards(terms: int) -> dict[int, str]:
     text[:6] = [each.replace("(6)", "(8)") for each in heads]
     name = {3: "THREE", 5: "FIVE"}.get(terms, "FOUR")
     text[text.index("C FOUR TERM APPROXIMATION")] = f"C {name} TERM APPROXIMATION, A CONJECTURE"
-    # By the first and the last statement of groups of cards: the new statements.
+    # New statements, by the first and the last statement of the cards that they replace.
     groups = {
         ("T1=DT*.2", "T5=.01"): [f"T{k}=DT*{k}./{terms + 1}." for k in terms_range]
         + [f"{end}=.01"],
@@ -227,7 +227,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
     for name, values in (("moments", scene.moments), ("torque", torque), ("omega", scene.omega)):
         for axis, value in enumerate(values):
             number = first[name] + 10 * axis
-            # A whole number has no digit after its point.
+            # Without a digit after the point of a whole number.
             written = repr(value).removesuffix("0") if value == int(value) else repr(value)
             left = deck(program).cards[number].text.partition("=")[0]
             found[number] = f"{left}={written}"

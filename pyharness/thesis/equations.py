@@ -64,7 +64,7 @@ def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
 
 
 class Record:
-    """The results of a twin's run, a row for each step."""
+    """The results of a Python port's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
         """Create a record; `evaluations_per_step` counts evaluations of the right-hand sides."""

@@ -1,7 +1,7 @@
 """Runs of the programs in an arithmetic of `word.py`, such as the 48 bits of the CDC.
 
-The twins run in each, the compiled programs in the formats of IEEE 754. Their numbers are exchanged
-with the extension module as bytes, in this machine's order.
+The Python ports run in every arithmetic, the compiled programs in the formats of IEEE 754. Numbers
+pass to and from the extension module as bytes, in this machine's order.
 """
 
 import copy
@@ -35,9 +35,9 @@ _BITS = {24: 32, 53: 64, 113: 128}
 def run(
     scene: Scene, listing: Listing, word: Word, lipschitz: float = 500.0, may_stop: bool = True
 ) -> Trajectory:
-    """Run the twin of a listing in the arithmetic `word`; no argument is checked.
+    """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
-    The results are rounded to floats; the attribute `exact` has them as numbers of the word.
+    The results are rounded to floats; the attribute `exact` has them in that arithmetic.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene, with all numbers except counts converted to `word`."""
+    """Return a copy of a checked scene, with all numbers except counts in the arithmetic `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:
@@ -73,8 +73,8 @@ def run_compiled(
 ) -> Trajectory:
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
-    Raise InputError if the compiler does not support the word, or angles of the torque are too
-    large for its sine; NotBuiltError if the extension is not built.
+    Raise InputError if the compiler does not support it, or angles of the torque are too large for
+    its sine; NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -108,7 +108,7 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the names of the words that the compiled programs support; none if not built."""
+    """Return the arithmetics that the compiled programs support; none if not built."""
     try:
         from pyharness import _build
     except ImportError:
@@ -129,7 +129,7 @@ def _check_angles(scene: Scene) -> None:
 
 
 def n_bytes(word: Word) -> int:
-    """Return the number of bytes of a number in binary32, binary64 or binary128."""
+    """Return the bytes of a number in binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
@@ -140,12 +140,12 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
     """
     size = n_bytes(word)
     written = b"".join(_pattern(each).to_bytes(size, sys.byteorder) for each in numbers)
-    # Memory of a copy, which NumPy allocates, is aligned for any number.
+    # The copy is aligned for any number.
     return np.array(np.frombuffer(written, np.int8).reshape((size, *shape), order="F"), order="F")
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the array of numbers in bytes that `to_bytes` has made."""
+    """Return the numbers in bytes from `to_bytes`."""
     patterns = (each.tobytes() for each in given.reshape(n_bytes(word), -1, order="F").T)
     found = [_number(int.from_bytes(each, sys.byteorder), word) for each in patterns]
     return np.array(found, dtype=object).reshape(given.shape[1:], order="F")
@@ -156,7 +156,7 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the field 0, but the unit in the last place of the field 1.
+        # A subnormal number has the field 0, but the unit of the field 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

@@ -39,7 +39,7 @@ def _factor(a: list[list[float]]) -> list[int] | None:
                 total = total - row[k] * a[k][j]
             row[j] = total
 
-        # Of several elements with the largest scaled magnitude, the first one is the pivot.
+        # The first of several elements with the largest scaled magnitude is the pivot.
         biggest = 0.0
         pivot = j
         for i in range(j, n):

@@ -29,8 +29,8 @@ from pyharness.model.values import Number, boolean, integer, number_list
 from pyharness.thesis.compiled import stop_reads_velocity
 from pyharness.thesis.equations import card_torque
 
-_LEAST_WORK = 100_000  # fewest steps, over all bodies of one call, that are worth a thread
-_PIECES = 8  # calls of the kernel for each thread, because the runs of some bodies may end early
+_LEAST_WORK = 100_000  # fewest steps, over all bodies, that are worth a thread
+_PIECES = 8  # kernel calls for each thread, because some runs may end early
 _NOT_REACHED = -1
 
 
@@ -73,8 +73,7 @@ class ProgramEnsemble(BatchResult):
     ier: NDArray[np.int32] | None
 
 
-# The annotations are text, because the signature would otherwise show the 300 characters of
-# ArrayLike's definition in each.
+# As text, because the signature would otherwise repeat ArrayLike's 300 characters.
 def run_many(
     scene: Scene,
     listing: Listing,

@@ -66,7 +66,7 @@ def _operator(name: str, reflected: bool = False) -> Callable[["_Number", Any], 
 class _Number(float):
     """A floating-point value, with the counter of the operations on it.
 
-    A repeated operation on the same operands returns the same object.
+    Repeated operations on the same operands return the same object.
     """
 
     counter: _Counter
@@ -117,7 +117,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return numbers from before a step as copies with `counter`, and other values unchanged."""
+    """Return numbers from before a step as copies with `counter`, other values unchanged."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)

@@ -22,8 +22,8 @@ from pyharness.thesis.equations import card_torque
 
 # Zero has no minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# A value that is not finite is printed as asterisks, like one that is too wide for its field. The
-# machine printed R or I, which has no more information.
+# A value that is not finite is printed as asterisks, like one too wide for its field. The machine
+# printed R or I, which has no more information.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 

@@ -33,7 +33,7 @@ def run(
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Points and slopes of the stages have the program's own indices.
+    # Indices are the program's own.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}

@@ -1,8 +1,8 @@
-"""Words: floating-point formats of p bits with a rounding rule, for runs of the twins.
+"""Words: floating-point formats of p bits with a rounding rule, for runs of the Python ports.
 
 A number of a word has the operators of a float, also with integers, floats and numbers of the same
-word. A float is treated as a literal of a source text: its shortest decimal representation is
-rounded, not its exact binary value.
+word. A float counts as a literal of a source text: its shortest decimal representation is rounded,
+not its exact binary value.
 
 Rules are functions of pairs of integers (m, e), for a number m 2**e; m has p bits, or fewer if
 subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an
@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 from pyharness.model.errors import InputError, unknown
 
 RULES = ("nearest-even", "chop", "FX", "RX")
-# Additional bits with which a sine or cosine is computed before it is rounded to the word.
+# Additional bits of a sine or cosine before rounding.
 _GUARD_BITS = 40
 Pair = tuple[int, Any]
 Rounding = Callable[[int, int], Pair]
@@ -33,8 +33,8 @@ class Rules(NamedTuple):
     """The arithmetic of a format, as functions of integers m and e.
 
     `nearest` (ties to even) is for square roots, sines, cosines and literals, `cut` (towards zero)
-    for literals if the word truncates them. A difference is the sum with the negative; `difference`
-    is for comparisons only: numbers are equal if it is zero.
+    for literals if the format truncates them. A difference is the sum with the negative;
+    `difference` is for comparisons only: numbers are equal if it is zero.
     """
 
     nearest: Rounding
@@ -197,11 +197,11 @@ def _comparison(compare: Callable[[float, float], bool]) -> Callable[["Number", 
 
 
 class Number:
-    """An immutable number of a word: the integer `m` times 2**`e`.
+    """An immutable number of a floating-point format: the integer `m` times 2**`e`.
 
     If `m` is 0, `e` is the value as a float: 0.0, -0.0, inf, -inf or nan. `Word` makes a subclass
-    for each word. The operators round their results; x/0 is infinite, 0/0 is nan. Square roots,
-    sines and cosines are rounded to nearest even if the word truncates.
+    for each format. The operators round their results; x/0 is infinite, 0/0 is nan. Square roots,
+    sines and cosines are rounded to nearest even if the format truncates.
     """
 
     __slots__ = ("e", "m")
@@ -217,11 +217,11 @@ class Number:
     __truediv__ = _operator("divide", _quotient)
 
     def __rsub__(self, other: Any) -> "Number":
-        """Return `other`, converted to the word, minus this number."""
+        """Return `other`, converted to this format, minus this number."""
         return self.word(other) - self
 
     def __rtruediv__(self, other: Any) -> "Number":
-        """Return `other`, converted to the word, divided by this number."""
+        """Return `other`, converted to this format, divided by this number."""
         return self.word(other) / self
 
     def __neg__(self) -> "Number":
@@ -237,10 +237,9 @@ class Number:
         return bool(self.m or self.e)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether the difference, computed in the word, is zero.
+        """Return whether the difference, computed in this format, is zero.
 
-        In a CDC word, two neighbouring numbers may have the difference zero, and then count as
-        equal.
+        In a CDC word, two neighbouring numbers may have the difference zero.
         """
         x, y = self, self.word(other)
         if x.m and y.m:
@@ -264,7 +263,7 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return the word and the value: ``Word(48, 'FX')(m * 2**e)``."""
+        """Return format and value: ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
@@ -310,7 +309,7 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        It is applied to the `_shadow` of each; a finite result other than 0 means that 0 was added.
+        It is computed from `_shadow`; a finite result other than 0 means that 0 was added.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -374,10 +373,10 @@ class Word:
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a float, integer, fraction, decimal text or own number as a number of this word.
+        """Return a float, integer, fraction, decimal text or own number as a number of this format.
 
         A float is converted from its shortest decimal representation. Raise TypeError for any other
-        type, and for a number of another word.
+        type, and for a number of another format.
         """
         if isinstance(value, Number) and value.word is self:
             return value

@@ -11,7 +11,7 @@ from typing import Any
 
 from pyharness.model.report import Field, Line, Report, Section, Table
 
-SCHEMA = 1  # of JSON
+SCHEMA = 1  # version of the JSON output
 _WIDTH = 100
 _NARROWEST = 12  # least width to which a last column is wrapped
 _MOST_ROWS = 200
@@ -91,7 +91,6 @@ def csv_text(table: Table) -> str:
 
 
 def _markdown(report: Report) -> str:
-    """Return a report's page, or else its data with all digits."""
     if report.page is not None:
         return "\n".join(map(_markdown_section, report.page))
     assert report.data is not None

@@ -17,15 +17,15 @@ class Accuracy:
     """The errors of a trajectory against the reference, and its drifts of conserved quantities."""
 
     omega: tuple[float, float, float]  # largest error of each component (rad/s)
-    velocity: float | None  # largest error of any component of the translational velocity (m/s)
-    # Largest drifts of the energy and of the squared angular momentum, relative to the initial
-    # values; None if a torque acts, the moments are unknown or the trajectory has no row.
+    velocity: float | None  # largest error of any component (m/s)
+    # Drifts of the energy and of the squared angular momentum, relative to the initial values; None
+    # with a torque, without moments or without rows.
     energy: float | None
     momentum: float | None
-    error: Array  # shape (n,): largest error of any component of omega at each time (rad/s)
+    error: Array  # shape (n,): largest error of omega at each time (rad/s)
     turned: Array | None = None  # shape (n,): error of the attitude at each time (rad)
-    # Largest drift of the angular momentum in space, relative to its initial norm; None if a torque
-    # acts, if the moments or the attitude are unknown, or if the trajectory has no row.
+    # Drift of the angular momentum in space, relative to its initial norm; None also without an
+    # attitude.
     momentum_in_space: float | None = None
 
     @property
@@ -37,8 +37,7 @@ class Accuracy:
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against `truth`, up to the end of the shorter one.
 
-    Errors are infinite without rows. Drifts of energy and momentum are computed only without
-    torque.
+    Errors are infinite without rows.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -105,7 +104,7 @@ def differences(first: Trajectory, second: Trajectory) -> list[str]:
         found.append("IER")
     if first.exact is not None and second.exact is not None:
         pairs = zip(first.exact.ravel().tolist(), second.exact.ravel().tolist(), strict=True)
-        # Compared as text, because nan is not equal to nan, and 0.0 is equal to -0.0.
+        # As text, because nan is not equal to nan, and 0.0 is equal to -0.0.
         if any(x.m != y.m or str(x.e) != str(y.e) for x, y in pairs):
             found.append("numbers of the word")
     return found

@@ -1,4 +1,4 @@
-"""Batches of scenes; arrays hold the quantities in which the scenes differ."""
+"""Batches of scenes; arrays hold the quantities in which they differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -24,9 +24,9 @@ from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 from pyharness.thesis.many import ProgramEnsemble, run_many
 
-# Quantities that may be arrays for a program, but not for a method.
+# Arrays for a program, but not for a method.
 OF_PROGRAMS = ("step_size", "lipschitz")
-_EFFORT = 1e9  # in effect no work limit: the caller has requested the whole batch
+_EFFORT = 1e9  # in effect none: the caller has requested the whole batch
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,8 @@ class Solver:
     """The method, or the program of the thesis, that solves a batch; the other is None.
 
     `t_end` (s) is by default the step size times the number of steps. The rest is for programs:
-    `listing` selects the active defects (``original``, ``corrected``), `reading` the interpretation
-    of doubtful cards. `lipschitz` is the limit (1/s) of the stop test, and `may_stop` whether this
-    test may end a run.
+    `listing` selects the active defects, `reading` the interpretation of doubtful cards.
+    `lipschitz` is the limit (1/s) of the stop test, and `may_stop` whether it may end a run.
     """
 
     method: str | None = "auto"
@@ -53,12 +52,12 @@ class Solver:
 class Batch:
     """Many scenes that one method or program solves; results are computed when first read.
 
-    Functions that check a statement of the thesis may read `omega0`, `omega`, `status`, `n_rows`
-    and `stop_variable`, and call `rows` and `by_method`.
+    Functions that check a claim of the thesis may read `omega0`, `omega`, `status`, `n_rows` and
+    `stop_variable`, and call `rows` and `by_method`.
 
-    `scene` has the quantities that all scenes share. `arrays` has the others, each with a row per
-    scene; its keys are arguments of `solve_many` and `run_many`, always including `omega`.
-    `listing` is None for a method. `t_end` (s) has shape (n,). `attitude` is for methods only.
+    `scene` has the quantities that all scenes share. `arrays` has the others, with a row per scene;
+    its keys are arguments of `solve_many` and `run_many`, always with `omega`. `listing` is None
+    for a method, `t_end` (s) has shape (n,), and `attitude` is for methods only.
     """
 
     scene: Scene
@@ -88,7 +87,7 @@ class Batch:
 
     @property
     def is_program(self) -> bool:
-        """Return whether a program of the thesis solves the batch."""
+        """Return whether a program solves the batch."""
         return self.listing is not None
 
     @cached_property
@@ -120,7 +119,7 @@ class Batch:
         """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
 
         A method starts from time 0 for each of them, so that errors do not accumulate. A program's
-        times are those of `sample_steps`.
+        ends are `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -157,8 +156,8 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        Scenes are run one by one, without the codes IER, if they differ in `torque_rate` or the
-        program refuses one of them. Only the refused scenes have the status REFUSED.
+        Scenes run one by one, without the codes IER, if they differ in `torque_rate` or the program
+        refuses one. Only refused ones have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -170,14 +169,13 @@ class Batch:
     def scene_of(self, i: int) -> Scene:
         """Return scene `i` (from 0), with an attitude only if the torque needs it.
 
-        Raise InputError if a number is invalid.
+        Raise InputError for an invalid number.
         """
         own = {name: array for name, array in self.arrays.items() if name != "lipschitz"}
         return scene_of_row(self._shared, own, i)
 
     @cached_property
     def _shared(self) -> Scene:
-        """Return `scene`, with an attitude only if the torque needs it."""
         attitude = self.scene.attitude if self.scene.torque.needs_attitude else None
         return replace(self.scene, attitude=attitude)
 
@@ -200,8 +198,7 @@ class Batch:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
-        # One attitude suits all scenes, because `attitudes` multiplies the result by
-        # `first_attitudes`.
+        # One serves all scenes, because `attitudes` multiplies the result by `first_attitudes`.
         has_one = self.attitude and not self.scene.torque.needs_attitude
         more = {"attitude": IDENTITY} if has_one else {}
         return self._solve(method, tolerance, t_end, **more)

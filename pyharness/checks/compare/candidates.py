@@ -30,11 +30,11 @@ _SAME = 1e-9  # relative difference up to which two times are equal; the step si
 class End:
     """The state that a candidate computes at one time."""
 
-    omega: Array  # shape (3,), rad/s; NaN if the candidate did not reach the time
-    ended: str = "complete"  # how the run ended: "complete", or why there is no full result
-    steps: int = 0  # number of steps, as the candidate counts them
-    evaluations: int | None = None  # evaluations of the right-hand side, if they are counted
-    attitude: Array | None = None  # shape (4,), scalar first, if it was propagated
+    omega: Array  # shape (3,), rad/s; NaN if the time was not reached
+    ended: str = "complete"  # "complete", or why there is no full result
+    steps: int = 0  # as the candidate counts them
+    evaluations: int | None = None  # of the right-hand side, if counted
+    attitude: Array | None = None  # shape (4,), scalar first, if propagated
 
     @property
     def is_refused(self) -> bool:
@@ -49,7 +49,7 @@ class End:
 
 @dataclass(frozen=True)
 class Ready:
-    """An integration from time 0 to one time: `run` is timed, and `read` converts its result."""
+    """An integration from time 0 to one time; `read` converts the result of the timed `run`."""
 
     run: Callable[[], Any]
     read: Callable[[Any], End]
@@ -60,11 +60,11 @@ class Candidate:
     """A method with its tolerance, a prepared solver, or a program."""
 
     name: str
-    # Takes a scene and a time (s). Raises InputError if the candidate can't solve the scene, or has
-    # no result at the time, like a program whose steps end at another time.
+    # Raises InputError if the candidate can't solve the scene, or has no result at the time (s),
+    # like a program whose steps end at other times.
     ready: Callable[[Scene, float], Ready]
-    # Takes a scene, and returns its trajectory at the times of its steps. A method takes other
-    # times as an optional second argument. A prepared solver has no rows and raises InputError.
+    # Returns the trajectory at the times of the scene's steps or, for a method, at those in an
+    # optional second argument. A prepared solver has no rows and raises InputError.
     rows: Callable[..., Trajectory]
 
     def end(self, scene: Scene, time: float) -> End:
@@ -103,7 +103,7 @@ def prepared_candidate(
     read = _turned if attitude else _answered
 
     def ready(scene: Scene, time: float) -> Ready:
-        # A solver with attitudes takes the initial one as its third argument.
+        # With attitudes, the third argument is the initial one.
         solver = make(scene, name, tolerance)
         start, turned = np.array(scene.omega), ((0.0, 0.0, 1.0, 0.0),) if attitude else ()
         if primed:
@@ -159,7 +159,7 @@ def copied_result(values: Iterable[float]) -> Array:
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` with omega NaN and the ending `why`."""
+    """Return an `End` with omega NaN."""
     return End(np.full(3, math.nan), why)
 
 
@@ -176,7 +176,7 @@ def _turned(solver: Any, found: tuple[Array, Array]) -> End:
 def _answered(solver: Solver, omega: Array) -> End:
     method = solver.plan.method
     each = METHODS[method].evaluations if method in FIXED_STEP else method.startswith("gauss-")
-    # A Taylor series has no evaluations, because it expands the right-hand side.
+    # A Taylor series expands the right-hand side instead of evaluating it.
     evaluations = None if method == "taylor" else solver.steps * int(each)
     return End(copied_result(omega), solver.status, solver.steps, evaluations)
 

@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
-Differences between Fortran and twin are in units in the last place. Errors against the
-reference (rad/s) have no meaning below the reference's own error.
+Differences between Fortran and Python are in units in the last place. Errors (rad/s) have no
+meaning below the error of the reference.
 """
 
 import itertools

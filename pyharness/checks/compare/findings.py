@@ -17,20 +17,20 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.bounded import ErrorBound
 from pyharness.truth.reference import Reference
 
-# Largest relative error that rounding causes in any method, divided by the error amplification.
+# Relative error that rounding causes in any method, divided by the error amplification.
 _ROUNDING = 4e-15
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramFinding:
-    """The results of one listing, and their differences from the reference and the twin."""
+    """The results of one listing, compared with the reference and the Python version."""
 
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # distance of Fortran and the twin; None if only the twin was run
-    differences: tuple[str, ...]  # names of the results in which Fortran and the twin differ
-    order: Order | None  # measured for a corrected program in binary64 only
+    ulps: float | None  # between Fortran and Python; None if only Python ran
+    differences: tuple[str, ...]  # results in which Fortran and Python differ
+    order: Order | None  # for a corrected program in binary64 only
     seconds_per_step: float
 
     __repr__ = short_repr
@@ -110,7 +110,7 @@ class Comparison:
     def unexpected(self) -> tuple[str, ...]:
         """Return a sentence for each unexpected result.
 
-        With programs, a result is unexpected if Fortran and twin differ, or a corrected program
+        With programs, a result is unexpected if Fortran and Python differ, or a corrected program
         misses its order. Without programs, it is unexpected if a method's error exceeds the limit
         that follows from its tolerance, or rows are missing.
         """

@@ -19,24 +19,24 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.programs import Program
 from pyharness.truth.reference import Reference
 
-# Largest amount by which a measured order may be below the expected one.
+# Accepted deficit of a measured order.
 ORDER_SLACK = 0.5
-# The order is measured when two conditions hold. Halving the step changes the result by less than
-# `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
-# the torque change by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of the
-# torque also seem to converge.
+# Conditions for a measurement. Halving the step changes the result by less than `_SMALL_CHANGE`,
+# relative to the largest value. In a step the phases of the body's motion and of the torque change
+# by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of the torque also seem to
+# converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# The step is halved until this many steps are taken, and at least eight times.
+# The step is halved until so many steps are taken, and at least eight times.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# A program that does not converge is incorrect if a textbook method of the same order converges
-# with fewer steps, by this factor.
+# A program that does not converge is incorrect if a textbook method of its order does, with fewer
+# steps by this factor.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
 # Assumed number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
-# LEQT1F may report a matrix with a larger condition number as singular.
+# With a larger condition number, LEQT1F may report a matrix as singular.
 _CONDITION = 1e15
 
 State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
@@ -46,22 +46,21 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 class Order:
     """A method's order of convergence, measured by halving the step, or why it is undecided."""
 
-    due: int  # the expected order, known from theory
-    # `as due`: the expected order was observed. `rounding`: before the order could be observed, the
-    # error was only rounding error. `misses`: the error decreases more slowly than expected. In the
-    # other four states the order is undecided: no step was small enough (`unsettled`), the program
-    # found its matrix singular (`singular`), the motion amplifies rounding errors too much
-    # (`sensitive`), or the solution is unbounded (`unbounded`).
+    due: int  # expected by theory
+    # `as due`: as expected. `rounding`: the error reached rounding before the order showed.
+    # `misses`: the error decreases too slowly. Else undecided: no step was small enough
+    # (`unsettled`), the program found its matrix singular (`singular`), the motion amplifies
+    # rounding errors too much (`sensitive`), or the solution is unbounded (`unbounded`).
     state: State
-    value: float | None  # the measured order, if it could be measured
-    step_size: float  # smallest step size tried (s); if `singular`, the largest singular one
-    steps: int = 0  # number of steps of the finest run that was compared with the reference
-    error: float = math.inf  # the largest error of that run (rad/s)
-    time: float = math.nan  # the time of that error (s)
+    value: float | None  # measured, if possible
+    step_size: float  # smallest tried (s); if `singular`, the largest singular one
+    steps: int = 0  # of the finest run compared with the reference
+    error: float = math.inf  # largest of that run (rad/s)
+    time: float = math.nan  # of that error (s)
 
     @property
     def is_judged(self) -> bool:
-        """Return whether the measurement decides if the method has its theoretical order."""
+        """Return whether the measurement decides if the method has its order."""
         return self.state in ("as due", "rounding", "misses")
 
     def __str__(self) -> str:
@@ -77,7 +76,7 @@ class Order:
 
 
 class _SingularError(Exception):
-    """Signal that a run failed at a step size for which its matrix may be singular."""
+    """A run failed at a step size for which its matrix may be singular."""
 
 
 def measured_order(
@@ -154,7 +153,7 @@ def order_of(
         steps = finer.steps
         if state != "singular":
             step_size = finer.step_size
-        if len(found) < n:  # after an overflow, because the step is far too large
+        if len(found) < n:  # overflow: the step is far too large
             previous = None
             continue
         errors = np.abs(found - right).max(axis=1)

@@ -14,15 +14,14 @@ from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Dashes and widths distinguish the lines without colour.
+# Distinct without colour.
 _STYLES: dict[str, dict[str, Any]] = {
     "original": {"color": "#c02020", "linestyle": (0, (5, 2)), "linewidth": 1.4},
     "custom": {"color": "#107040", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4},
     "corrected": {"color": "#1040a0", "linestyle": (0, (1, 1.2)), "linewidth": 2.0},
 }
 _REFERENCE: dict[str, Any] = {"color": "#b8b8b8", "linestyle": "-", "linewidth": 3.5}
-# A line does not show a trajectory of a single row, so that it is drawn as a marker. The markers
-# can be distinguished even at the same point.
+# For trajectories of one row, which a line does not show; distinct even at the same point.
 _MARKERS: dict[str, dict[str, Any]] = {
     "reference": {"marker": "s", "markersize": 11.0},
     "original": {"marker": "o", "markersize": 8.0, "markerfacecolor": "none"},
@@ -32,7 +31,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 def _curves(comparison: Comparison) -> list[tuple[str, str, Trajectory, Accuracy]]:
-    """Return program or method, which has a column of panels, and listing, if any."""
+    """Return program or method (a column), listing if any, trajectory and errors of each curve."""
     found: list[tuple[str, str, ProgramFinding | MethodFinding]]
     found = [(each.listing.program, each.listing.label, each) for each in comparison.programs]
     found += [(each.method, "", each) for each in comparison.methods if not comparison.programs]

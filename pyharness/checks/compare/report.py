@@ -182,8 +182,8 @@ def _data(comparison: Comparison) -> Table:
         }
         rows.append(each | row)
     for each in map(_method, comparison.methods):
-        # A method of `solve_ivp` chooses its own steps, whose number is not written. If the method
-        # failed, the reason is written as its ending.
+        # A method chooses its own steps, whose number is not written. A failure is written as its
+        # ending.
         row = {"steps": None, "ended": each["failure"] or each.get("ended", "")}
         rows.append(each | row | ({"seconds": None} if each["failure"] else {}))
     for each in rows:

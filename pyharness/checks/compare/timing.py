@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-SLOW = 20e-3  # s; functions whose call takes longer are timed in fewer rounds
+SLOW = 20e-3  # s; slower calls are timed in fewer rounds
 Run = Callable[[], object]
 Clock = Callable[[], float]
 
@@ -28,8 +28,8 @@ def seconds(
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
     In each round a function is called for about `length` seconds. The first call only limits the
-    rounds: to three if it takes `slow` seconds or more, to one from five times `slow`. `statistic`
-    combines the rounds.
+    rounds: to three from `slow` seconds on, to one from five times `slow`. `statistic` combines the
+    rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -64,9 +64,9 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 
 @contextlib.contextmanager
 def ended_after(limit: float) -> Iterator[None]:
-    """Raise RuntimeError if the Python code of a ``with`` block takes longer than `limit` (s).
+    """Raise RuntimeError if a ``with`` block takes longer than `limit` (s).
 
-    It works in the main thread only, where signals arrive.
+    It interrupts Python code in the main thread, where signals arrive.
     """
 
     def end(*_: object) -> None:

@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-A fault is recognised if an integrator converges to its motion, which is our solution of another
-scene or in other conventions.
+That motion is our solution of another scene, or in other conventions. An integrator has the fault
+if it converges to this motion.
 """
 
 import math
@@ -32,7 +32,7 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of an integrator: its name, a sentence on it, and what it changes.
+    """A fault of an integrator: its name, a sentence on it, and its changes.
 
     A faulty integrator computes the motion of another `scene` (None if the fault has no effect), at
     other `times` (s; the second argument is the step size), and changes its states; `state` also
@@ -68,14 +68,13 @@ def _moments(scene: Scene) -> Triple:
 
 
 def _gyroscopic(scene: Scene, omega: Any) -> list[Any]:
-    """Return omega x (I omega)."""
     x, y, z = omega
     a, b, c = (m * w for m, w in zip(_moments(scene), omega, strict=True))
     return [y * c - z * b, z * a - x * c, x * b - y * a]
 
 
 def _with_gyroscopic(*factors: float, applied: float = 1.0) -> Callable[[Scene], Scene]:
-    """Return a change of a scene that multiplies the torque, and the term -omega x (I omega)."""
+    """Return a change of a scene that multiplies its torque and the term -omega x (I omega)."""
 
     def changed(scene: Scene) -> Scene:
         def torque(t: Any, omega: Any) -> list[Any]:
@@ -149,7 +148,6 @@ def _with_doubled_rates(scene: Scene) -> Scene:
 
 
 def _with_fast_torque(scene: Scene) -> Scene:
-    """Return a scene in which torques vary twice as fast."""
     law = scene.law
     rate = [2.0 * x for x in law.rate]
     sines, cosines = ([(a, 2.0 * f) for a, f in waves] for waves in (law.sines, law.cosines))

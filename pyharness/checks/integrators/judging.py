@@ -81,7 +81,7 @@ class Verdict:
         return self.judged[-1].finest.control if self.judged else ""
 
     def add(self, scene: str, *checks: Check) -> None:
-        """Append checks in the scene of this name, with the command that repeats them."""
+        """Append checks in a scene, with the command that repeats them."""
         self.checks += [replace(check, again=self.again(scene)) for check in checks]
 
 
@@ -94,9 +94,9 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    ``again(name)`` returns the command that repeats the checks in a scene. ``told`` receives the
+    ``again(name)`` returns the command that repeats the checks in a scene; ``told`` receives the
     number of finished problems and the name of the next. `due` is the required order. An invalid
-    answer ends the checks. Raise InputError if the command is empty.
+    answer ends the checks. Raise InputError for an empty command.
     """
     found = Verdict(command, again)
     where = "start"
@@ -118,7 +118,8 @@ def judge_integrator(
     found.findings = recognised(found.judged)
     for each in found.findings:
         name = Name("integrator", "fault", each.name)
-        # A low order is a fault only if a higher one was requested; the checks of the order decide.
+        # A low order is a fault only if a higher one was requested, which the checks of the order
+        # decide.
         found.add("", name.judged(each.name in FIRST_ORDER, each.text))
     if found.judged and (unexplained := _unexplained(found)):
         says = "no known fault explains the failed checks"
@@ -129,8 +130,7 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow of its own motion; a low order explains why a higher one is
-    missing.
+    A fault also explains an overflow of its own motion, and a low order the lack of a higher one.
     """
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}
@@ -150,7 +150,7 @@ def _unexplained(found: Verdict) -> tuple[str, ...]:
 
 
 def judge_problem(ask: Ask, problem: Problem, due: float, found: Verdict) -> None:
-    """Append to `found` the checks in one problem; raise PortError for an invalid answer."""
+    """Append the checks in one problem to `found`; raise PortError for an invalid answer."""
     answers = []
     for level in range(LEVELS):
         motion = ask(problem.request(level), len(problem.times))

@@ -1,4 +1,4 @@
-"""Faults planted in an integrator's requests and answers, and the self-test that uses them."""
+"""Faults planted in an integrator's requests and answers, and their self-test."""
 
 import itertools
 import json
@@ -37,7 +37,7 @@ class IntegratorPlant:
     request: Callable[[dict[str, Any]], object] | None = None
     state: Callable[[State, Scene], State] | None = None
     advance: Advance | None = None
-    # What an integrator with the fault has, of `_possible`.
+    # Conditions for the fault, of `_possible`.
     needs: tuple[str, ...] = ()
 
 
@@ -170,7 +170,7 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
         motion = ask(json.dumps(asked).encode(), rows)
         if plant.state is None or (motion.attitude is None and "attitude" in plant.needs):
             return motion
-        # A fault of omega alone does not read the attitude, which may be None.
+        # Without attitudes the fault is of omega alone.
         state: Any = State(motion.omega, motion.attitude)  # type: ignore[arg-type]
         return replace(motion, **plant.state(state, scene)._asdict())
 
@@ -178,13 +178,13 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
-    """Yield the outcomes without a fault, then with each planted fault.
+    """Yield the outcome without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
-        """Return the results with a fault, the names of the recognised ones, and the failures."""
+        """Return results with a fault, names of the recognised ones, and the number of failures."""
         found = Verdict(command)
         for problem in chosen:
             asking = with_plant(ask, plant, problem.scene) if plant else ask

@@ -31,20 +31,20 @@ DRAWS = 2
 PARTS = ("omega", "attitude")
 """The parts of a state whose errors are measured."""
 _COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerances
-_EACH = 2  # coarsest steps between two requested times
-_ORDER_ONE = 1.5  # a measured order below this counts as 1
+_EACH = 2  # coarsest steps between requested times
+_ORDER_ONE = 1.5  # a smaller measured order counts as 1
 _SEVERAL = 4  # steps that must show the order 1
-_LATE = 3  # tolerances before the last that must show the order too
+_LATE = 3  # earlier tolerances that must show the order too
 _LEAST = 1e-300  # in place of an error of 0
-# An error above this many roundings, times the square root of the number of steps, is due to the
+# Above this many roundings, times the square root of the number of steps, an error is due to the
 # method.
 _ROUNDINGS = 240.0
 _BETWEEN = 8.0  # s from a row to the next
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
-# The largest step size (1/32 s) and tolerance (1e-6) of the motion.
+# Levels of the largest step size (1/32 s) and tolerance (1e-6) of the motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
 _MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # the attitude has the larger error
-_TOTAL = 3.0  # largest sum of the limits of all rows: the errors of explicit methods may grow
+_TOTAL = 3.0  # largest sum of the limits of all rows: errors of explicit methods may grow
 _MOST = 0.9  # a larger limit would pass a body that stops
 
 CHANGE = Basis(
@@ -95,7 +95,7 @@ class Problem:
         return list(motions(self.scene, self.times, self.step_size(LEVELS - 1)))
 
     def faulty_states(self, fault: Fault, level: int) -> State:
-        """Return the states of a fault in `faulty` at the step size of a level."""
+        """Return the states of one of the `faulty` at the step size of a level."""
         if fault.of_step:
             found = fault.motion(self.scene, self.times, self.step_size(level))
             assert found is not None
@@ -149,8 +149,8 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    They are proportional to the power `order` of the step size (s) or tolerance; `order` is None if
-    they are rounding.
+    They are proportional to the power `order` of the setting, a step size (s) or tolerance; `order`
+    is None if they are rounding.
     """
 
     part: str
@@ -169,7 +169,7 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the errors decrease with an order of at least 1, up to `ORDER_SLACK`."""
+        """Return whether the order of decrease is at least 1, up to `ORDER_SLACK`."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property
@@ -189,14 +189,14 @@ def convergence(
     """Return the measured order of convergence of errors above `floor`.
 
     It is the order of the last pair. With `overall`, for tolerances, whose errors decrease
-    irregularly, it is the smaller of two orders: from the first setting to the last, and from the
-    fourth last.
+    irregularly, it is the smaller of the orders from the first and from the fourth last setting to
+    the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
     if seen:
         last = seen[-1]
-        # The last tolerances alone show an error that ceases to decrease.
+        # The last ones alone show an error that ceases to decrease.
         firsts = {0, max(0, last - _LATE)} if overall else {last - 1}
         known = [k for k in firsts if math.isfinite(errors[k])]
         powers = [_power(errors[k] / errors[last], settings[k] / settings[last]) for k in known]
@@ -205,7 +205,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return p for which the ratio `errors` is the ratio `settings` to the power p."""
+    """Return the power p with `errors` = `settings`**p; both are ratios."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -242,7 +242,7 @@ class Judged:
     def error(self, level: int) -> float:
         """Return the larger error of omega (relative) and attitude (rad).
 
-        It is at least the tolerance or, with a step size, the possible rounding error.
+        It is at least the tolerance or, with a step size, the rounding error.
         """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
@@ -286,7 +286,7 @@ def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     number = next((n for n, limit in enumerate(limits) if _TOTAL / limit >= _FEWEST), -1)
     most = max(_FEWEST, _ROWS if control == "tolerance" or number < 0 else _ROWS >> number)
     if number < 0 and limits[-1] > 0.5 * limits[0]:
-        # The errors do not decrease with the step size, so that small steps would be useless.
+        # The errors do not decrease with the step size, so small steps are useless.
         return levels[0], _BETWEEN * np.arange(1.0, _FEWEST + 1.0), None
     limit = limits[number]
     rows = max(_FEWEST_COARSE, int(min(most, _TOTAL / limit)))
@@ -306,7 +306,7 @@ def drift_of(scene: Scene, times: Array, motion: Motion) -> Drift:
             there = in_space(np.vstack([[scene.attitude], motion.attitude]), vectors)
             named["direction"] = _angle(there[1:], there[:1])
             changes.append(_angle(there[1:], there[:-1]))
-        # The change from a row that is 0 or not finite is NaN, which is ignored.
+        # From a row that is 0 or not finite the change is NaN, which is ignored.
         change = np.fmax.reduce(np.concatenate(changes), initial=0.0)
     return Drift(times, named, float(change))
 
@@ -319,7 +319,7 @@ def _angle(first: Array, second: Array) -> Array:
 def growth_power(times: Array, drift: Array) -> float | None:
     """Return the power of time with which the largest drift grows.
 
-    Return None if the drift is 0 in the first quarter of the time, or not finite.
+    It is None if the drift is 0 in the first quarter of the time, or not finite.
     """
     quarter = times <= times[-1] / 4.0
     early, late = float(np.abs(drift[quarter]).max()), float(np.abs(drift).max())

@@ -91,7 +91,7 @@ def read_motion(line: bytes, rows: int) -> Motion:
         return Motion(omega, control=control, rounding=rounding)
     attitude = _rows("attitude", given["attitude"], rows, 4)
     with np.errstate(all="ignore"):
-        norms = np.hypot.reduce(attitude, axis=1)  # without squares, which would overflow earlier
+        norms = np.hypot.reduce(attitude, axis=1)  # squares would overflow earlier
         unit = attitude / norms[:, None]
     if not norms.all():
         raise PortError(f"attitude, row {int((norms == 0.0).argmax()) + 1}: all four numbers are 0")

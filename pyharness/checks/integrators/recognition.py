@@ -11,12 +11,12 @@ from pyharness.checks.compare.orders import ORDER_SLACK
 from pyharness.checks.integrators.faults import FAULTS, OUTPUTS, Fault, State
 from pyharness.checks.integrators.problem import Judged, convergence, drift_of, errors_between
 
-# A motion has a known fault if the fault explains all but this part of the error, and if the rest
-# decreases at least with this power of the step size or tolerance.
+# A fault is recognised if it explains all but this part of the error, and the rest decreases at
+# least with this power of the step size or tolerance.
 _UNEXPLAINED = 0.1
 _FALLS = 1.0 - ORDER_SLACK
 _OF_MOTIONS = 1e-10  # errors of the motions of faults
-_CONSERVED = 8.0  # rounding errors in a step, of a quantity that is conserved
+_CONSERVED = 8.0  # rounding errors in a step, of a conserved quantity
 
 FIRST_ORDER = {
     "first-order": "omega converges with order 1 only",
@@ -64,12 +64,12 @@ def _explained(judged: Judged) -> list[str]:
     converges = all(each.converges for each in true)
     if converges and judged.finest.control == "tolerance":
         return []
-    # The motion of any other fault does not converge to the true one.
+    # Other faults' motions do not converge to the true one.
     known = [(f, state) for f, state in judged.problem.faulty if f.of_step or not converges]
     both = _best(judged, known, range(len(true)))
     if both is not None:
         return [both.name]
-    # One fault of omega, and one of the returned attitude.
+    # One fault of omega, one of the attitude.
     base = None if true[0].is_higher or len(true) == 1 else _best(judged, known, range(1))
     if base is None:
         return []

@@ -1,7 +1,7 @@
 """Faults of a chosen size: which function is faulty, and how its result changes.
 
-A fault is planted in the running process, and removed when its context ends. A Python twin with a
-fault is made from a copy of the sources with one replacement.
+A fault is planted in the running process, and removed when its context ends. A faulty Python twin
+is a copy of the sources with one replacement.
 """
 
 import importlib
@@ -48,7 +48,7 @@ def instead(target: str, faulty: Faulty) -> Fault:
 
     def planted(size: float) -> AbstractContextManager[Any]:
         right = pkgutil.resolve_name(target)
-        # A lambda, unlike a partial function, can replace a method of a class.
+        # A lambda, unlike a partial function, can replace a method.
         return patch(target, lambda *rest, **named: faulty(size, right, *rest, **named))
 
     return planted
@@ -86,7 +86,7 @@ def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, An
 
 
 def change_attribute(name: str, change: Change) -> Change:
-    """Return a change of the attribute `name` of a result; it has no effect on None."""
+    """Return a change of a result's attribute; it has no effect on None."""
 
     def changed(found: Any, size: float) -> Any:
         value = getattr(found, name)
@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """A fault in a twin, the Python port of a program: a row of `data/plants.toml`."""
+    """A row of `data/plants.toml`: a faulty replacement in the Python version of a program."""
 
     file: str
     right: str
@@ -114,7 +114,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty twin, which also replaces the Fortran program if `both`."""
+    """A program with a faulty Python version, which also replaces Fortran if `both`."""
 
     module: ModuleType
     both: bool = True
@@ -131,7 +131,7 @@ class PlantedTwin(Program):
 
 
 def twin(program: str, name: str, both: bool = True) -> Fault:
-    """Return a fault in a program's twin; its context yields the program."""
+    """Return a fault in a program's Python version; its context yields the program."""
     fault = TWIN_FAULTS[name]
 
     @contextmanager

@@ -21,7 +21,7 @@ class Outcome:
     passed: bool
     failed: int
     note: str
-    has_effect: bool = True  # whether the fault changed a result
+    has_effect: bool = True  # the fault changed a result
 
     @property
     def check(self) -> Check:
@@ -37,7 +37,7 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test, which `again` repeats; `extra` are fields of its JSON."""
+    """Return the report of a self-test; `again` repeats it, `extra` are further JSON fields."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

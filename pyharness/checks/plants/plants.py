@@ -1,4 +1,4 @@
-"""Planted faults, each of which tests which checks detect it.
+"""Planted faults, which test what each check detects.
 
 Compiled programs are altered at their entry point, Python twins in a copy of their source.
 """
@@ -71,12 +71,10 @@ def _bit_off(found: Array, size: float) -> Array:
 
 
 def _third_off(found: Array, size: float) -> Array:
-    """Return vectors whose third component is multiplied by 1 - `size`."""
     return np.asarray(found * [1.0, 1.0, 1.0 - size])
 
 
 def _swapped(found: Array, size: float) -> Array:
-    """Return vectors with the first two components exchanged, if the size is not 0."""
     return found[:, [1, 0, 2]] if size else found
 
 
@@ -113,7 +111,7 @@ def _prepared(change: Callable[[Array, _Answer, float], _Answer]) -> Fault:
 
 
 def _stale_solver(size: float) -> AbstractContextManager[Any]:
-    """Return a context in which every second call of prepared solvers repeats the last result."""
+    """Return a context in which every second call of a prepared solver repeats the last result."""
     calls = itertools.count()
     before: list[_Answer] = []
 
@@ -179,7 +177,7 @@ def _shifted(
 
 
 def _wrong_card(size: float) -> AbstractContextManager[Any]:
-    """Return a context that exchanges the flags of two defects in the compiled programs."""
+    """Exchange the flags of two defects in the compiled programs."""
     known = [entry["flag"] for entry in flagged() if entry["kind"] != "reading"]
     flags = Listing.flags.fget  # type: ignore[attr-defined]
 
@@ -277,7 +275,7 @@ _DRAWS = 12
 
 
 def self_test(seed: str, record: Path) -> Iterator[Outcome]:
-    """Yield the outcomes without a fault, then with each planted fault."""
+    """Yield the outcome without a fault, then with each planted fault."""
     chosen = Selection(seed=seed, draws=_DRAWS, record=record, thin=True)
     failed, note = _failed(chosen)
     yield control(failed.total(), note)
@@ -294,7 +292,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return numbers of failed checks by kind, and a note with an id, if possible of no record."""
+    """Return numbers of failed checks by kind, and a note with an id, preferably not golden."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

@@ -1,4 +1,4 @@
-"""Faults planted in the requests to a port and in its answers, and the self-test that uses them."""
+"""Faults planted in the requests to a port and in its answers, and their self-test."""
 
 import copy
 import json
@@ -23,7 +23,7 @@ from pyharness.model.report import counted
 _MOST_CELLS = 24  # cells in which the faults are planted
 
 Row = list[float]
-# A change of a parsed request or answer in place; it changes nothing where a fault can't occur.
+# Changes a parsed request or answer in place, or nothing where a fault can't occur.
 Change = Callable[[dict[str, Any]], object]
 
 
@@ -172,7 +172,7 @@ PLANTS = (
 
 
 def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
-    """Yield the outcomes without a fault, then with each planted fault.
+    """Yield the outcome without a fault, then with each planted fault.
 
     Without valid answers, only a failed control is yielded.
     """
@@ -185,7 +185,7 @@ def self_test(command: str, cells: Sequence[Cell]) -> Iterator[Outcome]:
 
 
 def _chosen(cells: Sequence[Cell]) -> list[Cell]:
-    """Return at most `_MOST_CELLS` runs, a sample of all programs, listings and cases."""
+    """Return a sample of the runs, at most `_MOST_CELLS`, of all programs, listings and cases."""
     order = random.Random("self-test").sample(range(len(cells)), len(cells))
     found: dict[tuple[object, ...], int] = {}
     for n in order:
@@ -214,7 +214,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
                 has_changed = faulty != right
                 asked = json.dumps(faulty).encode()
                 faulty = _parsed(process.ask(asked)) if has_changed else answer
-            # Compared as text, because NaN differs from itself, and zeros have a sign.
+            # As text, because NaN differs from itself, and zeros have a sign.
             if json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True):
                 continue
             changed += 1

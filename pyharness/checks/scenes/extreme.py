@@ -1,7 +1,4 @@
-"""Extreme scenes with end times, in five named groups, the suites.
-
-Only one scene has a torque: Case 6 of the thesis.
-"""
+"""Extreme scenes with end times, in five named groups, the suites."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -39,9 +36,8 @@ def _stepped(name: str, scene: Scene, time: float) -> Circumstance:
     return Circumstance(name, in_steps(scene, time), time)
 
 
-# Moments of a body for motions near the separatrix. A = C = 1/2 are exact in binary64, so that
-# equal perturbations about axes 1 and 3 give a motion on the separatrix, where the body flips only
-# once.
+# Moments for motions near the separatrix. A = C = 1/2 are exact in binary64, so equal perturbations
+# about axes 1 and 3 start on the separatrix, where the body flips only once.
 MIDDLE_AXIS = (6.0, 5.0, 2.0)
 _A, _B = 0.5, 0.8
 _FLIPS = 5
@@ -49,8 +45,7 @@ _FLIPS = 5
 
 def quarter(disturbance: float) -> float:
     """Return a quarter of the period (s) from omega = (`disturbance`, 1, 0) rad/s."""
-    # The quarter period is the complete elliptic integral K(k) over the frequency, computed by the
-    # arithmetic-geometric mean.
+    # The complete elliptic integral K(k) over the frequency, by the arithmetic-geometric mean.
     mean, other = math.sqrt(_A * _A + _A * _B * disturbance**2), math.sqrt(_A * _B) * disturbance
     while mean - other > 1e-9 * mean:
         mean, other = 0.5 * (mean + other), math.sqrt(mean * other)
@@ -62,13 +57,12 @@ def _separatrix() -> Iterator[Circumstance]:
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
     end times are before the first flip, and in the first and the fifth. Other scenes start on the
-    separatrix, where the body flips only once.
+    separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
-        # Most end times are in the middle of a flip, where omega changes fastest and errors are
-        # largest.
+        # Mostly in the middle of a flip, where omega changes fastest and errors are largest.
         for name, omega, time in (
             ("early", beside, min(14.0, 0.75 * flip)),
             ("flip", beside, flip),
@@ -79,7 +73,7 @@ def _separatrix() -> Iterator[Circumstance]:
             yield _stepped(f"{name}-{d:.0e}", scene, time)
 
 
-# In binary64, 1 - 1e-16 is rounded to the largest number below 1.
+# 1 - 1e-16 is rounded to the largest number below 1.
 _DIFFERENCES = (*(10.0**-k for k in range(1, 17)), 0.0)
 SYMMETRIC_START = (0.3, 0.9, -0.7)
 _SHORT, LONG = 20.0, 1e6  # s
@@ -93,8 +87,7 @@ def _near_symmetry() -> Iterator[Circumstance]:
             ("small-pair", (1.5, 1.0, near), _SHORT),
             ("large-pair", (1.0, near, 0.6), _SHORT),
             ("large-pair-long", (1.0, near, 0.6), LONG),
-            # The nearer the body is to a sphere, the slower omega changes. The end time is chosen
-            # so that omega changes by the same phase in all these scenes.
+            # Near a sphere omega changes slowly; its phase changes equally in all these scenes.
             ("sphere", (1.0, near, 1.0 - 2.0 * difference), _SHORT / (difference or 1.0)),
         ):
             scene = Scene(f"near symmetry, {name}, {size}", SYMMETRIC_START, moments=moments)
@@ -103,13 +96,12 @@ def _near_symmetry() -> Iterator[Circumstance]:
 
 _SHAPED = (0.3, 1.0, -0.6)
 _RADIANS = 20.0
-# Orders of the three moments. With these orders each moment occurs about each axis, and there are
-# even and odd permutations.
+# Each moment occurs about each axis, in even and odd permutations.
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
-    # In the ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The two large moments of the uneven bodies
-    # differ by about half of the largest difference that a body can have.
+    # Ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The large moments of the uneven bodies differ by
+    # about half of the largest possible difference.
     "needle": (1.0, 1.0, 1e-12),
     "uneven-needle": _NEEDLE,
     "coin": (1.0, 1e12, 1e12),
@@ -134,12 +126,11 @@ def _shapes() -> Iterator[Circumstance]:
             order = "".join(str(axis + 1) for axis in axes)
             scene = Scene(f"{name} {order}", _SHAPED, moments=(first, second, third))
             a, b, c = map(math.sqrt, map(abs, scene.euler_coefficients))
-            # The rates of small motions about the three axes (rad/s). The end time is such that the
-            # fastest of them advances by _RADIANS.
+            # Rates of small motions about the three axes (rad/s); the fastest advances by _RADIANS.
             rates = zip((b * c, c * a, a * b), scene.omega, strict=True)
             time = _RADIANS / max(w * abs(own) for w, own in rates)
             yield _stepped(f"{name}-{order}", scene, time)
-    # Case 6 has torques, for which there is no closed form.
+    # The only scene with a torque; it has no closed form.
     yield Circumstance("case-6", case_scene(6), 1.0)
 
 

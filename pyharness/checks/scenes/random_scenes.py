@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Defects added later are drawn last, so that the draws of a seed do not change.
+# Drawn last, so that the draws of a seed do not change.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")
@@ -27,11 +27,11 @@ MODERATE = ("free", "constant", "wave")
 class Draw:
     """The random inputs of one check: a scene, a program, and parameters of the runs."""
 
-    scene: Scene  # in odd draws a difficult scene, named by its kind in `NASTY`
+    scene: Scene  # in odd draws a difficult one, named by its kind in `NASTY`
     listing: Listing  # of any program, with random defects and readings
-    lipschitz: float  # constant of the stop test (1/s)
+    lipschitz: float  # of the stop test (1/s)
     may_stop: bool
-    digits: float  # 0 for the coarsest tolerance, 1 for the finest tolerance of a method
+    digits: float  # from 0 (coarsest tolerance) to 1 (a method's finest)
     backward: bool  # whether a method integrates to negative times
     stages: int  # of Gauss collocation
 
@@ -53,7 +53,7 @@ def weekly_seed(day: datetime.date | None = None) -> str:
 
 def draw(seed: str, number: int) -> Draw:
     """Return the random inputs of check `number`, the same in all versions of Python."""
-    # A generator for each draw, so that it can be repeated alone.
+    # For each draw, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
     scene = _plain(source)
     if number % 2 == 1:
@@ -77,7 +77,7 @@ def draw(seed: str, number: int) -> Draw:
 
 
 def text_generator(seed: str) -> np.random.Generator:
-    """Return NumPy's random generator with a text as seed."""
+    """Return NumPy's random generator for a text as seed."""
     return np.random.default_rng([ord(letter) for letter in seed])
 
 
@@ -193,7 +193,7 @@ def _many_speeds(source: Random) -> Scene:
         some[source.randrange(2)].append((_vector(source, amplitude), frequency))
     sines, cosines = some
     if source.random() < 0.2:
-        # The same frequencies in sines and cosines, which methods may combine.
+        # Methods may combine equal frequencies of sines and cosines.
         cosines = sines
     start, law = source.choice((0.0, 0.01, 1.0)), TorqueLaw(sines=sines, cosines=cosines)
     return replace(scene, omega=np.multiply(start, scene.omega).tolist(), torque=law)
@@ -203,7 +203,7 @@ def _far_scale(source: Random) -> Scene:
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
-        # The rate of a torque scales with the cube, and would overflow or underflow.
+        # A torque's rate scales with the cube, and would overflow or underflow.
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
@@ -314,7 +314,6 @@ def _scene(
     size = (max(moments) if moments else 10.0) * source.uniform(0.1, 2.0)
     kind = source.randrange(4) if torque else 0
     if kind < 3:
-        # None, a constant, or a constant and a rate.
         vectors: list[Any] = [_vector(source, size) for _ in range(kind)]
         law = TorqueLaw(*vectors)
     else:

@@ -1,7 +1,7 @@
 """Random scenes with torques that depend on omega or attitude, reproducible from a seed.
 
-Torques are sums of recorded functions or of ready-made terms. They are proportional to the
-gyroscopic torque, so that they affect slow and fast bodies alike. End times may be negative.
+Torques are sums of recorded functions or of ready-made terms, proportional to the gyroscopic
+torque, so that they affect slow and fast bodies alike. End times may be negative.
 """
 
 from collections.abc import Callable
@@ -22,16 +22,15 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
-# A torque over the size of the moments, as a function of t, omega and attitude, for symbols or
-# numbers.
+# A torque over the size of the moments, from t, omega and attitude, as symbols or numbers.
 Term = Callable[[Any, Any, Any], Any]
 Body = tuple[float, list[float], float]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
-# Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
+# These change within a small range of time or omega, and are constant or nearly 0 elsewhere.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
-TIMED = ("table", "pulses")  # ready terms that depend on time alone
+TIMED = ("table", "pulses")  # depend on time alone
 READY = (
     *("damping", "drag", "rate_control", "attitude_control", "wheels", "gravity_gradient"),
     *("magnetic_dipole", "magnetic_damping", "in_space", *TIMED),
@@ -86,7 +85,7 @@ def _moving(
 
 
 def ready(source: Random, name: str, moments: list[float], speed: float) -> StateTorque:
-    """Return a ready-made term with random arguments, similar in size to the gyroscopic torque."""
+    """Return a ready-made term with random arguments, about as large as the gyroscopic torque."""
     part = max(moments) * speed * source.uniform(0.05, 1.0)
     vector = [source.uniform(-1.0, 1.0) for _ in range(3)]
     several = [source.uniform(0.1, 0.5) * part for _ in range(3)]
@@ -109,7 +108,6 @@ def ready(source: Random, name: str, moments: list[float], speed: float) -> Stat
 
 
 def _of_time(source: Random, size: float, length: float, count: int) -> StateTorque:
-    """Return a table of 12 values, or 6 pulses."""
     times = np.cumsum([source.uniform(0.1, 3.0) * length for _ in range(12)]) - 3.0 * length
     values = [[source.uniform(-size, size) for _ in range(3)] for _ in range(count)]
     if count == 6:

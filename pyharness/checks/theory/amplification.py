@@ -2,15 +2,15 @@
 
 A perturbation x of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
 multiplies x by a matrix of polynomials in z, which is h times an eigenvalue of J, or hJ itself. The
-coefficients are exact fractions. The matrix has m rows for the m vectors that a program propagates.
-In the original Runge-Kutta program these are two: the result, and U(1), at which the first stage is
+coefficients are exact fractions. The matrix has m rows for the m vectors that a program propagates:
+two in the original Runge-Kutta program, the result, and U(1), at which the first stage is
 evaluated.
 
-A region of linear stability in the plane of z is where the spectral radius is at most 1.
+A program is linearly stable where the spectral radius is at most 1, a region in the plane of z.
 
 A collocation program evaluates the right-hand side along a straight line, its first estimate, and
-corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F). Here F is its
-value at s = 0, and Q its quadratic part.
+corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F), with its value F
+at s = 0 and its quadratic part Q.
 """
 
 from dataclasses import dataclass
@@ -33,23 +33,23 @@ from pyharness.model.trajectory import Array
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A stability boundary nearer to z = 0 than this counts as being at z = 0.
+# A stability boundary nearer to z = 0 counts as being there.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
-# Samples of z: smallest value, largest value, and number of values. The rectangle of _REAL and
-# _IMAGINARY contains all stability boundaries. _DISTANCES are distances of imaginary z from 0.
+# Samples of z: smallest, largest, and number. The rectangle of _REAL and _IMAGINARY contains all
+# stability boundaries; _DISTANCES are along the imaginary axis.
 _REAL = (-4.6, 1.4, 301)
 _IMAGINARY = (-3.6, 3.6, 361)
 _DISTANCES = (1e-3, 4.0, 181)
-_HIDDEN = 1e-13  # largest growth that is regarded as a rounding error
+_HIDDEN = 1e-13  # largest growth regarded as rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Amplification:
     """The matrix of polynomials in z by which one step multiplies a perturbation."""
 
-    # fractions, shape (m, m, 5): the coefficients of 1, z, ..., z**4 of each element. The last row
-    # is for the result of the step, the other rows for vectors such as U(1).
+    # Fractions, shape (m, m, 5): coefficients of 1, z, ..., z**4. The last row is for the result of
+    # the step, the others for vectors such as U(1).
     coefficients: Fractions
 
     @property
@@ -69,7 +69,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without row and column of the step's result, if possible.
 
-        It is possible if only the new result depends on the old, by a factor that is free of z.
+        It is possible if only the new result depends on the old, by a factor free of z.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -92,10 +92,9 @@ class Amplification:
 
 
 def amplification(listing: Listing, step: int = 1) -> Amplification:
-    """Return the amplification matrix of step `step` of a program.
+    """Return the amplification matrix of step `step` (from 1) of a program.
 
-    `step`, from 1, matters only with the defect `dt-accumulates`, which moves the collocation
-    points.
+    The step matters only with the defect `dt-accumulates`, which moves the collocation points.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -137,7 +136,7 @@ def _runge_kutta(listing: Listing) -> Amplification:
     matrix = np.array([kept, result], dtype=object)
     if listing.has("base-not-restored"):
         return Amplification(matrix)
-    # U(1) and the base are the same vector, whose columns are added.
+    # U(1) and the base are the same vector; their columns are added.
     return Amplification(matrix[1:].sum(axis=1, keepdims=True))
 
 
@@ -185,10 +184,10 @@ def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
 class Region:
     """The spectral radius of an amplification matrix on a grid of z and on the imaginary axis."""
 
-    name: str  # a text that names the programs and methods that have this matrix
-    # shape (imaginary, real); spectral radius on the grid, of the matrix from `moving`
+    name: str  # the programs and methods with this matrix
+    # Spectral radius on the grid, of the matrix from `moving`; shape (imaginary, real).
     radius: Array
-    # spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if it is only rounding
+    # Spectral radius minus 1 at `Regions.distances` on the imaginary axis; 0 if only rounding.
     growth: Array
 
 
@@ -196,11 +195,11 @@ class Region:
 class Regions:
     """The stability regions, where the spectral radius is at most 1, on one grid of z."""
 
-    # real and imaginary parts of z on the grid in the complex plane
+    # Real and imaginary parts of z on the grid.
     real: Array
     imaginary: Array
-    distances: Array  # distances of samples of z from 0, along the imaginary axis
-    regions: tuple[Region, ...]  # in the order in which they are drawn
+    distances: Array  # of samples of z from 0, along the imaginary axis
+    regions: tuple[Region, ...]  # in the order of drawing
 
 
 def regions() -> Regions:

@@ -19,8 +19,8 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
 ROUNDING = 2.0**-53
-# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in magnitude exceeds
-# 4 c sqrt(n) with a probability of at most 2 exp(-8), whatever their distribution.
+# Hoeffding 1963: a sum of n independent terms of mean 0 and at most c in magnitude exceeds 4 c
+# sqrt(n) with a probability of at most 2 exp(-8).
 DEVIATIONS = 4.0
 LAWS = {"energy": 0.5, "momentum": 0.5, "phase": 1.5}  # powers of the number of steps
 _SAMPLES = 256
@@ -41,12 +41,12 @@ POWER = Basis(
 
 @dataclass(frozen=True)
 class Noise:
-    """Bounds on the rounding and truncation errors of a step, over the largest abs(omega)."""
+    """Bounds on the errors of a step, over the largest abs(omega)."""
 
-    step: float  # step size, s
-    rounding: float  # bound of the rounding error, whose sign is random
-    truncation: float  # bound of the truncation error, which may have a bias
-    # whether truncation conserves energy and momentum, so that it affects the phase alone
+    step: float  # s
+    rounding: float  # bound of the rounding error, of random sign
+    truncation: float  # bound of the truncation error, possibly biased
+    # truncation conserves energy and momentum, and affects the phase alone
     conserves: bool
 
 
@@ -54,15 +54,15 @@ class Noise:
 class Orbit:
     """Samples of one torque-free motion, and factors for error bounds."""
 
-    # samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
-    # (rad/s2), and the Jacobian of this derivative with respect to omega (1/s)
+    # Samples along the motion, shapes (n, 3), (n, 3), (n, 3, 3): omega (rad/s), its time derivative
+    # (rad/s2), and the Jacobian of that (1/s).
     states: Array
     slopes: Array
     jacobians: Array
     largest: float  # largest abs(omega), rad/s
     frequency: float  # of the motion about the polhode: 2 pi over the period (rad/s)
-    # largest factors from an error of omega, over `largest`, to the errors of energy and momentum
-    # (both relative) and of the frequency (rad/s)
+    # Largest factors from an error of omega, over `largest`, to the errors of energy and momentum
+    # (both relative) and of the frequency (rad/s).
     gains: dict[str, float]
     turn: float  # largest factor from an error of omega, over `largest`, to a phase error (rad)
 
@@ -70,12 +70,12 @@ class Orbit:
         """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # The result is rounded once more. A, B and C have two rounding errors each, which change
-        # the conserved quantities by at most four rounding errors of the energy at any time.
+        # The result is rounded once more. The two roundings in each of A, B, C change the conserved
+        # quantities by at most four roundings of the energy.
         lost = walk + (0.0 if noise.conserves else drift) + ROUNDING
         conserved = ("energy", "momentum")
         found = {name: lost * self.gains[name] + 4.0 * ROUNDING for name in conserved}
-        # An error in step k of n shifts the frequency for n - k steps. The sum of (n - k)**2 is
+        # An error in step k of n shifts the frequency for n - k steps; the sum of (n - k)**2 is
         # near n**3 / 3.
         shear = self.gains["frequency"] * noise.step
         late = walk * steps / math.sqrt(3.0)
@@ -104,8 +104,7 @@ def orbit(scene: Scene) -> Orbit:
         weight = moments**power
         total = (weight * states**2).sum(axis=1)
         part = (weight * np.abs(states)).sum(axis=1) * largest / total
-        # A relative error of omega counts twice in the energy, a quadratic form, and once in the
-        # momentum, the root of one.
+        # The energy is a quadratic form of omega, the momentum the root of one.
         gains[name] = float(part.max()) * (2.0 if name == "energy" else 1.0)
     gains["frequency"] = largest * max(_steepness(a, state) for state in states)
     along = jacobians(scene, states)

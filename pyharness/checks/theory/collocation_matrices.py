@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
-LEQT1F is the linear solver of the collocation programs. Every float is a fraction, so that exact
-solutions are computed in fractions. `program` is "two-term" or "four-term".
+LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
+are computed in fractions; every float is one.
 """
 
 import math
@@ -21,7 +21,7 @@ Exact = list[list[Fraction]]
 Fractions = NDArray[np.object_]
 
 _UNIT = Fraction(1, 2**53)
-# The collocation points of each program, at which the residual is zero, in units of the step size.
+# Collocation points in units of the step size.
 PARTS = {
     "two-term": (Fraction(1, 3), Fraction(2, 3)),
     "four-term": (Fraction(1, 5), Fraction(2, 5), Fraction(3, 5), Fraction(4, 5)),
@@ -45,10 +45,10 @@ SINGULARITY = Basis(
     "the last pivot of exact elimination, evaluated in binary64 (`theory/collocation_matrices.py`)",
 )
 """Basis of limits that follow from `singular_below`."""
-# Within this range of nonzero elements, no operation on a system of at most four equations
-# underflows or overflows. A product of two elements is at least 2**-300, so that its rounded value
-# is a multiple of 2**-352. In forward substitution every further product costs 202 binary digits,
-# so that each unknown is 0 or at least 2**-756. It is at most 2**600.
+# Range of nonzero elements in which at most four equations neither underflow nor overflow. A
+# product of two elements is at least 2**-300, and rounded a multiple of 2**-352. In forward
+# substitution every further product costs 202 binary digits, so each unknown is 0 or at least
+# 2**-756; it is at most 2**600.
 _RANGE = 2.0**-150, 2.0**150
 
 
@@ -90,26 +90,25 @@ def collocation_matrix(points: Sequence[Fraction]) -> Fractions:
 class Solved:
     """LEQT1F's accuracy for A X = B with one collocation matrix and six right-hand sides."""
 
-    ier: int  # IER, the error code of the compiled solver: 0, or 129 for a singular matrix
-    differing: int  # count of elements of X, and IER, in which Fortran and the Python twin differ
-    # exact condition numbers in the row-sum norm: of the matrix, and of the matrix with each column
-    # divided by its largest element
+    ier: int  # of the compiled solver: 0, or 129 for a singular matrix
+    differing: int  # elements of X, and IER, that differ between Fortran and Python
+    # Exact condition numbers in the row-sum norm: of the matrix, and with each column divided by
+    # its largest element.
     condition: float
     scaled_condition: float
-    # norm of abs(L) abs(U) over the norm of the matrix; in both, each column is divided by the
-    # largest element of the matrix in that column
+    # Norm of abs(L) abs(U) over the norm of the matrix, both with the columns divided by the
+    # matrix's largest elements.
     growth: float = math.nan
-    order: tuple[int, ...] = ()  # the rows in the order in which they became pivots
-    # largest relative amount by which a chosen pivot is below the largest pivot candidate, and the
-    # largest such amount that rounding may cause
+    order: tuple[int, ...] = ()  # rows in the order of becoming pivots
+    # Largest relative shortfall of a pivot from the best candidate: found, and possible by
+    # rounding.
     pivoting: tuple[float, float] = (0.0, 0.0)
-    # ratios of errors to their bounds, the largest of all right-hand sides (Higham 2002, theorem
-    # 9.4): for the residual of A X = B, for the elements of X, and for the increment of an unknown
-    # over a step
+    # Largest ratios of errors to their bounds (Higham 2002, theorem 9.4): of the residual of A X =
+    # B, the elements of X, and the increment of an unknown over a step.
     residual: float = math.nan
     forward: float = math.nan
     increment: float = math.nan
-    # error of the increment, over the step size times the largest element of the right-hand side
+    # Error of the increment, over the step size times the largest element of the right-hand side.
     increment_error: float = math.nan
     yardstick: float = math.nan  # `forward` for `numpy.linalg.solve` instead of LEQT1F
 
@@ -128,7 +127,7 @@ def solved(program: str, step: float) -> Solved:
     matrix = collocation.collocation_matrix(points(program, step))
     count = len(matrix)
     places = np.arange(count)
-    # Six right-hand sides, three regular and three random.
+    # Three regular, three random.
     rough = np.random.default_rng(count).normal(size=(3, count))
     sides = np.array([np.ones(count), places / count, (-1.0) ** places, *rough])
     factors, found, ier = extension().solve_linear(*map(np.asfortranarray, (matrix, sides.T)))
@@ -144,7 +143,7 @@ def solved(program: str, step: float) -> Solved:
         return Solved(ier, differing, condition, scaled_condition)
     lower = fractions(np.tril(factors, -1) + np.eye(len(factors)))
     upper = fractions(np.triu(factors))
-    # Each row of L U equals a row of the matrix except for rounding.
+    # A row of L U equals a row of the matrix except for rounding.
     order = tuple(int(abs(exact[:, 1] - row[1]).argmin()) for row in lower @ upper)
     sizes = abs(lower) @ abs(upper)
     growth = float(norm(sizes / columns) / norm(scaled))
@@ -168,8 +167,8 @@ def solved(program: str, step: float) -> Solved:
             total, power = 0.0, step
             for c in solution:
                 total, power = total + c * power, power * step
-            # At most three roundings in a power of the step size, one in its product with the
-            # coefficient c, and n in the sum.
+            # At most three roundings in a power of the step size, one in its product with c, and n
+            # in the sum.
             bound = powers @ (reach + gamma(count + 4) * abs(x))
             missed = abs(Fraction(total) - powers @ truth)
             pairs = (abs(exact @ x - b), allowed), (abs(truth - x), reach), ([missed], [bound])
@@ -178,8 +177,8 @@ def solved(program: str, step: float) -> Solved:
         return [max(each) for each in zip(*every, strict=True)]
 
     residual, forward, increment, increment_error = errors(found)
-    # The hypotheses of theorem 9.4: no operation underflows or overflows, and L and U are factors
-    # of the rows in `order`, within the errors of theorem 9.3.
+    # Theorem 9.4 holds if no operation underflows or overflows, and L and U are factors of the rows
+    # in `order`, within the errors of theorem 9.3.
     operands = [matrix, factors, sides, found, [step, step**count]]
     elements = np.abs(np.concatenate([np.ravel(each) for each in operands]))
     elements = elements[elements != 0.0]
@@ -195,7 +194,7 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return a step (s) so small that each row's largest element is 1, and the matrix."""
+    """Return the matrix of a step (s) so small that each row's largest element is 1."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
@@ -206,9 +205,8 @@ def solver_roundings(program: str) -> tuple[float, float]:
     Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
     points, where only c1 is not zero. The second, times the relative deviation, is for deviations
     from equal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for n points (Higham
-    2002, theorem 9.4). L and U are the factors of the matrix, X is the solution, and powers are
-    those of the step size. The bounds do not depend on the step size as long as each row's largest
-    element is 1.
+    2002, theorem 9.4), with the factors L and U, the solution X and the powers of the step size.
+    They do not depend on the step size as long as each row's largest element is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -260,7 +258,7 @@ def _share(error: Fraction, bound: Fraction) -> float:
     if not error or not bound:
         return math.inf if error else 0.0
     ratio = error / bound
-    # A ratio above 1 must not be rounded to 1, so that its comparison with 1 is exact.
+    # A ratio above 1 must not be rounded to 1.
     return max(float(ratio), math.nextafter(1.0, 2.0)) if ratio > 1 else float(ratio)
 
 
@@ -275,7 +273,7 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
-        # Both candidates of a comparison have the rounding errors of a sum and a scale.
+        # Both have the rounding errors of a sum and a scale.
         wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)

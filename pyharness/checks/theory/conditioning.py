@@ -29,14 +29,14 @@ from pyharness.model.tape_arrays import table_values
 from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
-# Bound of the number of roundings in a right-hand side of Euler's equations: two in each of A, B,
-# C, two in the products, and those of the sums.
+# Roundings in a right-hand side of Euler's equations, at most: two in each of A, B, C, two in the
+# products, and those of the sums.
 _ROUNDINGS = 8.0
-# Rounding error of an attitude (rad), twice the rounding error of a component of the quaternion,
-# which has some twenty roundings.
+# Rounding error of an attitude (rad), twice that of a quaternion's component, which has some twenty
+# roundings.
 ATTITUDE = 40.0 * ROUNDING
-# Largest error amplification at which a method's error must be at most its tolerance. Beyond it,
-# the tolerance is amplified.
+# Up to this amplification a method's error must be at most its tolerance; beyond, the tolerance is
+# amplified.
 LIVELY = 1e3
 FLOW = Basis(
     "derived",
@@ -56,24 +56,23 @@ class Conditioning:
     The limits contain `made`, the sum of the errors allowed in the steps (relative, or rad), and
     rounding errors. `limit` amplifies `made`, and is at most 2, because components up to `largest`
     differ by no more; its `steps` is the number of roundings of omega, 0 with compensated
-    summation. `angle_limit` contains the angle that results if omega has its largest rounding error
-    at all times.
+    summation. `angle_limit` assumes that omega has its largest rounding error at all times.
     """
 
-    # largest factor from an error of omega at any time to the error at the end, at least 1
+    # Largest factor, at least 1, from an error of omega at any time to the error at the end.
     amplification: float
-    # error at the end over `largest` if every term of the right-hand side, the initial omega and
-    # the result are wrong by a few roundings of their own magnitude, in the worst direction
+    # Final error over `largest` if every term of the right-hand side, the initial omega and the
+    # result are wrong by a few roundings, in the worst direction.
     rounding: float
-    storing: float  # error at the end over `largest`, caused by each step that rounds omega
-    # NaN allows no error.
+    storing: float  # final error over `largest` from each step that rounds omega
+    # Sum of the terms' rounding errors over `largest`, without amplification.
     unamplified: float
-    largest: float  # largest magnitude of any component of omega until the end (rad/s)
+    largest: float  # largest abs(omega) until the end (rad/s)
 
     def limit(self, made: float, steps: float = 0.0) -> float:
         """Return the largest final error that omega may have, over `largest`."""
         allowed = made * self.amplification + self.rounding + steps * self.storing
-        # If the limit is NaN, no error is allowed.
+        # NaN allows no error.
         return 0.0 if math.isnan(allowed) else min(2.0, allowed)
 
     def angle_limit(self, made: float, time: float) -> float:
@@ -88,7 +87,7 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
     Raise InputError if the solution grows without bound before, if it would be needed at too many
     times, or if the amplification exceeds binary64.
     """
-    # Near the separatrix a numerical integration would deviate from the solution after a few turns.
+    # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
 
     def sample(times: Array) -> tuple[float, tuple[Array, bool]]:
@@ -124,16 +123,16 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results there; those at the times
-    returned are returned too. Raise InputError if more than `most` intervals would be needed;
-    `fewest` are tried first.
+    `sample` returns the largest rate (1/s) at given times, and results; those at the final times
+    are returned too. Raise InputError if more than `most` intervals are needed; `fewest` are tried
+    first.
     """
     count = fewest
     while True:
         times = np.linspace(0.0, time, count + 1)
         rate, found = sample(times)
         wanted = rate * abs(time) * _NODES_PER_RADIAN
-        # `wanted` is NaN where the torque is singular, or very large numbers have no product.
+        # NaN where the torque is singular, or very large numbers have no product.
         if not wanted <= most:
             raise InputError(
                 "conditioning: the motion is too fast for so long a time; use a shorter time"
@@ -156,14 +155,14 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # Initial state and result are rounded once each, even in a very short time.
+    # Both ends are rounded once, even in a very short time.
     ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())
     found = Conditioning(
         amplification=growth(flow),
         rounding=_ROUNDINGS * ROUNDING * float((gathered(source) + ends).max()) / largest,
-        # The product of the divisors might underflow.
+        # The divisors' product might underflow.
         storing=ROUNDING * float(gathered(np.abs(state)).max()) / span / largest,
         unamplified=_ROUNDINGS * ROUNDING * (unamplified / largest + 2.0),
         largest=largest,
@@ -176,8 +175,8 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     """Return the sums of magnitudes of the terms of Euler's equations (1/s2), shape (n, 3).
 
-    A sine or cosine is multiplied by 1 plus its angle, because the angle's rounding error is
-    proportional to the angle.
+    A sine or cosine is multiplied by 1 plus its angle, to which the angle's rounding error is
+    proportional.
     """
     products = np.abs(np.roll(omega, -1, 1) * np.roll(omega, -2, 1))
     products *= np.abs(scene.euler_coefficients)
@@ -189,7 +188,7 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     return np.asarray(products + torque / moments)
 
 
-# A component of the quaternion is half an angle (rad).
+# A quaternion's component is half an angle (rad).
 _OF_ANGLE = 0.5
 
 
@@ -250,7 +249,7 @@ def _sources(tape: Tape, times: Array, state: Array) -> Array:
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
         found = evaluate(tape, given, _BOUNDS)
-    # An output that is a constant is a number.
+    # A constant output is a number.
     errors = [_bounded(each).error for each in found]
     return np.stack([np.broadcast_to(each, len(times)) for each in errors], axis=1)
 

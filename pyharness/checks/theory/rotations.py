@@ -5,8 +5,8 @@ small perturbation proportional to exp(Q t). Let A, B, C be the coefficients of 
 and M = N / I torque over moment. Then (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3.
 The rates Q (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-Below, `share` is the initial perturbation over the rotation. A place is a pair of a description and
-omega (rad/s). Only some members of a continuous family are reported.
+Below, `share` is the initial perturbation over the rotation. Of a continuous family only some
+members are reported.
 """
 
 import cmath
@@ -22,18 +22,18 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Array
 
 Rates = tuple[complex, complex, complex]
-Places = list[tuple[str, Triple]]  # steady rotations: a description, and omega (rad/s)
+Places = list[tuple[str, Triple]]  # description and omega (rad/s) of steady rotations
 
-# Points shown of a hyperbola of steady rotations: ratios of a component of omega to its value at
-# the vertex.
 _OVERFLOWS = (
     "rotations: a steady rotation or its rates overflow; use a smaller omega or torque, or moments "
     "nearer to each other"
 )
+# Shown points of a hyperbola of steady rotations: a component of omega over its value at the
+# vertex.
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
-# Error at which the linear approximation is regarded as invalid: relative to the perturbation, or
-# as a phase in rad.
+# The linear approximation is invalid at this error: relative to the perturbation, or a phase in
+# rad.
 OFF = 0.1
 
 
@@ -41,14 +41,14 @@ OFF = 0.1
 class SteadyRotation:
     """A steady rotation of a scene, and the development of a small perturbation."""
 
-    place: str  # a description: an axis, a point of a hyperbola, ...
-    omega: Triple  # of the steady rotation, rad/s
-    rates: Rates  # the three Q of equation 32 (1/s), the fastest growth first
-    # whether no small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t
+    place: str  # an axis, a point of a hyperbola, ...
+    omega: Triple  # rad/s
+    rates: Rates  # Q of equation 32 (1/s), the fastest growth first
+    # No small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t.
     stable: bool
-    # shortest time (s) between flips of the perturbed motion; None if it does not flip
+    # Shortest time (s) between flips of the perturbed motion; None without flips.
     flip_interval: float | None
-    # earliest time (s) at which the linear approximation has the error `OFF`; None if it is unknown
+    # Earliest time (s) at which the linear approximation has the error `OFF`, if known.
     linear_until: float | None
 
     @property
@@ -68,8 +68,8 @@ class SteadyRotation:
 class SteadyRotations:
     """The steady rotations of a scene, perturbed by the same relative magnitude."""
 
-    told: str  # text: which steady rotations exist, and which of them are shown
-    disturbance: float  # magnitude of the perturbation over the magnitude of the rotation
+    told: str  # text: which steady rotations exist, and which are shown
+    disturbance: float  # perturbation over rotation
     rotations: tuple[SteadyRotation, ...]
 
 
@@ -96,12 +96,12 @@ def rates(coefficients: Triple, omega: Triple) -> Rates:
     size = max(map(abs, omega))
     if size == 0.0:
         return 0j, 0j, 0j
-    # Components are scaled to at most 1, so that their products do not overflow.
+    # Components of at most 1, whose products do not overflow.
     (a, b, c), (x, y, z) = coefficients, (w / size for w in omega)
     terms = (b * c * x * x, c * a * y * y, a * b * z * z)
     slope, half = sum(terms), a * b * c * x * y * z
     if abs(slope) <= 16.0 * ROUNDING * sum(map(abs, terms)):
-        slope = 0.0  # the terms cancel, and their sum is only rounding
+        slope = 0.0  # the terms cancel to rounding
     roots = sorted(_roots(slope, half), key=lambda q: (-q.real, -q.imag))
     first, second, third = (size * q + 0j for q in roots)  # no -0.0
     return first, second, third
@@ -112,7 +112,7 @@ def _roots(slope: float, half: float) -> Rates:
     if half == 0.0:
         root = cmath.sqrt(slope)
         return root, 0j, -root
-    # The root with the sign of `half` is simple, and its formula has no cancellation.
+    # The root with the sign of `half` is simple; its formula has no cancellation.
     unit = math.sqrt(abs(slope) / 3.0)
     ratio = abs(half) / unit**3 if unit**3 > 0.0 else math.inf
     if math.isinf(ratio):
@@ -138,7 +138,7 @@ def _rotation(scene: Scene, place: str, omega: Triple, disturbance: float) -> St
     found = rates(scene.euler_coefficients, omega)
     if not np.isfinite([*matrix.flat, *found]).all():
         raise InputError(_OVERFLOWS)
-    # The sum of the rates is 0. If all are 0, but the Jacobian is not, a perturbation grows like t.
+    # The rates have the sum 0. If all are 0, but not the Jacobian, a perturbation grows like t.
     stable = found[0].real <= 0.0 and (any(found) or not matrix.any())
     flips: float | None = None
     until: float | None = None
@@ -163,7 +163,7 @@ def _growing(
     Linear theory is valid until then. The time is infinite if these terms are zero, and None if
     they exceed binary64. `rate` is the fastest Q, `matrix` the Jacobian (1/s).
     """
-    # The eigenvector of `rate` is the null vector of the matrix less the rate.
+    # The eigenvector of `rate`.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
     second = 0.0
     for twice, other in ((2.0 * rate, grows), (2.0 * rate.real, grows.conj())):
@@ -200,7 +200,7 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
     where K is the complete elliptic integral with the complementary modulus k', and lambda is near
     the growth rate. For a small perturbation it is near (2 / lambda) ln(4 / k'). It is shortest for
-    a perturbation along the other axis with the smaller coefficient. Return None if the signs are
+    a perturbation along the other axis with the smaller coefficient. It is None if the signs are
     impossible for a middle axis.
     """
     first, second, third = coefficients
@@ -224,7 +224,7 @@ def _places(scene: Scene) -> tuple[str, Places]:
         if coefficients[axis] == 0.0:
             told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
             return f"{told} {axis + 1}", []
-    # The products w2 w3, w3 w1 and w1 w2 of components of omega that balance the torque.
+    # w2 w3, w3 w1 and w1 w2, which balance the torque.
     products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
     if len(held) == 3:
         return _points(products)
@@ -268,7 +268,7 @@ def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Pl
     if coefficients[one] == coefficients[other] == 0.0:
         told += f"; to each any w{held + 1} may be added"
     along = dict.fromkeys(_ALONG, "hyperbola")
-    # At the margin of stability Q**2 = C (B a**2 + A b**2) changes its sign.
+    # At the margin of stability Q**2 = C (B a**2 + A b**2) changes sign.
     if coefficients[one] * coefficients[other] < 0.0:
         along[(-coefficients[one] / coefficients[other]) ** 0.25] = "its margin"
         told += ", and the margin of stability"
@@ -289,7 +289,7 @@ def _across(products: Sequence[float], axis: int) -> tuple[str, Places]:
     hyperbola is shown.
     """
     one, other = (axis + 1) % 3, (axis + 2) % 3
-    # The products w_one w_axis and w_other w_axis.
+    # w_one w_axis and w_other w_axis.
     across = products[other], products[one]
     told = (
         f"torque across the axis of symmetry: the hyperbola w{one + 1} w{axis + 1} = "

@@ -1,6 +1,6 @@
 """The report of the command `rotations`, and its picture of polhodes and growth rates.
 
-A polhode, a curve of torque-free omega, is represented by directions of the angular momentum.
+A polhode, a curve of torque-free omega, is drawn as directions of the angular momentum.
 """
 
 import math
@@ -115,17 +115,16 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Direction to the viewer, along the axes of the smallest, the middle and the largest moment. The
-# axis of the smallest moment points upwards.
+# Direction to the viewer, along the axes of the smallest, middle and largest moment; that of the
+# smallest points upwards.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
-_HIDDEN = 0.22  # opacity of curves and points behind the sphere
+_HIDDEN = 0.22  # opacity behind the sphere
 _SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
 _POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
 _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
             (-0.3, -0.7): 3}  # fmt: skip
-# Largest angle between each curve and the axis that it encircles (rad). On the separatrix this
-# angle is 90 degrees.
+# Largest angle of each curve from the axis that it encircles (rad); 90 degrees on the separatrix.
 _ANGLES = tuple(math.radians(degrees) for degrees in (18.0, 36.0, 54.0, 72.0))
 _POINTS = 181
 
@@ -228,9 +227,9 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
     """Yield the name and the points, shape (n, 3), of torque-free curves of L / abs(L).
 
     L is the angular momentum along the body axes. The last two curves are the separatrix, in the
-    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)). Here j = 1 / I (kg m2), and axis 2 has the
-    middle moment. With two equal moments both planes are perpendicular to the third axis. A sphere
-    has no curves.
+    planes L3 / L1 = +- sqrt((j1 - j2) / (j2 - j3)), with j = 1 / I and the middle moment about axis
+    2. With two equal moments both planes are perpendicular to the third axis. A sphere has no
+    curves.
     """
     high, middle, low = sorted(range(3), key=lambda axis: moments[axis])
     j = min(moments) / np.array(moments)
@@ -250,7 +249,7 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
                 curve = np.outer(to_middle, unit[middle]) + np.outer(to_far, unit[far])
                 name = f"around axis {'+' if sign > 0.0 else '-'}{axis + 1}"
                 yield name, curve + np.outer(sign * up, unit[axis])
-    # Angle of the planes of the separatrix from the axis of the largest 1 / I.
+    # Angle of the separatrix from the axis of the largest 1 / I.
     tilt = math.atan2(math.sqrt(j[high] - j[middle]), math.sqrt(j[middle] - j[low]))
     for sign in (1.0, -1.0):
         across = math.cos(tilt) * unit[high] + sign * math.sin(tilt) * unit[low]
@@ -263,8 +262,7 @@ def growth_of_bodies(first: Array, third: Array) -> Array:
     Q is the fastest rate of equation 32. `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
     """
     a, c = first, -third
-    # Coefficients of a body satisfy A + B + C + ABC = 0. At two corners of the square of K1 and K3,
-    # for bodies without extent, B is arbitrary.
+    # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.
     with np.errstate(invalid="ignore"):
         b = -(a + c) / (1.0 + a * c)
     b = np.where(np.isfinite(b), b, 0.0)

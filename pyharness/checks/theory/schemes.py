@@ -2,8 +2,7 @@
 
 A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
 is `Numbers`, or `Series` for power series in the step size, which yield each term of the truncation
-error. Schemes share no code with the methods. The derivative of the right-hand side F in the
-direction F is half of F(omega + F) - F(omega - F), because F is quadratic.
+error. Schemes share no code with the methods.
 """
 
 import math
@@ -19,7 +18,7 @@ from pyharness.checks.theory.collocation_matrices import PARTS, collocation_matr
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
-# Number of terms of a power series in the step size: powers 0 to TERMS - 1.
+# Powers 0 to TERMS - 1 of the step size.
 TERMS = 24
 
 
@@ -78,10 +77,10 @@ Scheme = Callable[[Numbers, Array], Array]
 class FixedStep:
     """A program or method with a fixed step."""
 
-    name: str  # of the program or method
-    order: int  # of the global error of the program or method
+    name: str
+    order: int  # of the global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
-    # bound of the error of a step's last additions, in units of 2**-53 of omega
+    # Bound for a step's last additions, in units of 2**-53 of omega.
     roundings: float = 1.0
 
 
@@ -136,8 +135,8 @@ def collocation_singular(program: str) -> Scheme:
 def runge_kutta_4(on: Numbers, omega: Array, punched: bool = False) -> Array:
     """Return omega after a step of classical Runge-Kutta (eq. 31).
 
-    If `punched`, it is the first step of the original program: the third stage starts from the
-    point of the second, and the fourth from the point of the third, instead of both from `omega`.
+    If `punched`, it is the first step of the original program, in which the third and the fourth
+    stage start from the point of the stage before instead of from `omega`.
     """
     first = on.times_step(on.rate(omega))
     at = omega + 0.5 * first
@@ -158,7 +157,11 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 
 
 def taylor_3(on: Numbers, omega: Array) -> Array:
-    """Return omega after a step of the Taylor method with three terms (eq. 30)."""
+    """Return omega after a step of the Taylor method with three terms (eq. 30).
+
+    As the right-hand side F is quadratic, its derivative in the direction F is half of F(omega + F)
+    - F(omega - F).
+    """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))
     return omega + on.times_step(rate + 0.5 * on.times_step(along))

@@ -19,10 +19,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
-# Rounding errors of many steps with independent directions add up like the square root of the
-# number of steps. The mean error of a step is taken as a third of the largest.
+# Independent rounding errors of steps add up like the square root of their number. The mean one is
+# taken as a third of the largest.
 _MEAN_ROUNDING = 1.0 / 3.0
-# Largest ratio of the last term of a power series to its sum, beyond which it is not accepted.
+# Largest accepted ratio of a power series' last term to its sum.
 _CONVERGED = 1e-3
 FORECAST = Basis(
     "derived",
@@ -37,13 +37,13 @@ FORECAST = Basis(
 class Path:
     """The solution of a scene, with the state-transition matrices from each time to the end."""
 
-    scene: Scene  # its torque must be constant
+    scene: Scene  # with constant torque
     times: Array  # shape (n,), s: from 0 to the end
     omega: Array  # shape (n, 3), rad/s
-    propagators: Array  # shape (n, 3, 3); state-transition matrices from each time to the end
-    flow: Conditioning  # sensitivity of omega at the end of this solution
-    turned: float  # integral over time of the largest absolute row sum of the Jacobian
-    fastest: float  # largest absolute row sum of the Jacobian at any time (1/s)
+    propagators: Array  # shape (n, 3, 3); matrices from each time to the end
+    flow: Conditioning  # sensitivity of omega at the end
+    turned: float  # integral over time of the Jacobian's row-sum norm
+    fastest: float  # largest row-sum norm of the Jacobian (1/s)
 
     @property
     def norms(self) -> Array:
@@ -60,10 +60,10 @@ class Forecast:
     """Predicted final errors of a fixed-step run, relative to the largest omega."""
 
     truncation: float  # expected truncation error of the component with the largest one
-    # bound of truncation and rounding error together; infinite if the steps are too large for it
+    # Bound of truncation and rounding together; infinite for too large steps.
     bound: float
-    rounding: float  # bound of the rounding error alone
-    wandering: float  # expected rounding error, if the errors of the steps are independent
+    rounding: float  # bound of the rounding error
+    wandering: float  # expected rounding error, if steps are independent
 
 
 def path(scene: Scene, time: float) -> Path:
@@ -92,8 +92,8 @@ class Forecaster:
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
-        # The mean relative final error from one step's rounding. A component's rounding error is
-        # proportional to the component, and 0 if it never changes.
+        # Mean relative final error from one step's rounding. A component that never changes has
+        # none.
         changes = (self._rates() != 0.0).any(axis=0)
         carried = along.propagators * (along.omega * changes)[:, None, :]
         squares = along.over_time(np.square(carried).sum(axis=2)) / float(along.times[-1])
@@ -114,8 +114,8 @@ class Forecaster:
         worst = float(here.over_time(here.norms * np.abs(local).max(axis=1))) / h / largest
         last = float(np.abs(terms[-1]).max())
         known = last <= _CONVERGED * float(np.abs(local).max())
-        # Later steps start off the exact solution, where local errors and their amplification are
-        # larger. The bound is valid only if they are at most twice as large.
+        # Later steps start off the exact solution, where errors and amplification are larger; the
+        # bound allows for twice as large ones.
         off = 2.0 * worst * (here.turned + 2.0 * (order + 2))
         if not (known and off <= math.log(2.0)):
             worst = math.inf
@@ -125,7 +125,7 @@ class Forecaster:
             rates = self._rates()
             constant, varying = solver_roundings(self.method.name)
             travelled = float(here.over_time(norms * np.abs(rates).max(axis=1))) / largest
-            # Bound of the relative change of the right-hand sides in a step.
+            # Relative change of the right-hand sides in a step, at most.
             differing = min(1.0, h * here.fastest)
             rounding += ROUNDING * travelled * (constant + varying * differing)
         wandering = self._wandering * math.sqrt(steps)
@@ -155,6 +155,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # The order of the scheme implies that these terms are zero, except for rounding.
+        # These terms are zero by the order of the scheme, except for rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -1,10 +1,9 @@
 """Weighted residual methods as Runge-Kutta tableaux, for any step size.
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
-+ c1 t + ... + cn t**n. The conditions make its derivative a projection of the right-hand side f
-along the step on the polynomials of degree n - 1. The projection is computed on the unit interval s
-= t / h in the basis of Legendre polynomials, which is well conditioned; c1, ..., cn are never
-formed.
++ c1 t + ... + cn t**n. They make its derivative a projection of the right-hand side f along the
+step on the polynomials of degree n - 1. The projection is computed on the unit interval s = t / h
+in the well-conditioned basis of Legendre polynomials.
 """
 
 from dataclasses import dataclass
@@ -25,11 +24,11 @@ class Tableau:
     It evaluates f along the first estimate or the previous correction.
     """
 
-    # shape (m,); the points at which f is evaluated, in units of the step size h: the collocation
-    # points, or the nodes of the quadrature for the weighted integrals
+    # Shape (m,), in units of the step size h: where f is evaluated, the collocation points or the
+    # quadrature nodes of the weighted integrals.
     nodes: Array
-    matrix: Array  # shape (m, m); the next estimate at the nodes is omega(0) + h matrix f
-    weights: Array  # shape (m,); the result of the step is omega(0) + h weights f
+    matrix: Array  # shape (m, m); next estimate at the nodes: omega(0) + h matrix f
+    weights: Array  # shape (m,); result of the step: omega(0) + h weights f
 
 
 @cache
@@ -54,13 +53,13 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     else:
         degree = 3 * n if weighting == "galerkin" else 3 * n - 1
         nodes, quadrature = _gauss(degree // 2 + 1)
-        # These polynomials span the same space as the weight functions t ... t**n (Galerkin) or
-        # 1 ... t**(n-1) (least squares).
+        # They span the same space as the weight functions t ... t**n (Galerkin) or 1 ... t**(n-1)
+        # (least squares).
         tests = basis(nodes, n)
         if weighting == "galerkin":
             tests = tests * nodes[:, None]
     weighted = fractions((tests * quadrature[:, None]).T)
-    # Computed in fractions, because in floats the tableau would depend on the LAPACK in use.
+    # In floats the tableau would depend on the LAPACK in use.
     projection = inverse(weighted @ fractions(basis(nodes, n))) @ weighted
     # Integrals of `basis` from 0 to the nodes.
     antiderivatives = legendre.legint(np.eye(n), lbnd=-1.0, scl=0.5)

@@ -43,12 +43,11 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# Limits of closed forms need no conditioning, which would take long for a million revolutions.
+# Limits of closed forms need no conditioning, which would take long.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
-# An angle in degrees is rounded when it is formed, converted and read. The errors of three angles
-# add up.
+# Each of three angles in degrees is rounded when formed, converted and read.
 _ANGLES = 64.0 * ROUNDING
 _OPERATIONS = Basis(
     "derived",
@@ -77,10 +76,9 @@ def _about_body(turn: Quaternion, vectors: Callable[[Triple], Triple], moments: 
 
 
 TURNS = {
-    # Axes 1, 2, 3 of the rotated body are axes 2, 3, 1 of the original body.
+    # Axes 1, 2, 3 of the rotated body are axes 2, 3, 1 of the original.
     "cyclic": _about_body((0.5, 0.5, 0.5, 0.5), lambda v: (v[1], v[2], v[0]), True),
     "half-turn": _about_body((0.0, 1.0, 0.0, 0.0), lambda v: (v[0], -v[1], -v[2]), False),
-    # The axes of space can be chosen at will.
     "space": Turn(
         lambda scene: replace(scene, attitude=product(POINTED, scene.attitude or POINTED)),
         lambda q: np.array(product((POINTED[0], *(-x for x in POINTED[1:])), q.T)).T,
@@ -154,8 +152,8 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
     off = abs(float(np.linalg.norm(answer.attitude)) - 1.0)
     yield name.with_quantity("length").bounded(off, 8.0 * ROUNDING, _OPERATIONS)
     if name.subject in FORMS:
-        # An error of the angle changes the direction of the angular momentum by at most that angle.
-        # The moments multiply omega, which has 16 rounding errors; the rotation takes two products.
+        # The direction of the angular momentum changes by at most the error of the angle. The
+        # moments multiply omega, which has 16 rounding errors; the rotation takes two products.
         moments = np.array(scene.moments)
         momentum = moments * scene.omega
         largest = max(scene.moments or (1.0,)) * max(map(abs, scene.omega))
@@ -171,7 +169,7 @@ def _montgomery(name: Name) -> Check:
 
     The angle about the angular momentum L is 2 E T/L less a solid angle, with energy E and period
     T. L encloses the solid angle in the body, about the axis along which its component keeps its
-    sign. As the angle is not conserved, no other check detects a wrong rate.
+    sign. The angle is not conserved, so no other check detects a wrong rate.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -187,7 +185,6 @@ def _montgomery(name: Name) -> Check:
     along = turned_to_space(np.array([scene.attitude]), momentum[None, :] / size)[0]
     found = 2.0 * math.atan2(float(turn[1:] @ along), float(turn[0]))
     apart = abs(math.remainder(found - wanted, 2.0 * math.pi))
-    # The time is rounded, and so are the terms.
     limit = ATTITUDE + 8.0 * ROUNDING * (2.0 * energy * period / size + 2.0 * math.pi)
     return name.bounded(apart, limit, _OPERATIONS)
 
@@ -208,7 +205,7 @@ def _solid_angle(scene: Scene, period: float) -> float:
         axes = [(third + 1) % 3, (third + 2) % 3, third]
         m, omega = m[:, axes], rows[:, axes]
         if m[0, 2] < 0.0:
-            # Half a turn about the first axis makes the third component positive, as the formula
+            # Half a turn about the first axis makes the third component positive, which the formula
             # requires.
             m, omega = m * [1.0, -1.0, -1.0], omega * [1.0, -1.0, -1.0]
         rate = np.cross(m, omega)
@@ -237,7 +234,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The forward run's error of omega rotates the body in the backward run.
+    # The forward run's error of omega rotates the backward run.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)

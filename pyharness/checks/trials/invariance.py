@@ -1,7 +1,7 @@
 """Trial of invariance: results must transform with a rotated or rescaled problem.
 
-Methods whose operations then differ only in axes, signs or exponents must return the same bits. All
-others must agree within an error bound.
+Methods whose operations differ only in axes, signs or exponents must return the same bits, all
+others agree within an error bound.
 """
 
 import random
@@ -67,7 +67,7 @@ def _signs(first: float, second: float, third: float) -> Symmetry:
         1.0,
         lambda omega: omega * [first, second, third],
         # Rounding to nearest does not depend on the sign. Radau and LSODA difference their Jacobian
-        # in a direction that does not change sign with the problem.
+        # in a direction that does not change sign.
         (*OURS, *_PREPARED, "dop853", "rk45", *FIXED_STEP, *PROGRAMS),
     )
 
@@ -76,13 +76,12 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
     return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
-# Only exponents change, and our methods compare only quantities with the same unit. SciPy's choice
-# of the first step compares others, and the implicit row scaling of LEQT1F compares powers of the
-# step.
+# Our methods compare only quantities of the same unit. SciPy compares others for its first step,
+# and LEQT1F's implicit row scaling powers of the step.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
-    # These methods treat all axes alike, by products of the next two axes in this order. The Taylor
-    # series and the sums of other methods process the axes in a fixed order.
+    # These methods form products of the next two axes in this order; others process the axes in a
+    # fixed order.
     "cyclic": Symmetry(
         lambda scene: rotated(scene, lambda v: (v[1], v[2], v[0]), body=True),
         1.0,
@@ -136,7 +135,7 @@ def _check_rotated(symmetry: Symmetry, time: float, tolerance: float, name: Name
     difference = float(np.abs(plain - other).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference)
-    # Each of the two results may have the allowed error.
+    # Each result may have the allowed error.
     return name.bounded(difference, 2.0 * flow.limit(tolerance), FLOW)
 
 
@@ -144,7 +143,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = run_method(method, scene, time, tolerance).omega
     start = restarted_at(scene, there, time)
-    # Backward, a method of SciPy may meet only a coarser tolerance.
+    # Backward, SciPy may meet only a coarser tolerance.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
@@ -153,14 +152,14 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     difference = float(np.abs(again - scene.omega).max()) / flow.largest
     if method in FIXED_STEP:
         return name.described(difference, "not reversible")
-    # The error of the forward run is an initial error of the backward run.
+    # The forward error is an initial error of the backward run.
     limit = flow.limit(tolerance) * back.amplification + back.limit(coarser)
     return name.bounded(difference, limit, FLOW)
 
 
 def _split(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
-    # A fixed seed keeps the three cuts the same.
+    # Always the same three cuts.
     source = random.Random("cuts")
     cuts = sorted(source.uniform(0.0, time) for _ in range(3))
     omega = np.array(scene.omega)
@@ -171,7 +170,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         omega = run_method(method, start, stop - begin, tolerance).omega
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # The rest of the trajectory amplifies the error of each piece.
+        # The rest amplifies the error of each piece.
         limit += piece.limit(tolerance) * rest
     whole = run_method(method, scene, time, tolerance).omega
     difference = float(np.abs(omega - whole).max()) / flow.largest

@@ -1,8 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the closed curve of omega. Rounding errors of energy and momentum
-grow with the power 1/2 of the number of steps, the phase error with the power 3/2. If the errors of
-a step are biased, the powers are 1 and 2.
+The phase is the position along the closed curve of omega; the law is in `theory.brouwer`.
 """
 
 import math
@@ -32,8 +30,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 from pyharness.truth.elliptic import torque_free
 
-# Numbers of revolutions. A revolution is the time 2 pi over the largest component of omega, as for
-# a body that rotates about one axis.
+# A revolution takes the time 2 pi over the largest component of omega.
 REVOLUTIONS = tuple(10.0 ** (k / 2.0) for k in range(2, 13))
 MOTIONS = {
     # Case 4: fast precession about the axis of the spin.
@@ -41,24 +38,23 @@ MOTIONS = {
     # All three components vary, and the elliptic modulus is large.
     "tumbling": Scene("tumbling", (0.25, 1.0, 0.5), moments=(40.0, 30.0, 20.0)),
 }
-# Number of initial conditions of each motion. With so many, over two decades of steps, a random
-# walk is mistaken for a drift with a probability below one in a thousand.
+# Initial conditions of each motion. With so many, over two decades of steps, a random walk is
+# mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
 _EFFORT = 10.0  # on the work limit of the Taylor series
-# Below this number of revolutions the rounding of the result is not negligible.
+# With fewer revolutions the rounding of the result is not negligible.
 _FIT_FROM = 10**2.5
-# Half the difference between the powers for random and for biased rounding.
+# Half the difference of the powers for random and biased rounding.
 _HALFWAY = 0.25
-# Phase error (rad) beyond which its linear measure is not accurate.
+# Largest phase error (rad) that is measured accurately.
 _LOST = 0.1
 
-# Bound on the last two terms of the Taylor series at the finest tolerance, as a fraction of omega.
+# Bound on the last two terms of the Taylor series at the finest tolerance, over omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
-# Step of Gauss collocation by number of stages, in radians of the fastest rate. With 8 stages
-# truncation is far below rounding. With 4 stages truncation dominates the phase error, but must not
-# change the energy.
+# Step by number of stages, in radians of the fastest rate. With 8 stages truncation is far below
+# rounding; with 4 it dominates the phase error, but must not change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
-_CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of a value of the closed form at any time
+_CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of the closed form at any time
 CLOSED_FORM = Basis(
     "measured",
     "errors that follow from 16 rounding errors of omega by a closed form",
@@ -113,12 +109,11 @@ def _rate(scene: Scene) -> float:
 
 
 INTEGRATORS = {
-    # The truncation error of a series keeps its sign, and steps lock to the periodic motion, so
-    # that rounding recurs in every revolution. The last two terms are at most SLACK times the local
-    # tolerance; each later term is at most half of the previous one.
+    # The truncation error keeps its sign, and steps lock to the periodic motion, so that rounding
+    # recurs in every revolution. The last two terms are at most SLACK times the local tolerance;
+    # each later one is at most half of the previous.
     "taylor": Integrator(_taylor, _taylor_noise, 1e6, 10**5.5, preference=True),
-    # Steps of at most one radian of the fastest rate. A step takes ten times as long as a Taylor
-    # step.
+    # A step takes ten times as long as a Taylor step.
     "gauss-8": Integrator(_gauss(8), partial(brouwer.gauss_noise, stages=8), 1e6, 1e5),
     "gauss-4": Integrator(_gauss(4), partial(brouwer.gauss_noise, stages=4), 1e5, 10**4.5),
 }
@@ -135,7 +130,6 @@ def _attempts() -> Iterator[Attempt]:
         yield Attempt(replace(name, subject="closed-form"), _closed_form)
         for method in ("dop853", "lsoda"):
             yield Attempt(replace(name, subject=method, setting="100"), _scipy)
-        # A hundred steps in each of 1e4 revolutions.
         step = 2.0 * math.pi / orbit_of(motion).largest / 100.0
         stepped = replace(scene, step_size=step, steps=1_000_000)
         for listing in LISTINGS:

@@ -27,9 +27,9 @@ from pyharness.truth.reference import reference
 CASES = (2, 3, 4, 5, 6)
 TIME = 1.0
 SMALLEST = 1e-6
-# Numbers of steps in `TIME`, half a decade apart.
+# In `TIME`, half a decade apart.
 COUNTS = tuple(round(10.0 ** (k / 2.0)) for k in range(13))
-# Divergence is also searched for over this time (s), down to a step size (s) without divergence.
+# Time (s) of a further search for divergence, down to a step size (s) without it.
 _LONG, _SMALLEST_LONG = 100.0, 2e-3
 _SPINNING = (2, 3, 4)
 _CROSSING = Basis(
@@ -72,7 +72,7 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
         own = replace(place, quantity=f"{TIME / count:.0e}", scene=scene)
         yield Attempt(own, partial(predicted, count))
     gauss = method.startswith("gauss")
-    # Where rounding is visible, a method of order above 4 has no truncation error left.
+    # Where rounding is visible, methods of higher order have no truncation error left.
     if not (before or gauss) and SCHEMES[method].order in (2, 4):
         crossing = partial(_crossing, method, case, lambda count: error(count)[0])
         yield Attempt(replace(place, quantity="crossing", scene=None), crossing)
@@ -85,17 +85,16 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
-        # At smaller steps LEQT1F reports a singular matrix.
+        # Below, LEQT1F reports a singular matrix.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.predict(c).truncation < 2.0]
     found = TIME / max(ruled, default=1)
     if found > TIME / counts[-1]:
-        # The crossing is between this step and the next smaller one; its estimate is their
-        # geometric mean.
+        # Estimated by the geometric mean of this step and the next smaller one.
         found /= 10.0**0.25
     predicted = forecaster.crossing(smallest)
-    # Steps are half a decade apart, and rounding may differ from its prediction by a factor of ten.
+    # Rounding may differ from its prediction by a factor of ten, besides the half decade.
     limit = 0.25 + 1.0 / (SCHEMES[method].order + 0.5)
     best = min(counts, key=error)
     note = (
@@ -134,8 +133,7 @@ def _divergence(case: int, listing: Listing | None, name: Name) -> Check:
     matrix = amplification(scheme)
     found, predicted, limit = divergence(scene, _LONG, matrix, runner, _SMALLEST_LONG)
     note = f"{_from(found, _LONG)}, predicted from {predicted:.4g} s"
-    # Linear theory excludes collocation points that move from step to step, unless the equations
-    # are linear.
+    # Linear theory excludes moving collocation points, unless the equations are linear.
     if listing is None or listing.label == "corrected" or (method in PARTS and case == 2):
         return name.bounded(abs(found / predicted - 1.0), limit, DOUBLING, note)
     return name.described(found, note)

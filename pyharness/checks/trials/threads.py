@@ -1,6 +1,6 @@
 """Trial of threads: concurrent calls must return bit-for-bit identical results.
 
-`choose_instructions` is not called, because it must be called before threads start.
+`choose_instructions` is not called: it must be called before threads start.
 """
 
 import random
@@ -46,14 +46,14 @@ SCENES = (
     Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
     Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
-# Its error amplification is computed from many steps.
+# Its error amplification needs many steps.
 _BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
 _LATE = 20.0  # s
 
 
 @dataclass(frozen=True)
 class Job:
-    """A call of a method or program; `call` returns the bits of its results."""
+    """A call of a method or program, which returns the bits of its results."""
 
     subject: str
     scene: Scene

@@ -36,11 +36,10 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.truth.axial_top import axial_top
 from pyharness.truth.reference import reference
 
-# Prepared solvers have separate kernels.
 _PREPARED = {"prepared-auto": "auto", "quick": "quick"}
 _OURS = ("taylor", "gauss-2", "gauss-4", "gauss-8", "auto")
 _ALL = (*_OURS, *_PREPARED, "dop853", "lsoda", "rk45", "radau")
-# Methods that follow a wave for a million radians within seconds.
+# They follow a wave for a million radians within seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 
 _BODY = (40.0, 30.0, 20.0)
@@ -63,7 +62,7 @@ def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
     The phase of a wave has a random rounding error in every evaluation, at least one per period.
-    `conditioning` adds n of them in full; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
+    `conditioning` adds all n; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -148,7 +147,7 @@ CIRCUMSTANCES = {
     "no-digits-1e22": _no_digits(1e22, 2e23, sphere=True),
     "averaged-1e16": _no_digits(1e16, 10.0, sphere=False),
     **{f"huge-{size:.0e}": _huge(size) for size in (1e6, 1e9, 1e12)},
-    # The torque alone increases omega to 1e8 times its initial value, which is no divergence.
+    # Omega grows to 1e8 times its initial value, which is no divergence.
     "huge-from-rest": _huge(1e4, (1e-6, 0.0, 0.0)),
     **{f"tiny-{size:.0e}": _tiny(size) for size in (1e-12, 1e-100, 1e-300, 5e-324)},
     "resonant": _resonant(_SYMMETRIC),

@@ -201,8 +201,6 @@ def _ensemble(options: argparse.Namespace) -> int:
     loads = [*with_attitudes(loads, options.seed), *loads]
     rates = measure_ensembles(loads, contenders, options.seed, shared.progress)
     rates.refused.extend(("", each.name, _absent()) for each in missing)
-    # Run times are measured with up to 100 times as many bodies, memory with up to 10 times as
-    # many.
     growth = sizes(options.seed, min(100 * n, _MOST_GROWN), shared.progress)
     found = ensembles.Ensembles(rates, growth, memory(min(10 * n, _MOST_BODIES)))
     shared.end_progress()

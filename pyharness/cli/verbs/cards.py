@@ -20,7 +20,7 @@ from pyharness.thesis.cards import chosen
 from pyharness.thesis.collation import expected_lines, faults, rows, undeclared, unexplained
 
 _LARGEST_SCAN = 1 << 24  # bytes
-# What is shown instead of cards. The whole edition alone has the header and apparatus of TEI.
+# Shown instead of cards. TEI needs the whole edition for its header and apparatus.
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {

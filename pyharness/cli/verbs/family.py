@@ -20,8 +20,8 @@ OPTIONS = {
     "--points P": "Collocation points: thesis (equally spaced, default), gauss, or N fractions "
     "of the step, as in 0.3,0.6.",
     "--corrections K": "Number of corrections of the estimate in each step, 0 to 100 (default 1).",
-    "--lost": "Instead, look for the mistake in three programs that the thesis does not print, and "
-    "that failed (IV.2): rank conjectured mistakes by how many of the three fail with them.",
+    "--lost": "Instead, rank conjectured mistakes by how many of three programs fail with them: "
+    "those that failed in the thesis (IV.2), which does not print them.",
     "--word W": f"Floating-point arithmetic of the programs of --lost: {', '.join(WORD_NAMES)} "
     f"(default {WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
     **shared.outputs(plot=""),

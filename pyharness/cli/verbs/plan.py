@@ -14,7 +14,7 @@ OPTIONS = {
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
     "--velocity": "Include the translational velocity.",
-    "--times T1,T2,...": "Times of the results, s (default: one time); several need "
+    "--times T1,T2,...": "Times of the results, s (default: one). Several require "
     "intermediate output.",
     **shared.outputs(plot=""),
 }

@@ -17,9 +17,9 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
-    "--lengths": f"Show each run, in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits, "
-    "and not only a verdict on the CDC's arithmetic (about two minutes; other formats and "
-    "--plot imply it).",
+    "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits, "
+    "not only a verdict on CDC arithmetic (about two minutes; implied by --plot and by formats "
+    "other than table).",
     "--all": f"Use every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits instead of selected "
     "ones (about twelve minutes).",
     "--vectors FILE": "Instead, check our emulation of the CDC's arithmetic against the "

@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes. Each claim counts equally: 1 point
-if it is reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
+The starts cover the sphere of directions at several magnitudes. A claim scores 1 point if it is
+reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
 """
 
 import math
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
-# The points of each code, with the code as index.
+# Indexed by code.
 _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
@@ -44,7 +44,7 @@ _OMEGA = tuple(Column(f"omega{k}", digits(".3g"), unit="rad/s") for k in (1, 2, 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The verdict codes of each claim over a grid of starts, readings and numbers of steps.
+    """The verdict codes of each claim over a grid of initial omegas, readings and step numbers.
 
     The axes of `codes` are reading, number of steps, magnitude of omega(0) (rad/s), height (omega3
     over the magnitude) and longitude (rad).
@@ -58,11 +58,11 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the total points of each start; `reading` and `steps` are indices."""
+        """Return the total points of each initial omega; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each start whether no claim fails."""
+        """Return for each initial omega whether no claim fails."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -90,18 +90,18 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the total points of several claims, for each start."""
+    """Return the total points of several claims, for each initial omega."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of starts with verdicts "reproduced", "in part" and "not reproduced"."""
+    """Return the fractions of codes "reproduced", "in part" and "not reproduced"."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
 
 def bits(codes: Codes) -> float:
-    """Return the entropy (bits) of the verdict on a claim over the starts."""
+    """Return the entropy (bits) of the verdict on a claim over the initial omegas."""
     parts = np.array([(codes == code).mean() for code in _CODES])
     parts = parts[parts > 0.0]
     return float(-(parts * np.log2(parts)).sum()) + 0.0
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return the verdict codes of the claims for the original programs, by start in `starts`."""
+    """Return verdict codes of the original programs by claim, for each of the thesis's starts."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}
@@ -277,7 +277,7 @@ def atlas_picture(atlas: Atlas) -> Picture:
 def _draw_maps(figure: "Figure", atlas: Atlas, score: Any) -> None:
     import matplotlib as mpl
 
-    # The maps of the first and last magnitude resemble their neighbours'.
+    # The first and last maps resemble their neighbours.
     count = len(atlas.magnitudes)
     inside = np.linspace(0, count - 1, _MAPS + 2)[1:-1].round()
     chosen = np.unique(inside) if count > _MAPS else np.arange(count)

@@ -26,7 +26,7 @@ class Assumptions:
     """One value for each choice that the thesis leaves open.
 
     `start` is omega(0) (rad/s) where the thesis gives none; None selects the value in `cases.toml`.
-    `readings` are alternatives to the readings that this edition adopts. `word` is the arithmetic.
+    `readings` are alternatives to this edition's readings. `word` is the arithmetic.
     """
 
     start: Triple | None = None
@@ -40,9 +40,8 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
-    `parts` divides the step size of a run; `runs` and `error` use the steps of the case. Without
-    `may_stop` the stop test of the Runge-Kutta program is skipped. Errors are against the reference
-    solution.
+    `parts` divides the step size of a run; `runs` and `error` use the steps of the case. `may_stop`
+    switches the stop test of the Runge-Kutta program. Errors are against the reference solution.
 
     The points of the collocation model are at k/(n+1) of the interval length DT, k = 1 ... n. In
     the original programs DT grows by the step size in every step, so that the points move out of
@@ -54,7 +53,7 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program; a corrected one is independent of the assumptions."""
+        """Return the listing of a program; assumptions affect only an original one."""
         if not self.is_original:
             return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))

@@ -1,4 +1,4 @@
-"""The claims of the thesis, entries of `data/claims.toml`, our verdicts on them, and reports."""
+"""The claims of the thesis, our verdicts on them, and reports."""
 
 import math
 from collections import Counter
@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts on a claim with one assumption changed; it `survives` if they do not change."""
+    """The verdicts with one assumption changed; `survives` if they are as without the change."""
 
     assumption: str
     original: str
@@ -95,7 +95,7 @@ def judgements() -> list[Judgement]:
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict of a claim's test, for the laboratory's programs."""
+    """Return the verdict of a claim's test."""
     name, parameters = entry["test"], entry.get("parameters", {})
     for room in (verdicts, methods, theory):
         if name in vars(room):
@@ -113,7 +113,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
-            # An original listing's conjecture is removed; any other is added.
+            # Removed if the original listing has it, else added.
             conjecture = name.removeprefix("conjecture ")
             own = Listing.original(PROGRAMS[0]).conjectures
             told = "without" if conjecture in own else "with"
@@ -125,8 +125,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    Claims about a case do not depend on another case's start. Therefore all hold at once if each
-    case has a start with which its claims hold.
+    Claims about a case do not depend on another case's start, so all hold at once if each case has
+    a start with which its claims hold.
     """
     found = []
     for case in open_starts():
@@ -142,7 +142,7 @@ def assignments() -> list[Assignment]:
     return found
 
 
-# A verdict as written in the table of all claims, and in its legend.
+# As written in the table of all claims, and in its legend.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),

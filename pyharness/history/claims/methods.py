@@ -50,8 +50,8 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
     The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the differential
     equations. A quotient is the change of a derivative between two stages, divided by the change of
-    its variable. A Lipschitz quotient is at most the norm of the Jacobian, here the largest norm
-    along the reference and the run.
+    its variable. The bound of a Lipschitz quotient is the largest norm of the Jacobian along the
+    reference and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -61,7 +61,8 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
         matrices = ([[0, a * z, a * y], [b * z, 0, b * x], [c * y, c * x, 0]] for x, y, z in points)
         norm = max(float(np.linalg.norm(matrix, 2)) for matrix in matrices)
         if lab.listing("runge-kutta").has("lipschitz-tests-velocity"):
-            # The equations of V are bilinear in V and omega; their derivatives have these norms.
+            # The equations of V are bilinear in V and omega; these are the norms of their
+            # derivatives.
             assert run.velocity is not None
             norm += float(np.linalg.norm(points, axis=1).max())
             norm += float(np.linalg.norm(run.velocity, axis=1).max())
@@ -106,7 +107,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
         if free.ended == "overflow" or float(np.abs(free.omega).max()) > bound:
             unbounded += 1
             caught += run.stop is not None
-    # Every component is 1 / (1 - t), which is unbounded at t = 1 s with any method.
+    # Every component is 1 / (1 - t), unbounded at t = 1 s.
     ours = Scene("unbounded", (1.0, 1.0, 1.0), coefficients=(1.0, 1.0, 1.0), steps=200)
     own = lab.run_on(ours, lab.listing("runge-kutta"))
     numbers = {
@@ -124,8 +125,8 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The cards have the step size as several literals. For the original programs, the numbers include
-    cases that improve when only some literals change.
+    The cards repeat the step size as a literal. For the original programs, the numbers include
+    cases that improve when only some of these literals change.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -176,8 +177,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step on the cards and in our LEQT1F are counted, weighted by `unit_times`.
-    They are counted as written, and with repeated terms counted once.
+    The operations of a step on the cards and in our LEQT1F are weighted by `unit_times`, and
+    counted as written and with repeated terms once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -198,7 +199,7 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" on run times, with each program's operations in 100 steps.
+    """Return "not testable" for run times, with each program's operations in 100 steps.
 
     Present run times are no evidence on the original machine.
     """
@@ -210,8 +211,8 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    The verdict is undecided if it depends on the threshold in `factors`, or on whether the cards of
-    our LEQT1F are counted.
+    The verdict is undecided if it depends on the threshold, one of `factors`, or on whether the
+    cards of our LEQT1F count.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -252,9 +253,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Two kinds of rounding error (rad/s) are measured. The first is the error in Case 1, which every
-    method solves exactly but for rounding, with decreasing steps. The second is the difference of
-    runs as in section IV.2 between binary64 and `words`.
+    Rounding error (rad/s) is measured in two ways: as the error, with decreasing steps, in Case 1,
+    which every method solves exactly but for rounding; and as the difference between runs as in
+    section IV.2 in binary64 and in `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -265,7 +266,6 @@ def computer_error(
             found = run(scene, Member(weighting, 4)).omega[parts - 1 :: parts]
             error = distance(found, lab.truth(1).omega)
             numbers[f"{weighting}, step {scene.step_size:g}: rounding error (rad/s)"] = error
-    # With products written out, different arithmetics differ only in rounding.
     for weighting in _OTHERS:
         floats = {case: integrate(lab.scene(case), weighting) for case in cases}
         for word in words:

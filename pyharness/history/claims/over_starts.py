@@ -1,7 +1,7 @@
-"""Verdicts on claims from many initial omegas at once, by the functions in `rules`.
+"""Verdicts on claims from many initial omegas (starts) at once, by the functions in `rules`.
 
-A sweep supplies the starts (values of omega(0)), the listing with its readings, and the number of
-steps. Each start is used in all cases in which the thesis gives none.
+A sweep supplies the starts, the listing with its readings, and the number of steps. Each start is
+used in all cases in which the thesis gives none.
 """
 
 from dataclasses import replace
@@ -30,20 +30,20 @@ FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
 # Arrays of a batch that would replace values of the cases in Table 1.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
 _TOLERANCE = 1e-12
-_EFFORT = 1e9  # in effect no work limit, because a sweep reports its expected time beforehand
+_EFFORT = 1e9  # in effect none, because a sweep reports its expected time beforehand
 
 
 class Starts:
-    """A bench of `rules`: runs from n starts, used in the cases without omega(0) in the thesis.
+    """Runs for `rules` from n initial omegas, which serve in cases whose omega(0) the thesis omits.
 
     The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
     """
 
     def __init__(self, one: Laboratory, omega0: Array) -> None:
-        """Store the laboratory and the starts (rad/s), shape (n, 3), without running programs."""
+        """Store the laboratory and the starts (rad/s), shape (n, 3)."""
         self._one, self._omega0 = one, omega0
-        # As the methods of the same names of `Laboratory`.
+        # As in `Laboratory`.
         self.scene = one.scene
         self.solution = cache(self._integrated)
         self.error = cache(partial(rules.largest_error, self))
@@ -52,7 +52,7 @@ class Starts:
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Return the runs of a program on a case from every start."""
-        # Other runs are needed once, for their error, which is cached.
+        # Other runs serve once, for their error, which is cached.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def _starts(self, case: int) -> Array:
@@ -96,9 +96,9 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 
 
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
-    """Return the code of the verdict on a claim for each initial omega of a batch, shape (n,).
+    """Return the codes of the verdict on a claim for the scenes of a batch, shape (n,).
 
-    Every code is SILENT if the claims do not apply to the sweep. Only cases of the claim are run.
+    All are SILENT if the claims do not apply to the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -115,7 +115,7 @@ FUNCTIONS = {name: partial(codes, name) for name in JUDGED}
 
 
 def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
-    """Return the codes FAILS, HOLDS or IN_PART of a claim from n starts, shape (n,)."""
+    """Return the codes FAILS, HOLDS or IN_PART of a claim from n initial omegas, shape (n,)."""
     grade = vars(rules)[entry["test"]](bench, **entry["parameters"])
     found = np.where(grade.whole, HOLDS, np.where(grade.part, IN_PART, FAILS))
     return np.broadcast_to(found, (n,)).astype(np.int8)
@@ -123,8 +123,7 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # Two benches are cached: with the requested number of steps, and with 100 steps for claims
-    # independent of this number.
+    # One with the requested number of steps, and one with 100 for claims independent of it.
     return Starts(one, batch.omega0)
 
 

@@ -1,11 +1,12 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
 A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. `parts` divides
-the step size; rows are at the steps of the case. Arrays have the shape (steps, 3) or (n, steps, 3);
-the values of a `Grade` have the shape () or (n,). The `rule` of the claim in `data/claims.toml`
-describes the grades. An error is the largest of any component of omega over the steps that the
-program ran, against the reference solution. The range of a component is its largest minus its
-smallest value.
+the step size; rows are at the steps of the case. Arrays have the shape (steps, 3) or (n, steps, 3),
+the values of a `Grade` () or (n,). The `rule` of the claim in `data/claims.toml` describes the
+grades.
+
+An error is the largest of any component of omega over the steps that the program ran, against the
+reference solution. The range of a component is its largest minus its smallest value.
 """
 
 import functools
@@ -38,7 +39,7 @@ class Runs(NamedTuple):
 
 
 class Grade(NamedTuple):
-    """The result of a claim's test: its numbers, and whether the claim holds from each start."""
+    """The result of a claim's test: numbers, and whether the claim holds, in whole or in part."""
 
     numbers: Mapping[str, Any]
     whole: Any
@@ -61,7 +62,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
     The difference must be at most `share` of the largest omega and, in each component, a tenth of
-    the range. The claim holds in part if only the first is true.
+    the range; if only the first is true, the claim holds in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -81,7 +82,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 
 
 def fails(bench: Bench, case: int, share: float) -> Grade:
-    """Grade the claim that the Runge-Kutta program fails in a case: ends early and is wrong.
+    """Grade the claim that the Runge-Kutta program ends early and is wrong in a case.
 
     It holds in part if only one of the two is true.
     """
@@ -130,8 +131,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that a tenth of the step size improves collocation, with one exception.
 
-    Apart from it, errors must be finite and at least halve for four fifths of the pairs of program
-    and case; for half of them the claim holds in part.
+    Without the exception, errors must be finite and at least halve for four fifths of the pairs of
+    program and case; for half of them the claim holds in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:

@@ -1,7 +1,6 @@
 """The sentences of the thesis with their claims, and each claim as a story of three sentences.
 
-The sentences of stories are in `data/claims.toml`. Their fields are replaced by numbers of our
-verdict.
+`data/claims.toml` has the stories, with fields for the numbers of our verdict.
 """
 
 import re
@@ -50,7 +49,7 @@ def story(judgement: Judgement) -> Story:
 def prose(x: float, digits: int = 3) -> str:
     """Return a number as text for a sentence, as web/story/numbers.js writes it."""
     if x == 0 or 1e-3 <= abs(x) < 1e6:
-        rounded = float(f"{x:.{digits}g}") + 0.0  # no sign of zero
+        rounded = float(f"{x:.{digits}g}") + 0.0  # without the sign of -0
         return f"{rounded:,.0f}" if rounded == int(rounded) else f"{rounded:.{digits}g}"
     mantissa, exponent = f"{x:.{digits - 1}e}".split("e")
     return f"{float(mantissa):g}{_TIMES}{power_of_ten(int(exponent))}"
@@ -62,11 +61,11 @@ def power_of_ten(exponent: int) -> str:
 
 
 class Sentence(NamedTuple):
-    """A sentence of the thesis with its claims; fields that do not apply are empty.
+    """A sentence of the thesis with its claims.
 
     `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` tells why a
     sentence has no claims. `laboratory` is the run that shows it best, as in
-    ``case=2&program=two-term``. `command` is one that shows more than `claims --explain`.
+    ``case=2&program=two-term``. `command` shows more than `claims --explain`.
     """
 
     where: str

@@ -56,7 +56,7 @@ def hamilton_ordinary(lab: Laboratory, cases: list[int], limit: float) -> Judged
     scene, truth = lab.scene(case), lab.truth(case)
     assert scene.moments is not None
     moments = scene.moments
-    # 3-1-3 Euler angles (rad) of an initial attitude, which must not be near the singular one.
+    # 3-1-3 Euler angles (rad), far from the singularity.
     begin = (0.3, 1.1, -0.4)
     momenta = _angle_rates_to_omega(begin).T @ (np.array(moments) * scene.omega)
     found = solve_ivp(
@@ -224,8 +224,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
 
-    A perturbation of a steady rotation by 1e-8 should change as exp(Q t). If Re Q is above 0, it
-    should grow at this rate (1/s); if not, stay within ten times its size for ten periods.
+    A perturbation of a steady rotation by 1e-8 should change as exp(Q t): grow at the rate Re Q
+    (1/s) if that is above 0, else stay within ten times its size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -234,7 +234,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # By these times the decaying part has vanished, and the growing part is still small.
+            # By then the decaying part has vanished, and the growing part is still small.
             steady = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             times = np.array([8.0, 10.0]) / rate if rate else steady
             found = solve(replace(scene, omega=start), times, tolerance=1e-14).omega - each.omega
@@ -301,7 +301,7 @@ def points_inside(lab: Laboratory, cases: list[int]) -> Judged:
     numbers, shares = {}, []
     for program, last in (("two-term", 2.0 / 3.0), ("four-term", 0.8)):
         run_of = lab.run(program, case)
-        # TIME grows by DT in every step, so that its increments are the DT of the points.
+        # The increments of TIME are the DT of the points.
         lengths = np.diff(run_of.recorded_time, prepend=0.0)
         inside = last * lengths < lab.scene(case).step_size
         shares.append(float(inside.mean()))

@@ -1,9 +1,9 @@
 """Tests of the thesis's claims about one case; each test returns a verdict with its numbers.
 
-Each function is the `test` of one or more claims in `data/claims.toml`; a test that is in none of
-`verdicts`, `methods` and `theory` is in `rules`. The claim's `rule` describes the decision, and its
-`parameters` are the keyword arguments. `lab` runs the programs under the chosen assumptions; `case`
-is a number of Table 1.
+Each function is the `test` of one or more claims in `data/claims.toml`; further tests are in
+`methods`, `theory` and `rules`. The claim's `rule` describes the decision, and its `parameters` are
+the keyword arguments. `lab` runs the programs under the chosen assumptions; `case` is a number of
+Table 1.
 
 An error is the largest of any component of omega against the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
@@ -74,7 +74,7 @@ def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the steps of Runge-Kutta from each of `starts`.
+    The numbers include the steps of Runge-Kutta from each initial omega in `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -184,8 +184,7 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all `starts`, because the thesis gives no omega(0) for some
-    cases.
+    The corrected programs run from all initial omegas in `starts`, because the thesis omits some.
     """
     numbers = {}
     for start in starts():

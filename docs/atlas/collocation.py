@@ -75,7 +75,7 @@ def tenfold(
     """Return for each |omega| in `sizes` the step (s) above which a wobble grows tenfold.
 
     A wobble is a perturbation of a steady rotation. A collocation step multiplies it by
-    1 + z + z^2/2, for imaginary z of the magnitude 1 + |z|^4/8.
+    1 + z + z^2/2, for imaginary z of the magnitude 1 + |z|^4/8 (nearly).
     """
     fastest = max(abs(q.imag) for q in rates(coefficients, omega)) / float(np.linalg.norm(omega))
     wobbles = fastest * sizes

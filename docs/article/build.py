@@ -1,9 +1,8 @@
-"""The article: its template, filled with computed values.
+"""The article, built from templates and computed values.
 
-``python -m docs.article.build``, in a checkout, writes `article.md` and `metadata.yaml` beside this
-file, and the picture of the collocation points to the folder `docs/figures`. The texts are in the
-templates `article.md.in` and `metadata.yaml.in`, the values come from `values.py`, and the
-references from `bibliography.bib`.
+``python -m docs.article.build``, in a checkout, fills `article.md.in` and `metadata.yaml.in` with
+values from `values.py` and references from `bibliography.bib`. It also draws the collocation points
+in the folder `docs/figures`.
 """
 
 import re
@@ -21,16 +20,13 @@ from pyharness.views.pictures import saved
 HERE = Path(__file__).parent
 ARTICLE, METADATA, POINTS = "article.md", "metadata.yaml", "figure-points.svg"
 _WIDTH = 120
-# A blank within code, a formula or a link must not become the end of a line.
+# Code, formulas and links must not be broken across lines.
 _WHOLE = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^]]*\]\([^)]*\)")
 _KEPT = ("|", "```", "$$", "#", "![")
 
 
 def built(found: Mapping[str, Any]) -> dict[str, str]:
-    """Return the texts of the article and of its metadata, by the names of their files.
-
-    `found` has the values that the templates name, as the function `values` returns them.
-    """
+    """Return article and metadata by file name, filled with values as `values()` returns them."""
     entries = references((HERE / "bibliography.bib").read_text(encoding="utf-8"))
     listed = "\n".join(f"- {each}" for each in entries)
     article = rendered(_template(ARTICLE), {**found, "references": listed})
@@ -41,10 +37,7 @@ def built(found: Mapping[str, Any]) -> dict[str, str]:
 
 
 def rendered(template: str, found: Mapping[str, Any]) -> str:
-    """Return a template with its fields replaced by values.
-
-    Raise UndefinedError if the template names a value that `found` does not have.
-    """
+    """Return a template filled with values; raise UndefinedError if a value is missing."""
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(template).render(found)
 
@@ -55,7 +48,7 @@ def abstract_of(text: str) -> str:
 
 
 def wrapped(text: str) -> str:
-    """Return a Markdown text whose paragraphs and items have lines of at most 120 characters."""
+    """Return a Markdown text with paragraphs and items wrapped at 120 characters."""
     return "\n\n".join(map(_block, re.split(r"\n\n+", text.strip()))) + "\n"
 
 
@@ -77,7 +70,7 @@ def _paragraph(text: str) -> str:
 
 
 def references(text: str) -> list[str]:
-    """Return the entries of a BibTeX file as items of a list of references, in the file's order."""
+    """Return the entries of a BibTeX file as list items, in the file's order."""
     found = []
     for body in re.findall(r"^@\w+\{[^,]*,\n(.*?)^\}", text, re.DOTALL | re.MULTILINE):
         field = dict(re.findall(r"(\w+)\s*=\s*\{(.*)\}", body))

@@ -1,8 +1,7 @@
 """The values of the article: every number and table of its text, computed by the package.
 
 The template `article.md.in` names each value, as in ``{{ stop.step }}``. The values are texts, with
-as many digits as the article shows. No value is written by hand: each is a result of the package,
-or an entry of its data.
+as many digits as the article shows. None is written by hand.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -122,12 +121,11 @@ def values() -> dict[str, Any]:
 
 
 def _number(claim: str, programs: str, pattern: str, form: str = "max", digits: int = 3) -> str:
-    """Return a number of our verdict on a claim as text.
+    """Return a number of our verdict on a claim, with `digits` significant digits, as text.
 
-    `programs` is ``original`` or ``corrected``. The name of the number fits `pattern`. If several
-    names fit, `form` selects the least or the largest number by ``min`` or ``max``. With ``%`` the
-    number is in percent. With ``of`` it is the number within the name, as in "of 64 subsets".
-    `digits` is the number of significant digits.
+    `programs` is ``original`` or ``corrected``. Of the numbers whose names fit `pattern`, `form`
+    selects the ``min`` or ``max``. ``%`` gives the largest in percent, and ``of`` the number within
+    the first name, as in "of 64 subsets".
     """
     judged = getattr(judgement(claim), programs)
     fitting = {name: x for name, x in judged.numbers.items() if fnmatchcase(name, pattern)}
@@ -152,7 +150,6 @@ def _certainties() -> dict[str, str]:
 
 
 def _switched() -> list[dict[str, Any]]:
-    """Return the apparatus entries of the faults that change a printed number."""
     return [each for each in entries("defect") if "flag" in each]
 
 
@@ -185,7 +182,6 @@ def _claims() -> dict[str, str]:
 
 @cache
 def _compared() -> dict[int, Comparison]:
-    """Return, by case, the comparison of all programs, original and corrected."""
     return {case: compare_programs(case_scene(case)) for case in case_numbers()}
 
 
@@ -210,7 +206,7 @@ def _orders() -> dict[str, str]:
 
 
 def _limits() -> dict[str, dict[str, str]]:
-    """Return how the original programs converge: Runge-Kutta in two cases, the others in Case 5."""
+    """Return orders and distances of the original programs from limit and solution (rad/s)."""
     found = {}
     chosen = {
         "runge_kutta": ("runge-kutta", 2), "runge_kutta_7": ("runge-kutta", 7),
@@ -233,13 +229,13 @@ def _limits() -> dict[str, dict[str, str]]:
 
 
 def _long_error() -> float:
-    """Return the error of both corrected collocation programs in Case 6 over many steps."""
+    """Return the larger error of the corrected collocation programs in a long Case 6 (rad/s)."""
     lab = Laboratory(False, Assumptions(steps=_LONG))
     return max(lab.error(program, 6) for program in COLLOCATION)
 
 
 def _gains() -> dict[str, str]:
-    """Return how many times smaller the error of Runge-Kutta becomes with the small step."""
+    """Return the factors by which the small step reduces the error of Runge-Kutta."""
     claim = "v3-small-step-runge-kutta"
     return {
         f"{programs}_{form}": _number(claim, programs, "case *: gain", form)
@@ -264,7 +260,7 @@ def _superior(told: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _share_of_largest(case: int) -> str:
-    """Return the error of the printed two-term program, in percent of the largest omega."""
+    """Return the error of the printed two-term program in percent of the largest omega."""
     lab = Laboratory(True)
     return f"{100.0 * lab.error('two-term', case) / largest(lab.truth(case)):.2f} %"
 
@@ -282,14 +278,14 @@ def _stop_test() -> dict[str, str]:
 
 
 def _norms(cases: Iterable[int]) -> list[float]:
-    """Return the largest norm of the Jacobian along the solution of each case (1/s)."""
+    """Return the largest norm (1/s) of the Jacobian along the solution of each case."""
     lab = Laboratory(True)
     found = (jacobians(lab.scene(n), lab.truth(n).omega) for n in cases)
     return [float(np.linalg.norm(each, 2, axis=(1, 2)).max()) for each in found]
 
 
 def _machine() -> dict[str, str]:
-    """Return how the printed pages and the stops change in the words of the CDC, of 48 bits."""
+    """Return the changes of the printed pages and stops in the CDC's words of 48 bits."""
     bits = WORDS["cdc48"].p
     found = list(word_cells(case_numbers(), lengths=(bits,)))
 
@@ -337,7 +333,7 @@ def _cases_table() -> str:
 
 
 def _faults_table() -> str:
-    """Return the effects of each fault, kept alone in the corrected program."""
+    """Return a table of the effects of each fault, alone in the corrected program."""
     rows = []
     for each in _switched():
         found = list(effects_of(each["id"]))
@@ -376,7 +372,7 @@ def _effects_row(
 
 
 def _errors_table() -> str:
-    """Return the largest error of omega of each program in each case, with the ends of the runs."""
+    """Return a table of the largest error of omega (rad/s) and the stop of each run."""
     rows = []
     for case, found in _compared().items():
         by_listing: dict[str, list[str]] = {}

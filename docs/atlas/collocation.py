@@ -21,7 +21,7 @@ _FEW = 21
 
 
 def collocation_picture(store: Store) -> Picture:
-    """Draw the overflow times, the energy changes, and the steps with tenfold wobble growth."""
+    """Draw overflow times, energy changes, and the steps at which a wobble grows tenfold."""
     from matplotlib.figure import Figure
 
     sweep = store.sweep
@@ -72,10 +72,10 @@ def tenfold(
     coefficients: tuple[float, float, float], omega: tuple[float, float, float], sizes: Array,
     seconds: float,
 ) -> Array:  # fmt: skip
-    """Return the step sizes (s) above which a wobble grows at least tenfold in `seconds`.
+    """Return for each |omega| in `sizes` the step (s) above which a wobble grows tenfold.
 
-    There is one for each magnitude of omega in `sizes`. A collocation step multiplies a wobble by
-    1 + z + z^2/2. For imaginary z its magnitude grows by the fraction |z|^4/8.
+    A wobble is a perturbation of a steady rotation. A collocation step multiplies it by
+    1 + z + z^2/2, for imaginary z of the magnitude 1 + |z|^4/8 (nearly).
     """
     fastest = max(abs(q.imag) for q in rates(coefficients, omega)) / float(np.linalg.norm(omega))
     wobbles = fastest * sizes

@@ -1,7 +1,7 @@
 """Pictures of the atlas, drawn from the stores of its sweeps.
 
-``python -m docs.atlas.draw stops stops.zarr``, in a checkout, draws the store of ``stops.toml``. It
-writes ``stops.png`` and its numbers, ``stops.csv``, beside this file.
+``python -m docs.atlas.draw stops stops.zarr``, in a checkout, draws the store of ``stops.toml``,
+and writes ``stops.png`` and its numbers, ``stops.csv``, beside this file.
 """
 
 import sys

@@ -1,4 +1,8 @@
-"""Parts that pages of the atlas share: maps of the square of all bodies, stability regions."""
+"""Shared parts of the pictures of the atlas: maps of the square of all bodies, stability regions.
+
+The square has the coordinates b/a and c/b, where a >= b >= c are the integrals of x^2, y^2 and z^2
+over the mass.
+"""
 
 from typing import TYPE_CHECKING, Any
 
@@ -39,12 +43,12 @@ def thinned(count: int, most: int = _MOST_PLACES) -> Any:
 
 
 def nearest(values: Array, value: float) -> int:
-    """Return the index of the positive number whose ratio to a value is nearest to 1."""
+    """Return the index of the positive number that is nearest to a value on a log scale."""
     return int(np.argmin(np.abs(np.log(values / value))))
 
 
 def square_map(plot: "Axes", store: Store, values: Array, **style: Any) -> Any:
-    """Draw values over the square of all bodies, and mark the bodies of the thesis."""
+    """Draw values over the square, and mark the bodies of the thesis."""
     across, up = values_of(store, "body.square.1"), values_of(store, "body.square.2")
     rows, columns = thinned(len(up)), thinned(len(across))
     shown = values[np.ix_(rows, columns)]
@@ -83,7 +87,7 @@ def place_of(moments: Triple) -> tuple[float, float]:
 
 
 def region_panels(plane: "Axes", growth: "Axes", found: Regions) -> None:
-    """Draw the linear stability regions of the programs, and growth on the imaginary axis."""
+    """Draw linear stability regions of the programs, and the growth on the imaginary axis."""
     regions = {each.name: each for each in found.regions}
     plane.axvspan(found.real[0], 0.0, color="#ededed", zorder=0)
     for name, label, color, dash in _OF_REGIONS:

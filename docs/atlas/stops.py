@@ -33,7 +33,7 @@ _FEW = 21
 
 
 def stops_picture(store: Store) -> Picture:
-    """Draw, for each listing and case, the variable that ends the run, and the prediction."""
+    """Draw the variable that ends the run, and a prediction, for each listing and case."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
@@ -104,9 +104,9 @@ def case_scenes(sweep: Sweep) -> list[Scene]:
 def predicted(scene: Scene, t_end: float) -> tuple[float, float]:
     """Return the constant (1/s) below which the corrected program stops, and a step size (s).
 
-    As the step size decreases, the quotient of the stop test tends to |omega''| / |omega'|. The
-    constant is its maximum from 0 to `t_end`. Above the step size, which is rk4's stability limit
-    for the fastest wobble in that time, perturbations grow.
+    The constant is the maximum of |omega''| / |omega'| from 0 to `t_end`, to which the quotient of
+    the stop test tends as the step size decreases. Above the step size, rk4's stability limit for
+    the fastest oscillation in that time, perturbations grow.
     """
     times = [t_end * (i + 1) / _ROWS for i in range(_ROWS)]
     omega = np.vstack([scene.omega, solve(scene, times).omega])

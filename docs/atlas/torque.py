@@ -20,7 +20,7 @@ _FEW = 16
 
 
 def torque_picture(store: Store) -> Picture:
-    """Draw flips over the square, and the fraction that flips and the mean tilt by initial tilt."""
+    """Draw flips over the square of bodies; by initial tilt, the share that flips and mean tilt."""
     from matplotlib.colors import BoundaryNorm
     from matplotlib.figure import Figure
 
@@ -53,7 +53,7 @@ def torque_picture(store: Store) -> Picture:
 
 
 def _told(store: Store) -> list[str]:
-    """Return a description of each torque along the dimension `torque`."""
+    """Return a description of each torque of the sweep."""
     count = store.sweep.dimensions["torque"]
     found = [""] * count
     for axis in store.sweep.axes:

@@ -1,8 +1,8 @@
-"""The document `docs/contributing/promises.md`, made from the stored tally of a campaign.
+"""The document `docs/contributing/promises.md`, made from the tally of a campaign.
 
 The text is in the template `promises.md.in`, the tally in `tally.json`, and explanations of
-broken promises in `exceptions.toml`. The command ``python -m tests.campaigns.proved --merge FILE
---page`` replaces the tally by the sum of other ones, and writes the document anew.
+broken promises in `exceptions.toml`. ``python -m tests.campaigns.proved --merge FILE --page``
+replaces the tally by the sum of others, and writes the document.
 """
 
 import tomllib
@@ -44,7 +44,7 @@ def write_page() -> None:
 
 
 def _exceptions(tally: Tally) -> str:
-    """Return a table of the broken promises, by result and explanation."""
+    """Return a table of broken promises, by result and explanation."""
     if not tally.broken:
         return "No promise was broken.\n"
     text = (HERE / "exceptions.toml").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def _exceptions(tally: Tally) -> str:
 
 
 def _explanation(broken: dict[str, Any], known: list[dict[str, Any]]) -> str:
-    """Return the explanation of a broken promise: by its scene, else by its result."""
+    """Return the explanation of a broken promise, by its scene or else its result."""
     for each in known:
         if broken["result"] in each["results"] and (
             "commands" not in each or broken["command"] in each["commands"]

@@ -1,7 +1,7 @@
-"""The counts of a campaign against proved solutions: their file, and their table.
+"""The tally of a campaign against proved solutions: counts, file and table.
 
-The campaign is ``python -m tests.campaigns.proved``. A tally is of constant size: quotients of
-error and estimate are counted in a histogram of 100 bins for each power of 10.
+``python -m tests.campaigns.proved`` runs the campaign. A histogram with 100 bins for each power of
+10 counts the quotients of error and estimate, so that the size of a tally is constant.
 """
 
 import json
@@ -17,7 +17,7 @@ from pyharness.edition.made_pages import table
 from pyharness.model.output_files import write_files
 
 MOST_FACTOR = 100.0
-"""The largest error of a method over its estimate."""
+"""The largest allowed quotient of error and estimate."""
 
 _FORMAT = 1
 _BINS = 100  # of each power of 10
@@ -31,7 +31,7 @@ _HEAD = (
 
 @dataclass
 class Row:
-    """The counts of one kind of result, as the omega of one method in one group of scenes."""
+    """The counts of one kind of result, such as omega by one method in one group of scenes."""
 
     results: int = 0
     broken: int = 0
@@ -51,7 +51,7 @@ class Row:
         self.bins[math.floor(_BINS * math.log10(max(ratio, _LEAST)))] += 1
 
     def quantile(self, share: float) -> float:
-        """Return the upper end of the bin that has a quantile of the quotients."""
+        """Return the upper end of the bin of a quantile; `share` is from 0 to 1."""
         rest = share * self.estimates
         for each in sorted(self.bins):
             rest -= self.bins[each]
@@ -80,7 +80,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Run:
-    """The scenes of one run: numbers from `first` on, of which `done` are finished."""
+    """One run: `count` scenes, numbered from `first`, of which `done` are finished."""
 
     seed: str
     first: int
@@ -103,9 +103,9 @@ class Run:
 
 @dataclass
 class Tally:
-    """The counts of runs, and a dictionary for each broken promise.
+    """The counts of runs, and the broken promises.
 
-    The dictionary has the texts `result` and `command`, and the numbers `error` and `limit`.
+    A broken promise has the texts `result` and `command`, and the numbers `error` and `limit`.
     """
 
     runs: list[Run] = field(default_factory=list)
@@ -118,7 +118,7 @@ class Tally:
         return self.rows.setdefault(name, Row())
 
     def judge(self, place: str, name: str, error: float, limit: float) -> None:
-        """Compare an error with its limit, and count it."""
+        """Count a result, and report it if its error is above the limit."""
         error, limit = float(error), float(limit)
         row = self.row(name)
         row.results += 1
@@ -128,7 +128,7 @@ class Tally:
             self._report(place, name, error, limit)
 
     def judge_estimate(self, place: str, name: str, error: float, estimate: float) -> None:
-        """Count the quotient of an error and its estimate, which is limited to `MOST_FACTOR`."""
+        """Count the quotient of error and estimate; above `MOST_FACTOR` a promise is broken."""
         error, estimate = float(error), float(estimate)
         row = self.row(name)
         row.add_ratio(error / estimate)
@@ -160,16 +160,16 @@ class Tally:
         return [[name, *row.cells()] for name, row in sorted(self.rows.items())]
 
     def markdown(self, above: float = 0.0) -> str:
-        """Return the counts and quantiles as a table in Markdown.
+        """Return a Markdown table of counts and quantiles.
 
-        Rows have a broken promise, or their largest error over its limit is at least `above`.
+        Rows without broken promises are left out if error over limit is below `above`.
         """
         rows = {name: row for name, row in sorted(self.rows.items())
                 if row.broken or row.largest >= above}  # fmt: skip
         return table(_HEAD, [[name, *row.cells()] for name, row in rows.items()])
 
     def text(self) -> str:
-        """Return the counts and quantiles as text."""
+        """Return the whole table, and the summary, as text."""
         lines = [_HEAD.split(" | "), *self.lines()]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         shown = [
@@ -179,7 +179,7 @@ class Tally:
         return "\n".join([*shown, self.summary()])
 
     def summary(self) -> str:
-        """Return the number of scenes of each group, and of broken promises, as one line."""
+        """Return the numbers of scenes of each group and of broken promises as one line."""
         scenes = ", ".join(f"{n} {name}" for name, n in sorted(self.counts.items()))
         return f"scenes: {scenes or 'none'}; {len(self.broken)} promises broken"
 
@@ -196,14 +196,14 @@ class Tally:
             "broken": self.broken,
             "rows": {},
         }
-        # A line for each row keeps changes readable.
+        # A line for each row keeps diffs readable.
         lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(row)}" for name, row in rows.items())
         text = json.dumps(record, indent=1).replace('"rows": {}', f'"rows": {{\n{lines}\n }}')
         write_files({str(path): f"{text}\n".encode()}, "--out")
 
 
 def command(count: int, seed: str, first: int, groups: Iterable[str], whole: bool = False) -> str:
-    """Return the command of a run of the campaign, which is `whole` if it leaves no result out."""
+    """Return the command of a run of the campaign; a `whole` run also computes slow results."""
     name = seed if seed.replace("-", "").isalnum() else repr(seed)
     chosen = ",".join(groups)
     run = f"python -m tests.campaigns.proved {count} {name} {first}"

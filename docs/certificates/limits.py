@@ -10,10 +10,7 @@ from pyharness.model.basis import MARKS, Basis
 
 
 def limits() -> list[Basis]:
-    """Return each basis that a module of `pyharness.checks` defines, once.
-
-    They are sorted by their marks, from proved to measured, and then by the limited quantities.
-    """
+    """Return all bases of limits in `pyharness.checks`, sorted by mark (proved first) and limit."""
     found = set()
     for each in pkgutil.walk_packages(checks.__path__, "pyharness.checks."):
         values = vars(import_module(each.name)).values()
@@ -23,12 +20,12 @@ def limits() -> list[Basis]:
 
 
 def counts_table() -> str:
-    """Return a table in Markdown with the meaning of each mark, and the number of its limits."""
+    """Return a Markdown table of the marks, with their meaning and number of limits."""
     counts = Counter(each.mark for each in limits())
     rows = [[mark, meaning, str(counts[mark])] for mark, meaning in MARKS.items()]
     return table("mark | basis of the limit | limits", rows)
 
 
 def limits_table() -> str:
-    """Return a table in Markdown of all limits, with their marks and sources."""
+    """Return a Markdown table of all limits, with marks and sources."""
     return table("mark | limit | source", [[x.mark, x.limit, x.source] for x in limits()])

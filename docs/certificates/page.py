@@ -1,7 +1,8 @@
-"""The document `docs/explanation/proofs.md`, made from the certificates and from runs.
+"""The document `docs/explanation/proofs.md`, made from certificates and runs.
 
-Its text is in the template `proofs.md.in`. The errors of the programs are intervals that contain
-the difference from the true solution, because the certificates enclose it.
+Its text is in the template `proofs.md.in`. A ball is a proved enclosure of omega: its middle and
+radius (rad/s). Errors of the programs are intervals that contain the difference from the true
+solution.
 """
 
 import json
@@ -26,7 +27,7 @@ PAGE = "explanation/proofs.md"
 """The path of the document in the folder `docs`."""
 
 JUDGED = (2, 3, 4, 5, 6)
-"""The cases by which the claim that collocation is superior is judged."""
+"""The cases that decide whether collocation is superior."""
 
 _HEAD = "case | steps | two-term | four-term | Runge-Kutta"
 _SHOWN = 4  # significant digits of a bound
@@ -72,7 +73,7 @@ def proofs_page() -> str:
 
 @cache
 def proved_rows(name: str) -> dict[float, Balls]:
-    """Return the proved balls of omega (rad/s) in a certificate, by their time (s)."""
+    """Return the balls of a certificate by their time (s)."""
     certificate = json.loads((HERE / name).read_text(encoding="ascii"))
     return {
         row["time"]: Balls(tuple(map(Fraction, row["omega"])), Fraction(row["radius"]))
@@ -81,14 +82,14 @@ def proved_rows(name: str) -> dict[float, Balls]:
 
 
 def solution_rows() -> list[tuple[int, float, Balls]]:
-    """Return the case, the time (s) and the proved omega (rad/s) of each row of the page."""
+    """Return the case, time (s) and ball of each row of the page."""
     return [(n, t, proved_rows(file_name(n))[t]) for n in case_numbers() for t in TIMES]
 
 
 def limit_rows() -> list[tuple[int, float, Balls]]:
-    """Return the case, the time (s) and the limit of the original Runge-Kutta program (rad/s).
+    """Return case, time (s) and ball of the limit of the original Runge-Kutta program.
 
-    The limit is 2 y(t/2) - y(0), for the solution y; cases whose torque varies with time have none.
+    The limit is 2 y(t/2) - y(0), for the solution y. Cases with a varying torque are left out.
     """
     found = []
     for case in case_numbers():
@@ -103,9 +104,9 @@ def limit_rows() -> list[tuple[int, float, Balls]]:
 
 
 def errors(original: bool) -> dict[int, tuple[int, list[Bounds]]]:
-    """Return bounds of the largest errors of the three programs (rad/s), for each case.
+    """Return for each case the number of steps that all three programs ran, and bounds of errors.
 
-    The errors are those at all steps that all three programs ran, whose number comes first.
+    The bounds (rad/s) are for the largest error of each program at these steps.
     """
     found = {}
     for case in case_numbers():
@@ -116,7 +117,7 @@ def errors(original: bool) -> dict[int, tuple[int, list[Bounds]]]:
 
 
 def error_bounds(run: Trajectory, case: int, rows: Sequence[int]) -> Bounds:
-    """Return bounds of the largest error of any omega component (rad/s) in rows of a run."""
+    """Return bounds of the largest error of any component of omega (rad/s) in rows of a run."""
     proved = proved_rows(file_name(case))
     low = high = Fraction(0)
     for n in rows:
@@ -177,7 +178,7 @@ def _end_table(original: bool) -> str:
 
 
 def _decimal_table(found: Sequence[tuple[int, float, Balls]]) -> tuple[str, str]:
-    """Return a table of balls with their digits, and a bound of the error of its numbers."""
+    """Return a table of balls in decimal digits, and a bound of the error of its numbers."""
     rows, error = [], Fraction(0)
     for case, time, (middle, radius) in found:
         wholes = [round(x * 10**DIGITS) for x in middle]
@@ -190,7 +191,7 @@ def _decimal_table(found: Sequence[tuple[int, float, Balls]]) -> tuple[str, str]
 
 
 def _shifted(whole: int) -> str:
-    """Return an integer over 10**DIGITS as a decimal number."""
+    """Return `whole` / 10**DIGITS as a decimal number."""
     sign, text = "-" if whole < 0 else "", str(abs(whole)).rjust(DIGITS + 1, "0")
     return f"{sign}{text[:-DIGITS]}.{text[-DIGITS:]}"
 

@@ -1,7 +1,7 @@
 """The certificates of the documents: proofs of the solutions of the seven cases.
 
-``python -m docs.certificates.write``, in a checkout, writes the certificates beside this file. The
-check of a certificate needs nothing but Python (`pyharness/truth/certificate_checker.py`).
+``python -m docs.certificates.write``, in a checkout, writes the certificates beside this file.
+`pyharness/truth/certificate_checker.py` checks them with Python alone.
 """
 
 import json
@@ -18,12 +18,12 @@ from pyharness.truth.certificate import prove
 HERE = Path(__file__).parent
 DIGITS = 25
 TIMES = (1.0, 3.0)
-"""The times (s) of the proved solutions of all certificates."""
+"""Times (s) in all certificates."""
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A certificate to be written: the name of its file, its case, scene and times (s)."""
+    """A certificate to be written: name of its file, case, scene and times (s)."""
 
     name: str
     case: int
@@ -31,7 +31,7 @@ class Planned:
     times: Sequence[float]
 
     def text(self) -> str:
-        """Return the text of the file, with a proof that is computed now."""
+        """Compute the proof, and return the text of the file."""
         proof = prove(self.scene, self.times, DIGITS)
         return json.dumps(proof.certificate, separators=(",", ":")) + "\n"
 
@@ -39,10 +39,9 @@ class Planned:
 def planned() -> list[Planned]:
     """Return all certificates to be written.
 
-    Each case has one with its initial omega. This certificate has rows at the times of the case's
-    steps, with which the results of the programs are compared, and at 1.5 s for a limit. A case
-    whose initial omega the thesis does not give has one for each other omega that this edition
-    tries.
+    The certificate of each case has rows at the times of the case's steps, to compare the programs,
+    and at half of `TIMES`, for the limit of the Runge-Kutta program. A case whose initial omega the
+    thesis does not give has further certificates, for the other omegas that this edition tries.
     """
     found = []
     for case in case_numbers():

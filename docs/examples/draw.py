@@ -1,7 +1,7 @@
 """Pictures of the examples of torques.
 
 ``python -m docs.examples.draw``, in a checkout, writes a picture of each example, such as
-``slew.svg``, and its numbers with six digits, such as ``slew.csv``, beside this file.
+``slew.svg``, and its numbers, such as ``slew.csv``, beside this file.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ _NAMES = ("$\\omega_1$", "$\\omega_2$", "$\\omega_3$")
 
 
 class Plot(NamedTuple):
-    """The label and the scale of an axis, and the curves by their names in the legend."""
+    """The label and scale of an axis, and its curves by their names in the legend."""
 
     label: str
     curves: dict[str, Array]
@@ -92,7 +92,7 @@ PLOTS: dict[str, Callable[[Any], list[Plot]]] = {
 
 
 def picture(name: str) -> Picture:
-    """Return the picture of an example, which is run for it: two plots against time."""
+    """Run an example, and return its picture: two plots against time."""
     from matplotlib.figure import Figure
 
     found = import_module(f"docs.examples.{name}")

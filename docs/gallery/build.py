@@ -1,9 +1,8 @@
-"""Builds the gallery: outputs and pictures of its pages, its index, and notebooks.
+"""Build the gallery: outputs and pictures of its pages, its index, and notebooks.
 
-The section of an example in a page is its only source. The name of an example is that of its
-picture. ``python -m docs.gallery.build``, in a checkout, executes
-the examples of all pages and tutorials. It replaces the outputs that they show, draws the pictures
-of the gallery, writes the index `README.md`, and writes notebooks to the folder `build/notebooks`.
+An example is a section of a page, and has the name of its picture. ``python -m
+docs.gallery.build``, in a checkout, executes the examples of all pages and tutorials, replaces
+their outputs and pictures, and writes the index `README.md`, and notebooks to `build/notebooks`.
 With names, such as ``python -m docs.gallery.build free-body``, only these pages are executed.
 """
 
@@ -24,16 +23,16 @@ PAGE = "gallery/README.md"
 """The path of the index in the folder `docs`."""
 
 PAGES = ("free-body", "satellites", "many-bodies", "programs")
-"""The pages, in the order of the index. Each section of a page is an example."""
+"""The pages, in the order of the index."""
 
 NOTEBOOKS = HERE.parents[1] / "build" / "notebooks"
 """The folder of the notebooks."""
 
 _HEAD = """
 Each example has a question, a short program that uses public functions only, a picture, and the
-answer in numbers. The programs run as they are; in a script, `figure.savefig("picture.png")` writes
-the figure. `python -m docs.gallery.build` writes outputs, pictures, and notebooks to
-`build/notebooks`; the web pages have the notebooks too.
+answer in numbers. The programs run as they are; in a script, `figure.savefig("picture.png")` saves
+the picture. `python -m docs.gallery.build` writes notebooks to `build/notebooks`; the web pages
+have them too.
 """
 
 
@@ -44,7 +43,7 @@ def page(name: str) -> Path:
 
 @cache
 def examples() -> dict[str, tuple[str, str]]:
-    """Return the page and the text of each example by its name, in the order of the index."""
+    """Return the page and text of each example by its name, in the order of the index."""
     found = {}
     for each in PAGES:
         _, *sections = re.split(r"^(?=## )", page(each).read_text(encoding="utf-8"), flags=re.M)
@@ -61,7 +60,7 @@ def question(text: str) -> str:
 
 
 def answer(text: str) -> str:
-    """Return the answer of an example: the paragraph that begins with the word Answer."""
+    """Return the paragraph of an example that begins with the word Answer, without this word."""
     (found,) = re.findall(r"^\*\*Answer\.\*\* (.*?)(?:\n\n|\Z)", text, re.DOTALL | re.MULTILINE)
     return " ".join(found.split())
 
@@ -88,7 +87,7 @@ def _alternative(picture: str) -> str:
 def rebuild(path: Path) -> None:
     """Execute the examples of a document, and replace the outputs and pictures that it shows.
 
-    If an example of the gallery prints something, and no output is shown, it is added.
+    In the gallery, missing outputs are added.
     """
     text = path.read_text(encoding="utf-8")
     parts, end = [], 0
@@ -107,14 +106,14 @@ def rebuild(path: Path) -> None:
 
 
 def write_notebooks(folder: Path) -> None:
-    """Write a notebook for each page of the gallery, and for each tutorial with examples."""
+    """Write a notebook for each page of the gallery and each tutorial with examples."""
     folder.mkdir(parents=True, exist_ok=True)
     for path, content in documents.notebooks(HERE.parent).items():
         (folder / Path(path).name).write_bytes(content)
 
 
 def main(arguments: list[str]) -> None:
-    """Execute the named pages, or all, and write everything that is made of them."""
+    """Execute the named pages, or all; write the index and the notebooks."""
     for path in documents.with_notebooks(HERE.parent):
         if not arguments or path.stem in arguments:
             rebuild(path)

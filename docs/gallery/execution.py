@@ -1,8 +1,7 @@
-"""Execution of the Python examples in documents, with what they print and draw.
+"""Execution of the Python examples in documents, with their outputs and figures.
 
-A document has its examples in blocks that begin with three backquotes and ``python``. A block
-``output`` after an example is the text that the example prints. In a page of the gallery, a
-picture after an example is the figure that the example leaves open in matplotlib.
+An example is a fenced block ``python``. A block ``output`` after it is the text that it prints. A
+picture after it is the figure that it leaves open in matplotlib.
 """
 
 import contextlib
@@ -21,27 +20,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PYTHON = re.compile(r"```python\n(.*?)```", re.DOTALL)
-"""An example in a document; its first group is the code."""
+"""An example; the first group is its code."""
 
 OUTPUT = re.compile(r"\n*```output\n(.*?)```", re.DOTALL)
-"""The text that an example prints, directly after the example."""
+"""The output directly after an example; the first group is its text."""
 
 PICTURE = re.compile(r"!\[[^]]*\]\(([^)/]+\.(?:svg|png))\)")
-"""A picture of a document in the document's folder; its first group is the file."""
+"""A picture in the folder of its document; the first group is the file."""
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?(?![\w.]*\w)")
-# Below this, a printed number is a rounding error, which differs from machine to machine.
-_ROUNDING = 1e-9
-# Points of a curve in the numbers of a picture.
-_POINTS = 30
+_ROUNDING = 1e-9  # smaller numbers are rounding errors, which depend on the machine
+_POINTS = 30  # of a curve in the numbers of a picture
 
 
 class Step(NamedTuple):
-    """An executed example: its code, the text that it printed, and the figure that it drew.
-
-    `end` is the position of the end of its block in the document. `figure` is None if the example
-    leaves no figure open.
-    """
+    """An executed example: code, printed text, figure, and the end of its block in the document."""
 
     code: str
     printed: str
@@ -50,10 +43,9 @@ class Step(NamedTuple):
 
 
 def executed(text: str, name: str) -> Iterator[Step]:
-    """Execute the examples of a document one after another, and yield each after its execution.
+    """Execute the examples of a document, which share their variables, and yield each.
 
-    All examples of a document share their variables. `text` is the document, and `name` the name
-    of its file, for error messages.
+    `name` is the name of the file, for error messages.
     """
     variables: dict[str, Any] = {"__name__": name}
     for block in PYTHON.finditer(text):
@@ -64,17 +56,16 @@ def executed(text: str, name: str) -> Iterator[Step]:
 
 
 def shown_output(text: str, step: Step) -> str | None:
-    """Return the text that a document shows as the output of an example; None if it shows none."""
+    """Return the output of an example in a document; None if the document has none."""
     found = OUTPUT.match(text, step.end)
     return None if found is None else found[1]
 
 
 def is_current(shown: str, printed: str) -> bool:
-    """Return whether a shown output and a printed one agree, apart from the machine's rounding.
+    """Return whether two outputs agree, apart from rounding, which depends on the machine.
 
-    The texts between the numbers are identical. A whole number is identical, and another number
-    differs by at most two units of its last digit. Numbers below 1e-9 are rounding errors, and
-    differ by at most a factor of 10, or are both below 1e-13.
+    Texts and whole numbers must be identical. Other numbers may differ by two units of the last
+    digit; below 1e-9 by a factor of 10, and below 1e-13 by any factor.
     """
     if _NUMBER.sub("#", " ".join(shown.split())) != _NUMBER.sub("#", " ".join(printed.split())):
         return False
@@ -96,7 +87,7 @@ def _are_close(shown: str, printed: str) -> bool:
 
 
 def picture_of(figure: "Figure") -> Picture:
-    """Return a figure with its numbers: points of each curve, of each set of dots and each map."""
+    """Return a figure with numbers: some points of each curve, set of dots and map."""
     rows: list[list[Any]] = []
     for number, axes in enumerate(figure.axes, 1):
         for label, columns in _drawn(axes):
@@ -110,7 +101,7 @@ def picture_of(figure: "Figure") -> Picture:
 
 
 def _drawn(axes: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Yield the label and the arrays of coordinates of everything that a diagram shows."""
+    """Yield the label and arrays of coordinates of each curve, set of dots and map."""
     for line in axes.lines:
         columns = line.get_data_3d() if hasattr(line, "get_data_3d") else line.get_data()
         yield line.get_label(), columns
@@ -125,7 +116,7 @@ def _drawn(axes: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _open_figure() -> "Figure | None":
-    """Return the figure that is open in matplotlib, and close it; None if no figure is open."""
+    """Close and return the figure that is open in matplotlib; None if there is none."""
     import sys
 
     if "matplotlib.pyplot" not in sys.modules:
@@ -140,10 +131,7 @@ def _open_figure() -> "Figure | None":
 
 
 def picture_file(path: Path, step: Step) -> Path | None:
-    """Return the file of the picture that a page shows after an example; None if it shows none.
-
-    `path` is the file of the page.
-    """
+    """Return the file of the picture after an example in a page; None if there is none."""
     text = path.read_text(encoding="utf-8")
     following = PYTHON.search(text, step.end)
     end = len(text) if following is None else following.start()

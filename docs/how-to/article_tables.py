@@ -1,7 +1,7 @@
-"""Compute Tables B, C and D of the article from the data package alone, with Python alone.
+"""Compute Tables B, C and D of the article from the data package, with Python alone.
 
-``python article_tables.py``, in the folder that has the folder `package`, prints a line for each
-row. The largest error of a run is that against the reference solution, with two digits.
+``python article_tables.py``, beside the folder `package`, prints a line for each row. Errors are
+against the reference solution.
 """
 
 import collections
@@ -14,7 +14,7 @@ programs = ["two-term", "four-term", "runge-kutta"]
 
 
 def table(path: str) -> list[dict[str, str]]:
-    """Return the rows of a CSV file of the package, each as a dictionary."""
+    """Return the rows of a CSV file of the package."""
     with open(package / path, newline="") as file:
         return list(csv.DictReader(file))
 

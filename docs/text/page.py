@@ -1,4 +1,4 @@
-"""The document `docs/explanation/about-the-text.md`, made from the tables of the edition.
+"""The document `docs/explanation/about-the-text.md`, made from the edition's tables.
 
 Its text is in the template `about-the-text.md.in`.
 """
@@ -26,7 +26,7 @@ PAGE = "explanation/about-the-text.md"
 
 
 def text_page() -> str:
-    """Return the document about the text as Markdown, with lines of at most 120 characters."""
+    """Return the document as Markdown, with lines of at most 120 characters."""
     scan, edition = facts("cards/scan"), facts("edition")
     (witness,) = scan["witness"]
     reading = second_reading_report().record()
@@ -82,13 +82,13 @@ def _counted(head: str, field: str, meanings: dict[str, str]) -> str:
 
 
 def shared_statements(scanned_names: bool = False) -> dict[tuple[str, str], int]:
-    """Return the number of statements that each pair shares, with uniform or scanned names."""
+    """Return the number of statements that each pair of decks shares, with our or scanned names."""
     found = {program: Counter(statements(program, scanned_names)) for program in PROGRAMS}
     return {(a, b): (found[a] & found[b]).total() for a, b in combinations(PROGRAMS, 2)}
 
 
 def statements(program: str, scanned_names: bool = False) -> list[str]:
-    """Return the text of each card of a program, without comments, labels and blanks."""
+    """Return the statements of a program, without comments, labels and blanks."""
     cards = (card for card in deck(program).cards.values() if not card.is_comment)
     texts = (card.text_with_scanned_names if scanned_names else card.text for card in cards)
     return [tight(text[6:]) for text in texts]
@@ -130,7 +130,6 @@ def _events_table() -> str:
 
 
 def _revision(revision: Revision) -> str:
-    """Return a revision of the text as an item of a list."""
     parts = [f"- **{revision.date}**, digest `{revision.digest}`. {revision.what}"]
     for name, heading in CHANGES.items():
         if names := getattr(revision, name):

@@ -1,6 +1,6 @@
-"""The computations of the notes for the instructor, which check every number of the solutions.
+"""Check the numbers of the solutions in the notes for the instructor.
 
-``python docs/tutorials/lesson_solutions.py`` prints nothing if all numbers are right.
+``python docs/tutorials/lesson_solutions.py`` prints nothing if all are right.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +23,8 @@ def last_u1(
 ) -> float:
     """Return U1 after 100 steps of the Runge-Kutta deck under the torques of Case 1.
 
-    `sign` and `second` change card 800: the sign of A and the second factor of the product.
-    `divisor` and `weights` change card 1180.
+    `sign` and `second` are the sign of A and the second factor of the product on card 800;
+    `divisor` and `weights` are those of card 1180.
     """
     i1, i2, i3 = moments
 
@@ -92,7 +92,7 @@ def equation_31(f: Callable[[F], F], y: F, h: F) -> F:
 
 
 def step_of_cards(f: Callable[[F], F], base: F, u1: F, h: F) -> tuple[F, F]:
-    """Return the result and U1(1) after one step of the deck: cards 770 to 1180."""
+    """Return the result and U1(1) after one step of the deck (cards 770 to 1180)."""
     k1 = f(u1)  # card 800, I = 1, J = 1
     u1 = u1 + h / 2 * k1  # card 860, I = 1, J = 1
     k2 = f(u1)  # card 800, I = 2, J = 1
@@ -108,7 +108,7 @@ assert step_of_cards(lambda y: y, F(1), F(1), F(1))[0] == F(19, 6)
 
 
 def error_of_omega1(step_size: float, keep: Sequence[str]) -> float:
-    """Return the largest error of omega1 in Case 2 with these faults alone, rad/s."""
+    """Return the largest error of omega1 (rad/s) in Case 2 with these faults alone."""
     scene = replace(case_scene(2), step_size=step_size, steps=round(1 / step_size))
     run = run_program(scene, Listing("runge-kutta", keep))
     return abs(run.omega[:, 0] - np.sin(5 * run.time)).max()

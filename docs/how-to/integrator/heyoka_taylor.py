@@ -1,4 +1,4 @@
-"""The Taylor series of heyoka for `verify --integrator`; needs the package heyoka."""
+"""The Taylor series of heyoka, for `verify --integrator`; needs the package heyoka."""
 
 import json
 import sys

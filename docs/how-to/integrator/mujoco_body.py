@@ -1,4 +1,4 @@
-"""A free body in MuJoCo for `verify --integrator`: python mujoco_body.py INTEGRATOR.
+"""A free body in MuJoCo, for `verify --integrator`: python mujoco_body.py INTEGRATOR.
 
 INTEGRATOR is Euler, implicit, implicitfast or RK4. Needs the package mujoco.
 """
@@ -35,7 +35,7 @@ def states(asked, integrator):
     moments = asked["moments"]
     text = MODEL.format(step=h, integrator=integrator, moments=" ".join(map(repr, moments)))
     model = mujoco.MjModel.from_xml_string(text)
-    # MuJoCo sorts the axes of a body by moment, and turns its frame of inertia.
+    # MuJoCo sorts the axes of a body by moment, and rotates its frame of inertia.
     model.body_inertia[1], model.body_iquat[1] = moments, (1.0, 0.0, 0.0, 0.0)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     data = mujoco.MjData(model)

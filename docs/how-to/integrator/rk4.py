@@ -1,4 +1,4 @@
-"""An integrator to begin with: the Runge-Kutta method of order 4, for `verify --integrator`."""
+"""An example for `verify --integrator`: the Runge-Kutta method of order 4."""
 
 import json
 import math

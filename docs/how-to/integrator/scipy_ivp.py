@@ -1,4 +1,4 @@
-"""SciPy's integrators for `verify --integrator`: python scipy_ivp.py METHOD [fixed].
+"""SciPy's integrators, for `verify --integrator`: python scipy_ivp.py METHOD [fixed].
 
 METHOD is RK45, DOP853, Radau or LSODA. With `fixed`, RK45 and DOP853 take steps of the requested
 size; otherwise the method chooses its steps by the tolerance.
@@ -40,7 +40,7 @@ def right_hand_side(asked):
 def by_steps(asked, method):
     h, times = asked["step_size"], asked["times"]
     start = asked["omega"] + asked["attitude"]
-    # With such a tolerance no step is rejected, and each is as long as the longest.
+    # With this tolerance no step is rejected, and each has the largest length.
     solver = method(
         right_hand_side(asked), 0.0, start, times[-1], first_step=h, max_step=h, atol=1e9
     )

@@ -83,7 +83,7 @@ def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     return _system(torque.tape, *body, attitude, len(scene.states))
 
 
-# Recording takes longer than most solutions; a loop over initial states has one system.
+# Recording takes longer than most solutions; many initial states share one system.
 @lru_cache(maxsize=64)
 def _system(
     tape: Tape, coefficients: Triple, divisors: Triple, attitude: bool, n_states: int

@@ -2,7 +2,7 @@
 
 The text is in the template `promises.md.in`, the tally in `tally.json`, and explanations of
 broken promises in `exceptions.toml`. ``python -m tests.campaigns.proved --merge FILE --page``
-replaces the tally by the sum of others, and writes the document.
+replaces the tally by the sum of several, and writes the document.
 """
 
 import tomllib

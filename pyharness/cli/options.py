@@ -23,6 +23,8 @@ from pyharness.model.scene_file import case_numbers, case_scene
 from pyharness.model.values import parsed_float, parsed_whole
 
 FORMATS = ("table", "json", "csv", "markdown")
+# Part of the usage of verbs that require one of two options.
+ONE_SCENE = "(--case N | --scene FILE)"
 # Options that several verbs share, with help texts. A placeholder after the name, as N in "--case
 # N", means that the option takes a value.
 BODY = {
@@ -40,23 +42,27 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original, with all defects (faults of its author; "
     "default), or corrected, without any.",
-    "--fix NAME,...": "Run the original program with these faults corrected and all others kept "
+    "--fix NAME,...": "Run the original program with these defects corrected and all others kept "
     "(names: `pyharness defects`).",
-    "--keep NAME,...": "Run the original program with these faults kept and all others corrected.",
-    "--reading NAME,...": "Read these doubtful statements of the original program in the other "
-    "possible way (names: `pyharness defects --kind reading`; default: no statement).",
-    "--conjecture NAME,...": "Complete statements missing from the original program in these ways "
-    "(names: `pyharness defects --kind conjecture`, or none; default: torque-held).",
-    "--lipschitz L": "Stop the Runge-Kutta program when a slope changes by more than L times the "
-    "change of its variable; L in 1/s (default 500, as printed).",
-    "--no-stop": "Omit this test, so that the Runge-Kutta program runs to its last step.",
+    "--keep NAME,...": "Run the original program with these defects kept and all others corrected.",
+    "--reading NAME,...": "Read these doubtful cards of the original program in the other "
+    "possible way, instead of ours (names: `pyharness defects --kind reading`).",
+    "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
+    "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
+    "torque-held).",
+    "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
+    "program stops when a derivative changes by more than L times the change of its variable.",
+    "--no-stop": "Omit the stop test of --lipschitz, so that the Runge-Kutta program runs to its "
+    "last step.",
 }
 EFFORT = {
-    "--effort F": "Multiply the work limit of each computation by F, above 0 (default 1: some ten "
-    "seconds, 30 for a program of the thesis); beyond it the computation ends with an error."
+    "--effort F": "Multiply the work limit of each computation by F, above 0 (default 1: "
+    "about ten seconds, or about 30 seconds for a program of the thesis). Beyond the limit, the "
+    "computation ends with an error."
 }
 STRICT = {
-    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance."
+    "--strict": "Exit with status 1 not only if a result is unexpected, but also if amplified "
+    "rounding errors may exceed the tolerance."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too; the ending of a name sets the "

@@ -17,7 +17,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter that omits options from the usage and keeps an example's lines."""
+    """A help formatter that keeps an example's lines, and shows only required options as usage."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         from textwrap import wrap
@@ -30,9 +30,11 @@ class _Formatter(argparse.HelpFormatter):
         return super()._fill_text(text, width, indent)
 
     def _format_usage(self, *arguments: Any) -> str:
-        _, actions, *_ = arguments
-        places = "".join(f" [{each.metavar}]" for each in actions if not each.option_strings)
-        return f"usage: {self._prog}{places} [options]\n\n"
+        usage, actions, *_ = arguments
+        places = " ".join(f"[{each.metavar}]" for each in actions if not each.option_strings)
+        forms = (usage or places).split("\n")
+        lines = [" ".join([self._prog, *form.split(), "[options]"]) for form in forms]
+        return "\n       ".join(["usage: " + lines[0], *lines[1:]]) + "\n\n"
 
 
 class Parser(argparse.ArgumentParser):
@@ -43,6 +45,7 @@ class Parser(argparse.ArgumentParser):
         self.module = import_module(f"pyharness.cli.verbs.{verb}")
         super().__init__(
             prog=f"pyharness {verb}",
+            usage=getattr(self.module, "USAGE", None),
             description=f"{description[:1].upper()}{description[1:]}.",
             epilog=f"example:\n  pyharness {self.module.EXAMPLE}",
             allow_abbrev=False,

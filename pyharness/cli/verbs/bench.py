@@ -25,8 +25,8 @@ _TERM_BODIES = 1000
 OPTIONS = {
     "--case N": "Measure only this case of Table 1 of the thesis, 1 to 7 (default: Cases 2 to 7, "
     "with --attitude also Case 1).",
-    "--horizon T": "End time of each integration, s, up to 1000 (default: 3, and also 100 for "
-    "Cases 3 and 4, with --attitude for all cases except 6).",
+    "--horizon T": "End time of each integration, s, up to 1000 (default: 3 and, in Cases 3 and 4, "
+    "also 100; with --attitude, also 100 in all cases except 6).",
     "--draws N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
     "instead of the cases.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
@@ -39,13 +39,14 @@ OPTIONS = {
     "(default: the present year and week, as in 2026-W47).",
     "--attitude": "Compute and measure the attitude (orientation) of the body together with omega.",
     "--method M,...": "Measure only these of our methods and programs, as named in the first "
-    "column of the result; none: leave them out (default: all).",
-    "--peers X,Y": "Measure only these third-party solvers, by the same names or by package "
-    "(heyoka, numba, scipy); none: leave them out (default: all installed ones).",
+    "column of the result; none: measure none of them (default: all).",
+    "--peers X,Y": "Measure only these third-party solvers, by their names in the first column "
+    "of the result or by package (heyoka, numba, scipy); none: measure none of them (default: all "
+    "installed ones).",
     "--compiled": "With --terms, have the C compiler translate Python functions first, as "
     "prepare(..., compiled=True) does.",
-    "--plan": "Measure instead how much time each computation that `pyharness plan` leaves out "
-    "would take.",
+    "--plan": "Measure instead how much time is saved by each computation that `pyharness plan` "
+    "can omit.",
     "--growth": "Measure instead how the error of the Taylor method grows with the integration "
     "time, up to 1e5 s, in Cases 3 and 4.",
     **shared.outputs(),

@@ -25,7 +25,8 @@ _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-readi
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
     "cards CARDS": "Show these cards (lines of the programs), by program, number or range, as in "
-    "two-term, 1660, 1040-1090 or two-term:1660 (default: contents; JSON, CSV and Markdown: all).",
+    "two-term, 1660, 1040-1090 or two-term:1660 (default: a table of "
+    "contents; in JSON, CSV and Markdown, all cards).",
     "--classes": "Count the notes of each kind (defect, doubtful reading, ...), the cards that "
     "they name, and the differences from the scan that they explain.",
     "--collate": "Compare the three programs, operation by operation, with each other and with "

@@ -29,16 +29,18 @@ OPTIONS = {
     "own).",
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
-    "--ablate": "Run every subset of each program's defects, and list the subsets by their "
-    "error up to the last step that all runs reached, largest first.",
-    "--numerics": "Show also drifts of energy and momentum, units in the last place, error "
-    "amplification, solve_ivp and run times (JSON and CSV always have them).",
+    "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
+    "error first. Errors are taken up to the last step that all runs reached.",
+    "--numerics": "Also show drifts of energy and momentum, differences between Fortran and Python "
+    "in units in the last place, the error amplification, the errors of SciPy's solve_ivp, and "
+    "run times (JSON and CSV always have them).",
     **shared.STRICT,
     **shared.EFFORT,
     **shared.outputs(),
 }
 # Without --numerics, these formats show no method of `solve_ivp`, and no verdict depends on one.
 _WITHOUT_METHODS = {"table", "markdown"}
+USAGE = shared.ONE_SCENE
 EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 
 

@@ -25,6 +25,7 @@ OPTIONS = {
     "a conjecture, because the thesis prints no such deck.",
     **shared.outputs(FORMATS, plot=""),
 }
+USAGE = "--program P"
 EXAMPLE = "deck --program runge-kutta --dialect gfortran --out runge-kutta.f"
 
 

@@ -15,6 +15,7 @@ OPTIONS = {
     "source checkout).",
     "--format F": "Output format of the list of written files: table (default) or json.",
 }
+USAGE = "(--out DIR | --data DIR)"
 EXAMPLE = "edition --out pages"
 
 

@@ -12,6 +12,7 @@ OPTIONS = {
     "missing (required).",
     "--format F": "Output format of the list of drawn figures: table (default) or json.",
 }
+USAGE = "--out DIR"
 EXAMPLE = "figures --out figures"
 
 

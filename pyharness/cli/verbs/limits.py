@@ -13,6 +13,7 @@ OPTIONS = {
     **shared.EFFORT,
     **shared.outputs(plot=""),
 }
+USAGE = shared.ONE_SCENE
 EXAMPLE = "limits --case 5 --program runge-kutta"
 
 

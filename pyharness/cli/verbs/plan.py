@@ -13,11 +13,12 @@ OPTIONS = {
     "chooses closed-form, quick or taylor).",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
-    "--velocity": "Include the translational velocity.",
-    "--times T1,T2,...": "Times of the results, s (default: one). Several require "
-    "intermediate output.",
+    "--velocity": "Include the computation of the translational velocity.",
+    "--times T1,T2,...": "Times of the results, s (default: only the end). Several times "
+    "require intermediate output.",
     **shared.outputs(plot=""),
 }
+USAGE = shared.ONE_SCENE
 EXAMPLE = "plan --case 5 --tolerance 1e-9"
 
 

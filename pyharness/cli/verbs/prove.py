@@ -14,8 +14,8 @@ from pyharness.truth.enclosure_report import certificates_report, enclosure_repo
 _DIGITS = 25
 OPTIONS = {
     **shared.SCENE,
-    "--times T1,T2,...": "Times of the results, s, all positive or all negative, in the order of "
-    "their distance from 0 (default: the end of the scene's last step).",
+    "--times T1,T2,...": "Times of the results, s, all positive or all negative, in order of "
+    "increasing distance from 0 (default: the end of the scene's last step).",
     "--digits D": f"Number of digits, 1 to {MOST_DIGITS} (default {_DIGITS}): the half-width of "
     "each interval is at most 10**-D rad/s, times the largest component of omega if that exceeds "
     "1 rad/s.",
@@ -29,6 +29,7 @@ OPTIONS = {
     **shared.EFFORT,
     **shared.outputs(plot=""),
 }
+USAGE = "(--case N | --scene FILE | --check FILE,...)"
 EXAMPLE = "prove --case 3 --times 1,3"
 
 

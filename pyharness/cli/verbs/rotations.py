@@ -16,6 +16,7 @@ OPTIONS = {
         "perturbations for all moments of inertia"
     ),
 }
+USAGE = shared.ONE_SCENE
 EXAMPLE = "rotations --case 4 --disturbance 1e-3"
 
 

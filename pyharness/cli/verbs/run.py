@@ -28,17 +28,17 @@ PROGRAM_FORMATS = ("printer", "tape5")
 FORMATS = (*shared.FORMATS, *PROGRAM_FORMATS)
 OPTIONS = {
     **shared.SCENE,
-    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)} (give this or "
-    "--method).",
+    "--program P": f"Run this program of the thesis: {', '.join(PROGRAMS)}. With "
+    "--case, give this or --method.",
     "--implementation I": "Language of the program: fortran or python (default fortran, but "
     "python with --word other than binary64).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates. "
     f"Fortran has only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method instead: auto (default with --scene), taylor, "
-    "closed-form, dop853 or another of docs/reference/methods.md.",
+    "--method M": "Solve the scene by this method instead of a program: auto (default with --scene), "
+    "taylor, closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results of --method, s, of either sign, in increasing or "
+    "--times T1,T2,...": "Times of the results of --method, s, positive or negative, in increasing or "
     "decreasing order (default: the ends of the scene's steps).",
     "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: only "
     f"if the scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}; 3-1-3, "
@@ -51,13 +51,14 @@ OPTIONS = {
     "a SciPy method may have missed a short change of the torque; needs --method.",
     **shared.EFFORT,
     **shared.outputs(FORMATS),
-    "--format F": f"Output format: {', '.join(FORMATS)} (default {FORMATS[0]}). printer and "
-    "tape5, for programs, are the printed page and the binary file TAPE5.",
+    "--format F": f"Output format: {FORMATS[0]} (default), {', '.join(shared.FORMATS[1:])}. With "
+    "--program also printer (the printed page) and tape5 (the binary file TAPE5).",
 }
 GROUPS = {
     "a program of the thesis": "program implementation word",
     "another method": "method times attitude tolerance animate strict",
 }
+USAGE = "--case N (--program P | --method M)\n--scene FILE [--program P | --method M]"
 EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 
 

@@ -17,13 +17,15 @@ FORMATS = ("table", "json")
 _ACTIONS = ("new", "check", "schema")
 _NEW = Path(__file__).with_name("brick.toml")
 OPTIONS = {
-    "action ACTION": "What to do: new (write a sample scene file), check (check a file) or "
-    "schema (print the JSON Schema of scene files, for an editor).",
+    "action ACTION": "One of new (write a sample scene file), check (check FILE) and schema "
+    "(print the JSON Schema of scene files, for an editor).",
     "file FILE": "The scene file to check.",
     "--case N": "With new, write this case of Table 1 of the thesis, 1 to 7 (default: a brick, "
     "with every section of a scene file).",
     **shared.outputs(FORMATS, plot=""),
+    "--format F": "With check, the output format: table (default) or json.",
 }
+USAGE = "ACTION [FILE]"
 EXAMPLE = "scene new --out brick.toml"
 
 

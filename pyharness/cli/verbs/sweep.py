@@ -27,7 +27,7 @@ OPTIONS = {
     "--repair": "Recompute damaged blocks (chunks) of the grid in the store, and rewrite damaged "
     "metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in "
-    "several) or dask (in a Dask cluster).",
+    "several processes of this machine) or dask (in a Dask cluster).",
     "--workers N": "Number of worker processes of --executor processes or dask, 1 to "
     f"{_MOST_WORKERS} (default: one for each processor).",
     "--scheduler ADDRESS": "Address of the scheduler of a Dask cluster, as in tcp://host:8786 "
@@ -36,6 +36,7 @@ OPTIONS = {
     "numerical values).",
     **{key: help for key, help in shared.outputs().items() if key != "--out FILE"},
 }
+USAGE = "FILE.toml --out STORE"
 EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 

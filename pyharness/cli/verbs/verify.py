@@ -16,16 +16,28 @@ FORMATS = ("table", "json", "junit", "markdown")
 # Options that apply to only one kind of check, by kind.
 _OF_ONE_KIND = {"random": ("seed", "draws"), "golden": ("record",)}
 _OF_THE_CHECKS = ("only", "seed", "draws", "external", "self_test", "update", "record", "also")
+_ABOUT = {
+    "cells": "Fortran programs against Python",
+    "words": "other floating-point formats",
+    "decks": "the compiled cards",
+    "schemes": "single steps of the programs",
+    "stops": "the stop test of the Runge-Kutta program",
+    "methods": "errors of omega",
+    "prepared": "solvers of `prepare`",
+    "attitudes": "errors of the attitude",
+    "orders": "orders of convergence",
+    "random": "random scenes",
+    "external": "published results",
+    "golden": "stored trajectories",
+}
 OPTIONS = {
-    "--only ID,...": f"Run only checks of these kinds: {', '.join(KINDS)}; or only those whose "
-    "ids begin with this text, as in cells/two-term. Some kinds: cells (Fortran "
-    "against Python), words (other floating-point formats), decks (the compiled cards), schemes "
-    "(single steps), stops (stopped runs), prepared (solvers of `prepare`), golden (stored "
-    "trajectories).",
+    "--only ID,...": "Run only checks of these kinds, or only those whose ids begin with this text, "
+    "as in cells/two-term. Kinds: "
+    f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes (default: {DRAWS}; with --port 0, with --integrator 2 "
-    "of each kind).",
+    "--draws N": f"Number of random scenes (default: {DRAWS}; 0 with --port; 2 of each kind with "
+    "--integrator).",
     "--external FILE": "Only compare our methods with the published results in this file "
     "(format: docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in "
@@ -34,28 +46,29 @@ OPTIONS = {
     "compare it bit for bit with ours in Python (docs/how-to/ports.md).",
     "--integrator COMMAND": "Start an integrator of rigid bodies by this command, compare it "
     "with the true solution of random scenes, and name its faults (docs/how-to/integrators.md).",
-    "--order P": "Lowest order of convergence that --integrator may have (default 1).",
+    "--order P": "Lowest order of convergence that your integrator (--integrator) may have "
+    "(default 1).",
     "--program P": "With --listing-output or --port, consider only this program: two-term, "
     "four-term or runge-kutta (default: all three).",
     "--case N": "With --listing-output or --port, consider only this case of Table 1 of the "
     "thesis, 1 to 7 (default: all).",
     "--cell NAME,...": "With --port, compare only these runs, as in two-term/case-3, or random "
-    "scenes, as in random/7; with --integrator, only these scenes or kinds (free, constant, "
-    "wave), as in wave-1 (default: all).",
+    "scenes, as in random/7; with --integrator, only these scenes, as in wave-1, or only scenes "
+    "with these kinds of torque: free (none), constant, wave (default: all).",
     "--self-test": "Plant known faults one by one in the software, or in the answers of --port "
     "or --integrator, and report which checks detect each.",
     "--update": "Compute and write the stored trajectories (golden) again, and report "
     "what changed.",
     "--record DIR": "Folder of the stored trajectories (default: tests/golden of the source "
     "checkout).",
-    **shared.outputs(FORMATS, plot="the errors of the integrator of --integrator"),
+    **shared.outputs(FORMATS, plot="the errors of your integrator (--integrator)"),
     **shared.ALSO,
 }
 GROUPS = {
-    "all programs and methods": "only seed draws self-test update record",
+    "our programs and methods": "only seed draws self-test update record",
     "a program of yours": "port integrator order",
     "data of yours": "external listing-output",
-    "a part of these": "program case cell",
+    "selection with the options above": "program case cell",
 }
 EXAMPLE = "verify --only cells,methods"
 

@@ -17,12 +17,12 @@ FORMATS = ("table", "json", "csv", "markdown")
 OPTIONS = {
     "--case N": "Run only this case of Table 1 of the thesis, 1 to 7 (default: all).",
     "--program P": f"Run only this program: {', '.join(PROGRAMS)} (default: all three).",
-    "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits, "
-    "not only a verdict on CDC arithmetic (about two minutes; implied by --plot and by formats "
-    "other than table).",
-    "--all": f"Use every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits instead of selected "
-    "ones (about twelve minutes).",
-    "--vectors FILE": "Instead, check our emulation of the CDC's arithmetic against the "
+    "--lengths": f"Show each run in selected precisions from {LENGTHS[0]} to {LENGTHS[-1]} bits "
+    "(about two minutes; implied by --plot and by formats other than table). By default, show only "
+    "whether CDC arithmetic changes the result.",
+    "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits (about "
+    "twelve minutes).",
+    "--vectors FILE": "Run no program, but check our emulation of the CDC's arithmetic against the "
     "operations and results in this JSON file.",
     **shared.outputs(FORMATS, plot="the error against the precision, for one --case,"),
 }

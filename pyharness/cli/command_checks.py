@@ -124,9 +124,9 @@ def show_self_test(
     refuse: Callable[[], None] = lambda: None,
     **extra: Any,
 ) -> int:
-    """Write the report of a self-test with `count` faults and a control.
+    """Write the report of a self-test: `count` planted faults after a control without fault.
 
-    Return 0 if every outcome passes, else 1. If the control fails, `refuse` is called.
+    Return 0 if every outcome passes, else 1. Call `refuse` if the control fails.
     """
     found = []
     for each in outcomes:

@@ -1,4 +1,4 @@
-"""Interruption: at any time Ctrl-C ends a command with one line and exit status 130.
+"""Interruption: at any time Ctrl-C ends a command with a one-line message and exit status 130.
 
 KeyboardInterrupt can be raised between any two instructions. An import may replace it, and a
 finalizer or a callback may drop it. The signal is therefore recorded, and a dropped exception is
@@ -34,7 +34,7 @@ class _Interruption:
         self.is_reported = False
 
     def leave_at_once(self, *_: object) -> None:
-        """Print the line, unless printed before, and end the process without cleanup."""
+        """Print "pyharness: interrupted", unless done before; end the process without cleanup."""
         try:
             if not self.is_reported:
                 os.write(2, LINE.encode())
@@ -67,9 +67,9 @@ def came() -> bool:
 
 
 def leave_when_interrupted() -> bool:
-    """Make Ctrl-C end the process at once; return False if SIGINT is ignored.
+    """Make Ctrl-C end the process at once and return True; return False if SIGINT is ignored.
 
-    It serves while nothing needs cleanup: during imports, and after the results are written.
+    This is right while nothing needs cleanup: during imports, and after the results are written.
     """
     # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -112,9 +112,9 @@ def report() -> int:
 def leave(code: int) -> None:
     """Remove temporary files and end the process.
 
-    Python's own exit would wait for threads, free all memory, and on Ctrl-C drop the interrupt or
-    end by the signal. After an interrupt, child processes are ended, and cleanup may take two
-    seconds.
+    Python's own exit would wait for threads and free all memory; on Ctrl-C it would drop the
+    interrupt, or end by the signal instead of with status 130. After an interrupt, child processes
+    are ended, and cleanup may take two seconds.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.

@@ -15,7 +15,7 @@ def schema() -> dict[str, Any]:
 
 
 def fields(whole: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and the meaning of each field of a part of the schema."""
+    """Yield the path and the meaning of each field of `part` of the schema `whole`."""
     for name, each in part.get("properties", {}).items():
         own = each
         if "description" not in each:

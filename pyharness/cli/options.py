@@ -73,7 +73,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory of a draw, on one core of 2026, and the limit on draws."""
+    """The time and memory of a random draw, on one core of 2026, and the largest count of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # per draw
@@ -89,7 +89,7 @@ SCENES = Cost("random scenes", 8.0, 1e5, 10_000)
 
 
 def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict[str, str]:
-    """Return --format, --plot and --out with their help texts.
+    """Return the options --format, --plot and --out, each with its help text.
 
     The first of `formats` is the default. `plot` names the content of the picture; if empty, there
     is no --plot.
@@ -105,29 +105,29 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
 
 
 def chosen_effort(options: argparse.Namespace) -> float:
-    """Return --effort, the factor on work limits; 1 by default."""
+    """Return the value of --effort, the factor on work limits; 1 by default."""
     return positive(options.effort, "--effort", 1.0)
 
 
 def chosen_case(options: argparse.Namespace) -> int | None:
-    """Return the number of --case, or None."""
+    """Return the number of the case in --case, or None."""
     check_known("case", options.case, [str(each) for each in case_numbers()])
     return None if options.case is None else int(options.case)
 
 
 def chosen_cases(options: argparse.Namespace) -> list[int]:
-    """Return the number of --case, or all numbers by default."""
+    """Return the number of the case in --case, or by default the numbers of all cases."""
     case = chosen_case(options)
     return list(case_numbers()) if case is None else [case]
 
 
 def chosen_tolerance(options: argparse.Namespace) -> float | None:
-    """Return --tolerance; None for the method's default."""
+    """Return the value of --tolerance; None for the method's default."""
     return None if options.tolerance is None else positive(options.tolerance, "--tolerance", 1.0)
 
 
 def chosen_seed(options: argparse.Namespace) -> str | None:
-    """Return --seed or None; raise InputError if it has unprintable characters."""
+    """Return the value of --seed, or None; raise InputError if it has unprintable characters."""
     if options.seed is not None and not options.seed.isprintable():
         raise InputError(
             "--seed: contains characters that can't be printed; allowed: printable characters"
@@ -159,7 +159,7 @@ def chosen_scene(options: argparse.Namespace, **allowed: bool) -> Scene:
 
     Warn of impossible moments and of a normalised attitude. Raise InputError for a full inertia
     matrix, a torque about the axes of space or dependent on the state, or a changing inertia,
-    unless `allowed`, passed to `checked_scene`, accepts it.
+    unless a flag in `allowed` (those of `checked_scene`) accepts it.
     """
     if (options.case is None) == (options.scene is None):
         raise InputError("give either --case N (1 to 7) or --scene FILE")
@@ -198,7 +198,7 @@ def chosen_programs(options: argparse.Namespace) -> tuple[str, ...]:
 
 
 def chosen_listing(options: argparse.Namespace) -> Listing:
-    """Return the listing of --listing, --fix, --keep, --reading and --conjecture.
+    """Return the listing that --listing, --fix, --keep, --reading and --conjecture describe.
 
     Warn of readings and conjectures without effect.
     """
@@ -209,7 +209,7 @@ def chosen_listing(options: argparse.Namespace) -> Listing:
 
 
 def changes_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the names in --fix, --keep, --reading and --conjecture."""
+    """Return the names in --fix, --keep, --reading and --conjecture, as arguments of `subset`."""
     found = {"fix": options.fix, "keep": options.keep, "readings": options.reading}
     assumed = None if options.conjecture is None else names(options.conjecture)
     return {**{each: names(text) for each, text in found.items()}, "conjectures": assumed}
@@ -232,7 +232,7 @@ def listing_text(listing: Listing) -> str:
 
 
 def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the limit of the stop test (1/s; default 500, as on the cards), and if it is on."""
+    """Return the stop test's limit (1/s; default 500, as on the cards), and whether to test."""
     if options.program not in (None, "runge-kutta"):
         refuse(options, f"--program {options.program}", ("lipschitz", "no_stop"))
     if options.no_stop:
@@ -244,7 +244,7 @@ def chosen_stops(options: argparse.Namespace) -> dict[str, Any]:
 def refuse(options: argparse.Namespace, chosen: str, names: Iterable[str]) -> None:
     """Raise InputError if an option of `names` is given besides `chosen`.
 
-    A name is an attribute, such as "no_stop", or a key, such as "--case N".
+    A name is an attribute of `options`, such as "no_stop", or a key of OPTIONS, such as "--case N".
     """
     for name in names:
         option = name.partition(" ")[0].removeprefix("--").replace("_", "-")
@@ -300,9 +300,9 @@ def whole_up_to(most: int, text: str | None, option: str, default: int) -> int:
 
 
 def chosen_count(text: str | None, option: str, default: int, least: int, cost: Cost) -> int:
-    """Return an option's number of draws, or the default; raise InputError if it is not allowed.
+    """Return an option's number of draws, from `least` to `cost.most`, or the default.
 
-    Print a forecast if they take more than a minute.
+    Raise InputError for other numbers. Print a forecast if the draws take more than a minute.
     """
     if text is None:
         return default
@@ -327,7 +327,7 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return the files of --also, each with its format."""
+    """Return the format of each file in --also; raise InputError for an unknown ending."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""
@@ -379,8 +379,8 @@ def show(
 ) -> int:
     """Write a report in the format of --format, the picture of --plot, and the files of --also.
 
-    `own` maps formats of this report alone, such as "tape5", to functions that return the content.
-    Return the exit status, 1 if `failed` is true, else 0.
+    `own` maps formats that only this report has, such as "tape5", to functions that return the
+    content. Return the exit status, 1 if `failed` is true, else 0.
     """
     from pyharness.views.render import render
 

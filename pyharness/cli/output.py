@@ -1,6 +1,7 @@
 """Functions that write output folders, completely or not at all.
 
-Messages name `option`, the source of the path. Verbs call the checks before any computation.
+Messages name `option`, with which the user gave the path. Verbs call the checks before any
+computation.
 """
 
 import json
@@ -33,10 +34,10 @@ def check_folder(path: str, names: Iterable[str], option: str) -> None:
 
 
 def _why_not_made(folder: Path) -> str:
-    """Return the reason why a folder can't be made, after a colon, or "".
+    """Return ": " and the reason why a folder can't be made, or "" if it can.
 
-    The folder is made and removed: permissions do not show that a name is too long, or that a file
-    system accepts no folder.
+    The folder is made and removed, because permissions do not show that a name is too long, or that
+    a file system accepts no folder.
     """
     if not folder.parent.is_dir():
         return ": there is no such folder"
@@ -69,15 +70,15 @@ def write_folder(path: str, contents: dict[str, bytes], option: str) -> None:
 def check_tree(path: str, mark: str, option: str, kind: str = "edition") -> None:
     """Raise InputError if `write_tree` may not replace the folder.
 
-    The folder may be new or empty, or contain only the JSON file `mark`, of schema `kind`, and the
-    files that it lists.
+    The folder may be missing or empty, or contain only the JSON file `mark`, of schema `kind`, and
+    the files that `mark` lists.
     """
     check_folder(path, (), option)
     folder = Path(os.path.realpath(path))
     new, _ = _beside(folder)
     try:
         reason = _why_not_anew(folder, mark, kind)
-        # As in `_why_not_made`, permissions alone do not tell.
+        # As in `_why_not_made`, permissions alone do not show whether this is possible.
         if not reason:
             new.mkdir()
             try:
@@ -124,8 +125,8 @@ def _beside(folder: Path) -> tuple[Path, Path]:
 def write_tree(path: str, contents: dict[str, bytes], option: str) -> None:
     """Replace a folder by one with only the files in `contents`, by path.
 
-    The new folder is complete before the old one is removed. On failure raise InputError and leave
-    the old one unchanged.
+    The new folder is complete before the old one is removed. If writing fails, the old folder
+    remains unchanged, and InputError is raised.
     """
     folder = Path(os.path.realpath(path))
     new, old = _beside(folder)

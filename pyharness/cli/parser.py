@@ -38,7 +38,7 @@ class _Formatter(argparse.HelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """The parser of one verb, whose errors suggest the nearest known name."""
+    """The parser of one verb's options; an error suggests the nearest known name."""
 
     def __init__(self, verb: str, description: str = "") -> None:
         self._width = _WIDEST
@@ -105,7 +105,8 @@ class Parser(argparse.ArgumentParser):
     def _joined(self, arguments: Sequence[str]) -> list[str]:
         """Return the arguments with negative numbers joined to their options, as in --x=-1.
 
-        Argparse would parse such numbers as options. Old names of options become the new ones.
+        Argparse would parse such numbers as options. Old names of options are replaced by the new
+        ones.
         """
         result: list[str] = []
         for argument in arguments:

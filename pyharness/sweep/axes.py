@@ -30,9 +30,9 @@ CHOICES = {
 class Field:
     """A number of a scene or solver that an axis may vary.
 
-    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch share
-    the value, except step size and Lipschitz constant for the thesis's programs. If `whole`, values
-    are rounded to integers.
+    `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch must
+    share the value; for the thesis's programs, step size and Lipschitz constant may differ all the
+    same. If `whole`, values are rounded to integers.
     """
 
     units: str
@@ -93,8 +93,8 @@ NUMBERS = {
     "lipschitz": Field("1/s", "constant of the stop test", *_FROM_ZERO, looped=True),
 }
 _POLAR = ("omega.magnitude", "tilt", "azimuth", "height", "longitude")
-# Groups of fields, by the beginnings of their names, that exclude each other, mostly because they
-# describe the same quantity.
+# Pairs of groups of fields, by the beginnings of their names. A field of one group excludes those
+# of the other, mostly because both describe the same quantity.
 RIVALS = (
     (("omega.1", "omega.2", "omega.3"), _POLAR),
     (("tilt", "azimuth"), ("height", "longitude")),
@@ -107,12 +107,12 @@ RIVALS = (
 
 
 def field_names() -> list[str]:
-    """Return the fields that an axis may vary, without the constants of expressions."""
+    """Return the names of the fields that an axis may vary, without constants of expressions."""
     return [*NUMBERS, *CHOICES]
 
 
 def number_field(name: str) -> Field:
-    """Return the field of a key of `NUMBERS`, or of a constant; raise KeyError for others."""
+    """Return the field `name`, a key of `NUMBERS` or a constant; raise KeyError for others."""
     if name.startswith(CONSTANTS):
         return Field("", "constant of the torque's expressions", looped=True)
     return NUMBERS[name]
@@ -143,11 +143,11 @@ class Axis:
     """One axis of a sweep's grid: a field of the scene or solver, as in ``omega.1``.
 
     Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
-    together. `how` tells what `values` are:
+    together. `how` is one of the following, and determines what `values` contains:
 
-    - `listed`: all values;
-    - a spacing of `SPACINGS`: both ends;
-    - a distribution of `DRAWS`: its parameters.
+    - `listed`: all values of the axis;
+    - a spacing of `SPACINGS`: the first and the last value;
+    - a distribution of `DRAWS`: the parameters of the distribution.
     """
 
     field: str
@@ -188,7 +188,8 @@ def _coordinates(axis: Axis) -> NDArray[Any]:
 
 
 def _draw(axis: Axis) -> Floats:
-    # Drawn at once, values do not depend on the chunks. Each field has its own random sequence.
+    # All values are drawn at once, so that they do not depend on the chunks. Each field has its own
+    # random sequence.
     seeds = np.random.SeedSequence([axis.seed, zlib.crc32(axis.field.encode())])
     source = np.random.Generator(np.random.Philox(seeds))
     if axis.how == "sphere":
@@ -205,24 +206,24 @@ def _draw(axis: Axis) -> Floats:
 
 
 def _between(first: float, last: float, made: Callable[[float, float], Floats]) -> Floats:
-    """Return ``made(first, last)`` without an overflow of `last - first`."""
+    """Return ``made(first, last)``, without an overflow if ``last - first`` is too large."""
     if math.isfinite(last - first):
         return made(first, last)
-    # So far from underflow, halving and doubling are exact.
+    # Numbers as large as these are halved and doubled exactly.
     with np.errstate(over="ignore"):
         doubled = 2.0 * made(0.5 * first, 0.5 * last)
     return np.clip(doubled, min(first, last), max(first, last))
 
 
 def check_name(what: str, name: object, allowed: Iterable[str], where: str = "") -> str:
-    """Return a name from a sweep file; raise InputError if it is not `allowed`."""
+    """Return `name`, read from a sweep file; raise InputError if it is not `allowed`."""
     if not isinstance(name, str) or name not in allowed:
         raise unknown(what, name, allowed, where)
     return name
 
 
 def axis_of(table: object, number: int) -> Axis:
-    """Return the axis of table [[axis]] `number`, from 1; raise InputError if it is invalid."""
+    """Return the axis of `table`, the [[axis]] `number` (from 1); raise InputError if invalid."""
     where = f"[[axis]] {number}"
     if not isinstance(table, dict):
         raise InputError(f"{where} is {kind_of(table)}; it must be a table [[axis]]")
@@ -303,7 +304,7 @@ def _refuse(where: str, table: dict[str, Any], chosen: str, keys: Iterable[str])
 
 
 def _checked(where: str, axis: Axis) -> Axis:
-    """Return `axis`; raise InputError if its extremes are not allowed."""
+    """Return `axis`; raise InputError if its least or its largest value is not allowed."""
     field = number_field(axis.field)
     if axis.how == "sphere":
         return axis

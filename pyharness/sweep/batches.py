@@ -1,6 +1,7 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-The scenes share the values in `scene`; `own` maps each field that varies to n values.
+The n scenes of a batch share the values of one scene; `own` maps each field that varies to its n
+values.
 """
 
 import tomllib
@@ -30,7 +31,8 @@ Columns = dict[str, Array]
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
     """Solve chunk number `chunk`, from 0, in any executor.
 
-    Arrays have the shape of the chunk, and one more dimension for several components.
+    The result maps each reduction to an array with the shape of the chunk, and one more dimension
+    if the reduction has several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)
@@ -39,7 +41,7 @@ def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
-    """Solve the scenes that `where` selects by an index array per dimension.
+    """Solve the scenes that `where` selects by an array of indices for each dimension.
 
     The first dimension of the results runs over the scenes.
     """
@@ -54,9 +56,9 @@ def solve_points(sweep: Sweep, where: list[Indices]) -> Arrays:
 def listing_of(program: str, listing: str, reading: str) -> Listing:
     """Return the listing that the fields `listing` and `reading` of a sweep describe.
 
-    `listing` is ``original``, ``corrected``, ``fix:`` and the only defects to correct, or ``keep:``
-    and the only defects to keep. `reading` is ``adopted``, or the readings to activate. Names are
-    joined by ``+``.
+    `listing` is ``original``, ``corrected``, ``fix:`` followed by the only defects to correct, or
+    ``keep:`` followed by the only defects to keep. `reading` is ``adopted`` (our reading of every
+    doubtful card), or the other readings to use. Names are joined by ``+``.
     """
     how, _, names = listing.partition(":")
     readings = [] if reading == "adopted" else reading.split("+")
@@ -100,7 +102,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
         try:
             scene = with_numbers(scene, constants, changed)
         except InputError:
-            # Until the time NaN, all methods fail, and each scene reports it.
+            # With the end time NaN, every method fails, and each scene reports the failure.
             own["t_end"] = np.full(n, np.nan)
     solver = replace(sweep.solver, **shared)
     listing = None
@@ -123,7 +125,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 def _components(
     name: str, base: tuple[float, ...], own: Columns, n: int, first: int = 1
 ) -> Array | None:
-    """Return the fields ``name.first`` and so on, a row per scene; None if none of them varies."""
+    """Return the n values of each field ``name.1`` and so on, shape (n, fields); None if fixed."""
     fields = {f"{name}.{number}": value for number, value in enumerate(base, first)}
     if not any(field in own for field in fields):
         return None
@@ -132,7 +134,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" (kg m2) or "coefficients", and n values, None if not varied."""
+    """Return "moments", "inertia" (kg m2) or "coefficients", with n values, or None if fixed."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -187,10 +189,11 @@ def _omega(scene: Scene, own: Columns, moments: Array | None, n: int) -> Array:
 
 
 def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) -> Array:
-    """Return unit vectors (n, 3) with given angles (rad) from the body's principal axes.
+    """Return unit vectors, shape (n, 3), with given angles (rad) from the body's principal axes.
 
-    `tilt` is from the axis of the middle moment. `azimuth` is about it, from the axis of the least
-    moment towards that of the largest. `moments` is (n, 3), or None for the scene's body.
+    `tilt` is the angle from the axis of the middle moment. `azimuth` is the angle about this axis,
+    from the axis of the least moment towards the axis of the largest. `moments` (kg m2) has shape
+    (n, 3), or is None for the scene's body.
     """
     bodies = np.array([scene.moments]) if moments is None else moments
     order = np.broadcast_to(np.argsort(bodies, axis=1, kind="stable"), (len(tilt), 3))
@@ -204,8 +207,8 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 def check_state_axis(scene: Scene, field: str) -> None:
     """Raise InputError if the scene's torque lacks the field of an axis.
 
-    A torque that depends on the state has neither constant nor linear term; only expressions have
-    named constants.
+    A torque that depends on the state has no fields for a constant and a linear term; only a torque
+    given by expressions has named constants.
     """
     torque = scene.torque
     if isinstance(torque, StateTorque):
@@ -241,7 +244,7 @@ def check_state_solver(scene: Scene, methods: Sequence[str], has_program: bool) 
 
 
 def follows_body(scene: Scene) -> bool:
-    """Return whether the torque has a ready term with the inertia of the scene's body."""
+    """Return whether a ready-made term of the torque contains the inertia of the scene's body."""
     return isinstance(scene.torque, StateTorque) and any(
         _is_of_body(dict(term), scene) for term in _terms(scene.torque)
     )
@@ -250,7 +253,7 @@ def follows_body(scene: Scene) -> bool:
 def with_numbers(
     scene: Scene, constants: Mapping[str, float], values: Sequence[Any] | None
 ) -> Scene:
-    """Return the scene with other constants of expressions, or other values of its body."""
+    """Return the scene with other constants of its torque's expressions, or of its body."""
     data: dict[str, Any] = tomllib.loads(scene_text(scene))
     if constants:
         data["torque"]["constants"].update(constants)
@@ -259,7 +262,8 @@ def with_numbers(
         data["body"] = {body_of(scene)[0]: list(values)}
         for table, term in zip(data["torque"]["terms"], _terms(scene.torque), strict=True):
             if _is_of_body(dict(term), scene):
-                # Without it, the reader takes the inertia of the table [body].
+                # Without its own inertia, the reader gives the term the inertia of the table
+                # [body].
                 del table["inertia"]
     return scene_of(data, scene.name)
 

@@ -1,6 +1,6 @@
-"""Executors, which compute the chunks of a sweep here or elsewhere, with equal results.
+"""Executors, which compute the chunks of a sweep in this or other processes, with equal results.
 
-Child processes ignore Ctrl-C, and end with this process.
+Child processes ignore Ctrl-C, and end when this process ends.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from pyharness.sweep.sweep import Arrays, Sweep
 EXECUTORS = ("here", "processes", "dask")
 Results = Generator[tuple[int, Arrays], None, None]
 
-# Successive deaths of processes, without a completed chunk, at which the sweep ends.
+# After so many deaths of processes in a row, without a completed chunk between, the sweep ends.
 _ATTEMPTS = 3
 _AHEAD = 2  # chunks submitted for each process, so that no process waits for the disk
 _ANSWER = 4.0  # time (s) in which a scheduler must answer and have a worker
@@ -39,8 +39,8 @@ _ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(?P<host>[\w.-]+|\[[\da-fA-F:.]+\]):(
 class Engine(NamedTuple):
     """A started executor.
 
-    `computed` takes a sweep and numbers of chunks. It yields the number and the results (arrays by
-    reduction) of each chunk when it is completed.
+    `computed` takes a sweep and the numbers of the chunks to compute. As each chunk is completed,
+    it yields the number of the chunk and its results, an array for each reduction.
     """
 
     workers: int
@@ -52,11 +52,11 @@ class Engine(NamedTuple):
 def engine(
     executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Engine]:
-    """Start an executor, and yield it.
+    """Start an executor, and yield it as an Engine.
 
     `executor` is ``here``, ``processes`` or ``dask``; `workers` is by default the number of
-    processors. Without the `address` of a scheduler, ``dask`` starts a cluster here. Raise
-    InputError if no scheduler with a worker answers, and later, if no worker is left.
+    processors. Without the `address` of a scheduler, ``dask`` starts a cluster on this machine.
+    Raise InputError if no scheduler with a worker answers, and also later if no worker is left.
     """
     if executor == "here":
         yield Engine(1, _solve_here, is_here=True)
@@ -100,7 +100,7 @@ def _by_processes(workers: int, sweep: Sweep, chunks: list[int]) -> Results:
 def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
     # A fork of a process with threads, as of NumPy and Zarr, may hang.
     context = multiprocessing.get_context("spawn")
-    # The pool creates semaphores, with which Python would otherwise start its own tracker.
+    # The pool creates semaphores, at which Python would otherwise start its resource tracker.
     with deaf_children():
         pool = ProcessPoolExecutor(workers, context, end_with_parent)
     waiting: dict[Future[Arrays], int] = {}
@@ -127,8 +127,8 @@ def _by_pool(sweep: Sweep, chunks: list[int], workers: int) -> Results:
 def deaf_children() -> Iterator[None]:
     """Block Ctrl-C in all processes and threads that are started within this context.
 
-    A terminal sends SIGINT to all its processes, but only the parent should react. The calling
-    thread receives the signal when the context ends.
+    A terminal sends SIGINT to all its processes, but only the parent process should react. Until
+    the context ends, the signal is also withheld from the calling thread.
     """
     # Children inherit a blocked signal. Python would start the resource tracker with the first
     # child, and then unblock the signal.
@@ -147,9 +147,9 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process when its parent ends, for whatever reason.
+    """Start a thread that ends this process as soon as its parent process ends.
 
-    Without a parent in `multiprocessing`, no thread is started.
+    No thread is started if `multiprocessing` knows no parent process.
     """
     parent = multiprocessing.parent_process()
     if parent is None:
@@ -173,7 +173,7 @@ def check_dask() -> None:
 
 @contextlib.contextmanager
 def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
-    """Start a Dask cluster here, and yield a client; Ctrl-C works while it starts."""
+    """Start a Dask cluster on this machine, which Ctrl-C can interrupt, and yield a client."""
     started: list[Any] = []
     errors: list[Exception] = []
     wanted = threading.Event()
@@ -247,7 +247,7 @@ async def _has_workers(dask: Any, address: str, answered: list[bool]) -> None:
 
 
 def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
-    """Yield number and results of each chunk; Dask repeats the chunks of dead workers."""
+    """Yield number and results of each chunk; Dask recomputes the chunks of dead workers."""
     dask: Any = import_module("distributed")
     n_threads = sum(client.nthreads().values())
     rest = iter(chunks)
@@ -256,7 +256,8 @@ def _by_client(client: Any, sweep: Sweep, chunks: list[int]) -> Results:
 
     def submit() -> None:
         if (chunk := next(rest, None)) is not None:
-            # In each task, because the sweep could be lost with the workers that received it.
+            # The sweep is sent with each task: sent once, it could be lost with the workers that
+            # received it.
             future = client.submit(solve_chunk, sweep, chunk, pure=False)
             chunk_of[future.key] = chunk
             running.add(future)

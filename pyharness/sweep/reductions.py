@@ -1,7 +1,7 @@
 """Reductions: the quantities that a sweep can store for each scene.
 
-`samples` is the number of times at which states are read; `of` names a principal axis by the rank
-of its moment.
+Parameters of several reductions: `samples` is the number of times at which states are read; `of`
+names a principal axis by the rank of its moment (least, middle or largest).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -29,9 +29,10 @@ class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
     `compute` returns, for a batch of n scenes and the parameters, n values, or n rows with a value
-    for each of `labels`, along `dimension`. `only` is `program` or `method` if the other can't
-    compute it; `needs` lists `moments`, `no torque` or `attitude`. `parameters` has the defaults,
-    `flags` the meanings of codes of outcomes.
+    for each of `labels`, along `dimension`. `only` is `program` or `method` if the quantity exists
+    for programs or methods alone. `needs` lists requirements of the scene: `moments`, `no torque`
+    or `attitude`. `parameters` has the defaults. If the values are codes of outcomes, `flags` has
+    their meanings.
     """
 
     title: str
@@ -119,14 +120,14 @@ def _angles(ours: Array, theirs: Array) -> Array:
 
 
 def _axis_tilt(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return the largest angles (rad) between an axis and its initial direction, shape (n,)."""
+    """Return the largest angle (rad) between an axis and its initial direction, shape (n,)."""
     return np.asarray(_tilts(batch, given).max(axis=1))
 
 
 def _tilted_time(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return how long (s) an axis is tilted by more than `above` (rad), shape (n,).
+    """Return the time (s) for which an axis is tilted by more than `above` (rad), shape (n,).
 
-    Each sample counts for the time since the sample before.
+    Each sample counts for the time since the previous sample.
     """
     angles = _tilts(batch, given)
     share = (angles > given["above"]).mean(axis=1)
@@ -134,16 +135,16 @@ def _tilted_time(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _axis_flips(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return how often an axis's tilt passes a right angle between samples, shape (n,)."""
+    """Return how often the tilt of an axis passes 90 degrees from sample to sample, shape (n,)."""
     along, across = _tilt_squares(batch, given)
     is_over = np.concatenate([np.zeros((len(along), 1), bool), across > along], axis=1)
     return np.asarray((is_over[:, 1:] != is_over[:, :-1]).sum(axis=1))
 
 
 def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
-    """Return the final angles (rad) between an axis and a direction in space, shape (n,).
+    """Return the final angle (rad) between an axis and a direction in space, shape (n,).
 
-    The direction is `towards` or, if empty, the axis's initial one.
+    The direction is `towards` or, if that is empty, the initial direction of the axis.
     """
     if not given["towards"]:
         return _axis_tilt(batch, {**given, "samples": 1})
@@ -158,7 +159,7 @@ def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _in_space(batch: Batch) -> Found:
-    """Return the attitudes at the end, shape (n, 4)."""
+    """Return the attitudes at the end as quaternions, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 
@@ -169,7 +170,7 @@ def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return the squared cosine and sine of half an axis's angle from its initial direction."""
+    """Return the squared cosine and the squared sine of half the tilt of an axis at each sample."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
@@ -290,14 +291,14 @@ def needs_attitudes(asked: Iterable[ReductionSpec]) -> bool:
 
 
 def empty(asked: ReductionSpec, n: int) -> Found:
-    """Return an array of missing values, shape (n,) or (n, components)."""
+    """Return an array of missing values for n scenes, shape (n,) or (n, components)."""
     reduction = REDUCTIONS[asked.reduction]
     shape = (n, len(reduction.labels)) if reduction.labels else (n,)
     return np.full(shape, reduction.fill, dtype=reduction.dtype)
 
 
 def reduced(asked: ReductionSpec, batch: Batch) -> Found:
-    """Return a reduction of a batch: a value, or a row of components, per scene."""
+    """Return a reduction of a batch: for each scene, a value or a row of components."""
     given = {**dict(asked.parameters), "function": asked.function}
     # Infinities and NaN are valid results.
     with np.errstate(all="ignore"):

@@ -35,7 +35,7 @@ _FLAGS = (*words("reduction value"), Column("scenes"))
 class Found(NamedTuple):
     """Statistics of one component of a reduction, in `units`.
 
-    `scenes` counts the scenes with a finite value, and `none` the others. `least`, `mean` and
+    `scenes` counts the scenes with a finite value, `none` the other scenes. `least`, `mean` and
     `largest` are None if no value is finite.
     """
 
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 def summary(store: Store, asked: ReductionSpec) -> tuple[list[Found], Counter[int]]:
     """Return the statistics of a reduction's components, and the counts of its codes of outcomes.
 
-    One of the two is empty. Values are read chunk by chunk.
+    One of the two is empty: a reduction yields numbers or codes. Values are read chunk by chunk.
     """
     reduction = REDUCTIONS[asked.reduction]
     labels = reduction.labels or ("",)
@@ -133,16 +133,17 @@ _MOST_PANELS = 6
 _MOST_PLACES = 200  # values along an axis of a map; more would not be visible
 _MOST_DOTS = 5000  # values in a panel with a line or dots
 _COLUMNS = 3  # of panels
-# Above so many orders of magnitude, a scale without negative values is logarithmic.
+# A scale without negative values is logarithmic if it spans more than so many orders of magnitude.
 _ORDERS = 3.0
 # The ends of a scale for all panels, and whether it is logarithmic.
 Scale = tuple[float, float, bool]
 
 
 def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
-    """Return the reduction `name`, by default the first without codes of outcomes, else the first.
+    """Return the reduction `name`, or by default the first whose values are numbers.
 
-    Raise InputError for an unknown name.
+    If there are only codes of outcomes, the default is the first reduction. Raise InputError for an
+    unknown name.
     """
     names = [asked.name for asked in sweep.reductions]
     if name is not None and name not in names:
@@ -154,8 +155,9 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
-    It is a map over the last two dimensions with several values that are numbers and not random;
-    with fewer, it is a line or dots.
+    The picture is a map over the last two dimensions that have several values, numbers and not
+    random. If there is only one such dimension, it is a line; if there is none, dots over a random
+    one.
     """
     from matplotlib.figure import Figure
 
@@ -202,7 +204,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
 ) -> list[tuple[str, Array]]:
-    """Return title and values of each panel; panels differ in the dimensions not shown."""
+    """Return title and values of each panel; panels differ in the values along other dimensions."""
     choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
     for dimension in (d for d in store.sweep.dimensions if d not in places):

@@ -23,9 +23,9 @@ from pyharness.sweep.sweep import Arrays, Indices, Sweep, spread
 
 # Scenes in the samples, evenly spread over the grid; the smallest sample is measured first.
 _SAMPLES = (8, 256, 2048, 8192)
-_ENOUGH = 0.2  # time (s) for a sample; if it took longer, it is usually large enough
-# A larger sample of at most the fraction `_PART` of all scenes, and at most `_LONGEST`, is measured
-# anyway: a small one includes too much of a batch's constant cost.
+_ENOUGH = 0.2  # s; a sample that took longer is usually large enough
+# The next larger sample is measured anyway if it has at most the fraction `_PART` of all scenes and
+# takes at most `_LONGEST`: a small sample includes too much of a batch's constant cost.
 _PART = 0.01
 _LONGEST = 60.0  # s
 # Fewest values sampled along a dimension in which all scenes of a batch are equal.
@@ -41,9 +41,10 @@ class Estimate(NamedTuple):
 
 
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
-    """Return the seconds to solve and write the missing chunks, and to read all chunks.
+    """Return the time (s) to solve and write the missing chunks, and to read all chunks.
 
-    If other processes compute, solving and writing overlap, and only the longer time counts.
+    If other processes compute, solving and writing overlap, and only the longer of both times
+    counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -52,7 +53,7 @@ def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
 
 
 def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
-    """Return the mean seconds to write, and to read, a chunk's files beside `path`.
+    """Return the mean times (s) to write, and to read, the files of a chunk beside `path`.
 
     Both are 0 if files can't be written; the sweep itself then reports the error.
     """
@@ -78,7 +79,7 @@ def seconds_of_files(sweep: Sweep, path: str) -> tuple[float, float]:
 
 
 def _pattern(sweep: Sweep, chunk: int) -> Arrays:
-    """Return random arrays like a chunk's results; equal values would be written too fast."""
+    """Return random arrays shaped as a chunk's results; equal values would be written too fast."""
     draw = np.random.default_rng(chunk)
     shape = tuple(part.stop - part.start for part in sweep.box(chunk))
     found = {}
@@ -92,15 +93,15 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 
 
 def seconds_per_chunk(sweep: Sweep) -> float:
-    """Return the seconds to solve a chunk in this process.
+    """Return the time (s) to solve a chunk in this process.
 
-    They are measured on sample scenes or, below 0.2 s, on whole chunks.
+    It is measured on sample scenes or, if below 0.2 s, on whole chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
     if seconds > _ENOUGH:
         return seconds
-    # Only whole chunks show the constant cost, which matters for fast ones.
+    # Only whole chunks show the constant cost of a chunk, which matters if they are fast.
     begin = time.perf_counter()
     count = min(_FILES, sweep.n_chunks)
     for i in range(count):
@@ -112,7 +113,7 @@ def seconds_per_chunk(sweep: Sweep) -> float:
 
 
 def seconds_per_scene(sweep: Sweep) -> float:
-    """Return the mean seconds to solve a scene, from samples spread over the grid."""
+    """Return the mean time (s) to solve a scene, from samples spread over the grid."""
     # Not timed, because this call imports the solver's modules.
     solve_points(sweep, spread(sweep, 1))
     for count, larger in zip(_SAMPLES, (*_SAMPLES[1:], math.inf), strict=True):
@@ -130,8 +131,9 @@ def seconds_per_scene(sweep: Sweep) -> float:
 def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     """Return the indices of sampled scenes, changed so that many share a batch.
 
-    Dimensions along which a batch is constant keep five distinct indices, or more if the batches of
-    a chunk are small, so that the sample's batches are about as large as real ones.
+    Along dimensions in which all scenes of a batch are equal, only five distinct indices remain, or
+    more if the batches of a chunk are small. The batches of the sample are then about as large as
+    real ones.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)
@@ -146,7 +148,8 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
     return found
 
 
-# Memory of a process over the size of a chunk; it holds several, and their computation needs more.
+# Ratio of the memory of a process to the size of a chunk. A process holds several chunks, and their
+# computation needs more.
 _COPIES = 12
 _MOST_CHUNKS = 1_000_000
 
@@ -156,7 +159,7 @@ class Outcome:
     """The chunks that one run of a sweep computed, in `seconds`.
 
     `estimate` is None if no chunk was missing. `before` counts the chunks of earlier runs,
-    `repaired` the computed chunks that had been damaged.
+    `computed` the chunks of this run, and `repaired` those of this run that had been damaged.
     """
 
     estimate: Estimate | None
@@ -167,9 +170,10 @@ class Outcome:
 
 
 def check_size(sweep: Sweep, path: str, workers: int, missing: int) -> tuple[int, int]:
-    """Return the bytes of the missing chunks on disk, and of all workers in memory.
+    """Return the sizes (bytes) of the missing chunks on disk, and of all workers in memory.
 
-    Raise InputError if the disk or half of the memory is too small, or for too many chunks.
+    Raise InputError if the disk or half of the memory is too small, or if there are too many
+    chunks.
     """
     disk = os.statvfs(Path(path).absolute().parent)
     scenes = math.prod(sweep.chunk_shape)
@@ -229,13 +233,14 @@ def swept(
     """Compute the chunks of a sweep that its store lacks; yield the open store and the outcome.
 
     `path` is the store's folder, made if missing, and locked until the context ends. `executor` is
-    "here", "processes" or "dask"; "dask" starts a cluster here unless `address` names a scheduler,
-    as in ``tcp://host:8786``. `before` gets the forecast before the computation. `progress` is True
-    for a bar, or a function that is called after each chunk with the number of computed chunks, of
-    all to compute, and "chunks". With `repair`, damaged chunks and metadata are made again.
+    "here", "processes" or "dask"; "dask" starts a cluster on this machine unless `address` names a
+    scheduler, as in ``tcp://host:8786``. `before` is called with the forecast before the
+    computation. `progress` is True for a progress bar, or a function that is called after each
+    chunk with three arguments: the number of computed chunks, the number of chunks to compute, and
+    "chunks". With `repair`, damaged chunks and metadata are made again.
 
-    Raise InputError if the store is another sweep's or damaged, no cluster answers, or disk or
-    memory is too small; computed chunks remain.
+    Raise InputError if the store belongs to another sweep or is damaged, if no cluster answers, or
+    if disk or memory is too small. Chunks computed before an error remain in the store.
     """
     is_there = check_store(sweep, path)
     check_size(sweep, path, workers or 1, 0 if is_there else sweep.n_chunks)

@@ -48,7 +48,7 @@ def check_zarr() -> None:
 class Store:
     """The open store of one sweep, made by `opened`.
 
-    `repaired` counts the damaged chunks that were removed when it was opened.
+    `repaired` counts the damaged chunks that were removed when the store was opened.
     """
 
     def __init__(self, sweep: Sweep, folder: Path) -> None:
@@ -63,7 +63,7 @@ class Store:
         self._done = [False] * sweep.n_chunks
 
     def check(self, repair: bool = False) -> None:
-        """Compare the complete chunks with their checksums.
+        """Compare the files of all complete chunks with their checksums.
 
         Raise InputError for a damaged chunk, or with `repair` remove its files.
         """
@@ -140,8 +140,9 @@ class Store:
 def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
     """Make or open a sweep's store, lock it against other processes, check it, and yield it.
 
-    Raise InputError, without changing files, if `path` is another sweep's store, no store, damaged,
-    or locked. With `repair`, damaged chunks are removed and damaged metadata written again.
+    Raise InputError, without changing files, if `path` is the store of another sweep, no store,
+    damaged, or locked. With `repair`, remove damaged chunks and write damaged metadata again
+    instead.
     """
     check_zarr()
     folder = Path(path)
@@ -173,9 +174,9 @@ def opened(sweep: Sweep, path: str, repair: bool = False) -> Iterator[Store]:
 
 
 def check_store(sweep: Sweep, path: str) -> bool:
-    """Return whether `path` is the store of this sweep; False if it is missing or empty.
+    """Return whether `path` is the store of this sweep; False if the folder is missing or empty.
 
-    Raise InputError for any other file or folder, or if the folder can't be made.
+    Raise InputError if `path` is any other file or folder, or if the folder can't be made.
     """
     folder = Path(path)
     if not path or "\0" in path:
@@ -234,7 +235,7 @@ def _check_metadata(sweep: Sweep, folder: Path, repair: bool) -> None:
 
 
 def _make(sweep: Sweep, folder: Path) -> None:
-    """Make an empty store and rename it to `folder`, which is thus never incomplete."""
+    """Make an empty store beside `folder` and rename it, so that `folder` is never incomplete."""
     with filled(sweep, folder) as new:
         try:
             os.rename(new, folder)

@@ -1,8 +1,9 @@
 """Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
 
-`sha256sum --check` reads a file of checksums. Its first line names the version of pyharness, the
-sweep and the part of the store, which reveals an exchanged file; the others have SHA-256 and path.
-`folder` is the store's, and `name` a path in it.
+The command `sha256sum --check` can read a file of checksums. The first line names the version of
+pyharness, the sweep and the part of the store, so that a file from elsewhere is detected. Each
+further line has the SHA-256 and the path of a file. In all functions `folder` is the folder of the
+store, and `name` a path in this folder.
 """
 
 import contextlib
@@ -45,10 +46,10 @@ class Label(NamedTuple):
 
 
 def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], limit: int) -> bytes:
-    """Return the content of a file of checksums of existing files.
+    """Return the content of a file of checksums for the files `names`.
 
-    `part` is their part of the store, as in "chunk 0/1". Raise DamageError if a file is unreadable,
-    not regular, or larger than `limit` (bytes).
+    `part` is the part of the store to which the files belong, as in "chunk 0/1". Raise DamageError
+    if a file is unreadable, not regular, or larger than `limit` (bytes).
     """
     identity = f"schema {label.schema}, version {label.version}, sweep {label.fingerprint}"
     lines = [f"# pyharness sweep store, {identity}, {part}"]
@@ -59,7 +60,7 @@ def checksum_text(label: Label, part: str, folder: Path, names: Sequence[str], l
 def check_files(
     label: Label, part: str, folder: Path, names: Sequence[str], limit: int, checksums: str
 ) -> None:
-    """Raise DamageError if files differ from the checksums in the file `checksums`."""
+    """Raise DamageError if the files `names` differ from the checksums in the file `checksums`."""
     found = checksum_text(label, part, folder, names, limit)
     known = read_bounded(folder, checksums, 2 * len(found))
     if known != found:
@@ -71,7 +72,7 @@ def check_files(
 
 
 def read_bounded(folder: Path, name: str, limit: int) -> bytes:
-    """Return a file's content; raise DamageError if it is missing, large or not regular."""
+    """Return a file's content; raise DamageError if missing, irregular, or above `limit` bytes."""
     with _opened(folder, name, limit) as handle, open(handle, "rb", closefd=False) as file:
         return file.read(limit)
 
@@ -79,7 +80,7 @@ def read_bounded(folder: Path, name: str, limit: int) -> bytes:
 def _digest(folder: Path, name: str, limit: int) -> str:
     digest = hashlib.sha256()
     with _opened(folder, name, limit) as handle:
-        # The end of a file that grows might never be reached.
+        # If another process extends the file, its end might never be reached.
         for _ in range(limit // _PIECE + 2):
             digest.update(os.read(handle, _PIECE))
     return digest.hexdigest()
@@ -114,7 +115,7 @@ def _opened(folder: Path, name: str, limit: int) -> Iterator[int]:
 
 
 def exists(folder: Path, name: str) -> bool:
-    """Return whether a path exists, even as a link without target.
+    """Return whether a path exists; a link without target exists too.
 
     Raise DamageError if the file system can't tell.
     """
@@ -128,7 +129,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove anything at a path, except a link's target, and any file in place of its parents."""
+    """Remove the file, link or folder at a path, and a file in the place of a parent folder."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -163,7 +164,7 @@ def place_checksums(
 
 CHECKSUMS = "checksums"  # the group of the checksums; no array may have this name
 METADATA = f"{CHECKSUMS}/metadata"
-# In bytes: the values of the longest axis, to which compression may add a little.
+# Bytes of the values of the longest axis, to which compression may add a little.
 LARGEST_METADATA = 65536 + 9 * MOST_VALUES
 _HEAD = re.compile(
     r"# pyharness sweep store, schema (\d{1,9}), version (\S+), sweep ([0-9a-f]{64}), metadata"
@@ -176,9 +177,9 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the readable identities in a store's metadata and in the checksums of the metadata.
+    """Return the readable identities in a store's metadata and in their checksums.
 
-    In an undamaged store both are equal.
+    In an undamaged store there are two, which are equal.
     """
     found = []
     with contextlib.suppress(
@@ -197,7 +198,7 @@ def labels(folder: Path) -> list[Label]:
 
 
 def metadata_files(sweep: Sweep) -> list[str]:
-    """Return the paths of the files without results: metadata, axes and labels."""
+    """Return the paths of all files without results: metadata, values of axes, and labels."""
     labels = {REDUCTIONS[asked.reduction].dimension for asked in sweep.reductions} - {""}
     values = [*(axis.field for axis in sweep.axes), *sorted(labels)]
     described = ["", CHECKSUMS, *values, *(asked.name for asked in sweep.reductions)]
@@ -277,6 +278,6 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound of the size (bytes) of any file of a chunk."""
+    """Return an upper bound of the size (bytes) of each file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -1,7 +1,7 @@
-"""The data of a sweep: scene, axes of the grid, solver, reductions, and chunks.
+"""The data of a sweep, a grid of scenes: scene, axes of the grid, solver, reductions, and chunks.
 
-A sweep solves a grid of scenes. A reduction is a quantity that is stored for each scene. A chunk is
-a block of the grid, solved and stored at once, and numbered from 0.
+A reduction is a quantity that is stored for each scene. A chunk is a block of the grid, solved and
+stored at once, and numbered from 0.
 """
 
 import math
@@ -24,7 +24,7 @@ Indices = NDArray[np.int64]
 class ReductionSpec:
     """A requested reduction: its array's `name`, its key in `REDUCTIONS`, and its parameters.
 
-    For the reduction `claim`, `function` checks the claim of each scene in a batch.
+    For the reduction `claim`, `function` returns for each scene of a batch whether the claim holds.
     """
 
     name: str
@@ -38,8 +38,8 @@ class Sweep:
     """A sweep as a sweep file describes it.
 
     `scene` supplies all quantities that no axis varies. `chunk` is the largest number of scenes in
-    a chunk. `fingerprint` is the SHA-256 of `text`, the sweep file, with the scene file that it
-    names.
+    a chunk. `text` is the content of the sweep file; `fingerprint` is the SHA-256 of `text` and of
+    the scene file that it names.
     """
 
     name: str
@@ -70,8 +70,9 @@ class Sweep:
     def chunk_shape(self) -> tuple[int, ...]:
         """Return the number of scenes of a chunk along each dimension.
 
-        A chunk covers some last dimensions completely, and in part the one before. It has length 1
-        along programs, methods, listings and readings, so that its scenes have the same solver.
+        A chunk covers as many of the last dimensions completely as fit, and part of the dimension
+        before them. It has length 1 along programs, methods, listings and readings, so that all its
+        scenes have the same solver.
         """
         single = {axis.dimension for axis in self.axes if axis.is_choice}
         room = self.chunk
@@ -97,7 +98,7 @@ class Sweep:
         return tuple(int(each) for each in np.unravel_index(chunk, self.chunk_counts))
 
     def box(self, chunk: int) -> tuple[slice, ...]:
-        """Return the part of the grid that a chunk covers, a slice per dimension."""
+        """Return the part of the grid that a chunk covers, as a slice for each dimension."""
         position = self.position_of(chunk)
         return tuple(
             slice(at * length, min(n, (at + 1) * length))
@@ -106,15 +107,15 @@ class Sweep:
 
 
 def points(box: tuple[slice, ...]) -> list[Indices]:
-    """Return the indices of all scenes in a box, an array per dimension, the last fastest."""
+    """Return the indices of all scenes in a box, an array for each dimension, in C order."""
     ranges = [np.arange(part.start, part.stop) for part in box]
     return [each.ravel() for each in np.meshgrid(*ranges, indexing="ij")]
 
 
 def spread(sweep: Sweep, count: int) -> list[Indices]:
-    """Return the indices of `count` evenly spread scenes, an array per dimension.
+    """Return the indices of `count` evenly spread scenes, an array for each dimension.
 
-    Two or more include the first and the last scene.
+    If `count` is at least 2, the first and the last scene are among them.
     """
     # A grid may have more scenes than 64 bits can count.
     total = sweep.n_scenes
@@ -128,7 +129,7 @@ def spread(sweep: Sweep, count: int) -> list[Indices]:
 
 
 def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]:
-    """Return the values of the varied fields, as ``omega.1``, in the scenes of `where`."""
+    """Return the values of each varied field, such as ``omega.1``, in the scenes of `where`."""
     at = dict(zip(sweep.dimensions, where, strict=True))
     return {axis.field: axis.coordinates()[at[axis.dimension]] for axis in sweep.axes}
 
@@ -136,7 +137,8 @@ def value_columns(sweep: Sweep, where: list[Indices]) -> dict[str, NDArray[Any]]
 def groups(columns: list[NDArray[Any]], n: int) -> list[tuple[Indices, tuple[Any, ...]]]:
     """Return the groups of indices 0 to n - 1 with equal values in all columns.
 
-    A group has ascending indices, and a value from each column. Without columns there is one group.
+    For each group, return its indices in ascending order, and its value in each column. Without
+    columns there is one group.
     """
     if not columns:
         return [(np.arange(n), ())]

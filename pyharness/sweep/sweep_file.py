@@ -41,16 +41,16 @@ _MOST_IN_CHUNK = 1_000_000
 _MOST_AXES = 12
 _MOST_SAMPLES = 10_000
 _LONGEST_NAME = 240  # bytes; most file systems take 255
-# Methods with attitudes of many bodies.
+# Methods that compute the attitudes of many bodies.
 _WITH_ATTITUDE = tuple(name for name in PREPARED if REGISTRY[name].attitude)
 
 
 def read_sweep(path: str | os.PathLike[str], claims: Mapping[str, Claim] | None = None) -> Sweep:
     """Return the sweep that a TOML file describes; raise InputError if it is invalid.
 
-    The path of a scene file is relative to the sweep file. `claims` maps each claim to the function
-    that checks it. For a `Batch` of n scenes it returns 1 where the claim holds, 0 where it fails,
-    2 where it does not apply, 3 where it holds in part.
+    The path of a scene file is relative to the sweep file. `claims` maps the name of each claim to
+    the function that checks it. For a `Batch` of n scenes this function returns n codes: 1 where
+    the claim holds, 0 where it fails, 2 where it does not apply, and 3 where it holds in part.
     """
     path = os.fsdecode(path)
     where = f"sweep file '{path}'"
@@ -93,7 +93,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of the table [scene], and its file's bytes after a zero byte, or b""."""
+    """Return the scene of the table [scene], and a zero byte with the bytes of its file, or b""."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
@@ -152,7 +152,7 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
-    """Return the reduction of an entry, a name or a table; raise InputError if it is invalid."""
+    """Return the reduction of `entry`, a name or a table; raise InputError if it is invalid."""
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:
         raise InputError("reductions: allowed: names, and tables with name and parameters")
@@ -307,7 +307,7 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError for an unknown solver, a tolerance not allowed, or `t_end` 0."""
+    """Raise InputError for an unknown solver, a tolerance that is not allowed, or `t_end` 0."""
     solver = sweep.solver
     programs = list(_choices(sweep, "program", solver.program))
     own = [] if programs else _choices(sweep, "method", solver.method)

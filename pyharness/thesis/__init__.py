@@ -1,1 +1,1 @@
-"""Cards, Python ports (twins) and compiled runs of the three programs in the thesis's appendix."""
+"""The three programs in the thesis's appendix: cards, Python ports (twins) and compiled runs."""

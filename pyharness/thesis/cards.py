@@ -1,9 +1,10 @@
 """The text of the edition: every card of the three decks, and its appearance in the scan.
 
-A card is a line of a printed program, a deck the cards of one program. A line of the scan is card
-number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the scan, and
-for each card the lines of the Python port, the twin; the Fortran port names its cards in comments.
-`data/apparatus.toml`, the critical apparatus, explains the deviations of the scan.
+A card is a line of a printed program, a deck the cards of one program. A line of the scan consists
+of card number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the
+scan, and for each card the corresponding lines of the Python port (the twin). The Fortran port
+names its cards in comments. `data/apparatus.toml`, the critical apparatus, explains where the scan
+deviates from our text.
 """
 
 import re
@@ -24,9 +25,9 @@ PORT = "fortran/original"
 
 
 class Difference(NamedTuple):
-    """A passage of a card that differs between our text and the scan, without blanks.
+    """A passage of a card that differs between our text and the scan, both without blanks.
 
-    `entry` identifies the explanation in the apparatus.
+    `entry` is the identifier of its explanation in the apparatus.
     """
 
     ours: str
@@ -45,9 +46,10 @@ class Place(NamedTuple):
 class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
-    `text` is columns 1 to 72 in our text. `differences` are from left to right, each the first
-    occurrence of its characters after the one before. `printed` is another number in the scan, and
-    the apparatus entry that explains it. `lost` is the entry on a card that the scan lacks.
+    `text` is columns 1 to 72 in our text. `differences` are ordered from left to right; each is the
+    first occurrence of its characters after the previous difference. If the scan has another card
+    number, `printed` is that number and the apparatus entry that explains it. If the scan lacks the
+    card, `lost` is the apparatus entry on it.
     """
 
     program: str
@@ -64,7 +66,7 @@ class Card(NamedTuple):
 
     @property
     def statement(self) -> str:
-        """Return the text with each run of blanks reduced to one."""
+        """Return the text with each sequence of blanks reduced to one blank."""
         return " ".join(self.text.split())
 
     @property
@@ -109,7 +111,7 @@ class Card(NamedTuple):
 
     @property
     def text_with_scanned_names(self) -> str:
-        """Return the text with the scan's names where ours are normalised."""
+        """Return our text, but with the names as printed where we normalised them."""
         kinds = {each["id"]: each["kind"] for each in facts("apparatus")["entry"]}
         return "".join(
             each.scans if each and kinds[each.entry] == "normalization" else text
@@ -154,7 +156,8 @@ class Deck:
     def executable(self) -> frozenset[int]:
         """Return the numbers of the cards with executable statements.
 
-        The others are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
+        All other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END
+        statement.
         """
         found, computes = set(), False
         for card in self.cards.values():
@@ -197,12 +200,12 @@ class Deck:
 
 @cache
 def deck(program: str) -> Deck:
-    """Return the deck of a program; it is shared, so callers must not change it."""
+    """Return the deck of a program; all callers share it and must not change it."""
     return Deck(program)
 
 
 def statements_of(texts: Iterable[str]) -> list[list[str]]:
-    """Return label and text, without blanks, of each statement on cards with these `texts`."""
+    """Return label and text of each statement, both without blanks, on cards with these `texts`."""
     found: list[list[str]] = []
     for text in texts:
         if text.startswith("C"):
@@ -224,16 +227,17 @@ def numbers(ranges: str) -> list[int]:
 
 
 def chosen(asked: Iterable[str]) -> list[Card]:
-    """Return the cards that `asked` names, or all if empty; raise InputError for other items.
+    """Return the cards that `asked` names, or all cards if it is empty.
 
-    Items: ``two-term``, ``two-term:1660``; ``1660``, ``1040-1090`` (cards of any program).
+    Each item is a program (``two-term``), a card (``two-term:1660``), or a number or range of
+    numbers in any program (``1660``, ``1040-1090``). Raise InputError for other items.
     """
     every = (card for each in list(asked) or PROGRAMS for card in _cards_of(each))
     return list(dict.fromkeys(every))
 
 
 def parallels(card: Card) -> list[Card]:
-    """Return the cards of the other programs with the same text, blanks ignored.
+    """Return the cards of the other programs with the same text; blanks are ignored.
 
     The list is empty for a comment or a blank card.
     """
@@ -297,9 +301,10 @@ def port_file(program: str) -> str:
 
 
 def switch_at(place: Place) -> tuple[str, bool] | None:
-    """Return the switch on which a Fortran line depends, and whether the line needs it active.
+    """Return the switch on which a Fortran line depends, and whether the line runs if it is active.
 
-    A switch is a defect or reading. Return None if the line depends on no single one.
+    A switch is the flag of a defect or reading. Return None unless the line depends on exactly one
+    switch.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

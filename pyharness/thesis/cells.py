@@ -1,7 +1,7 @@
-"""Combinations of a listing and a case, for which Fortran and Python ports are compared.
+"""Cells, combinations of a listing and a case, in which Fortran and Python ports are compared.
 
 A listing is a program with a choice of defects, readings and conjectures; a case is a scene of
-Table 1.
+Table 1 of the thesis.
 """
 
 from collections.abc import Iterator
@@ -19,14 +19,14 @@ def subsets(names: tuple[str, ...]) -> Iterator[frozenset[str]]:
 
 
 def all_listings(program: str) -> Iterator[Listing]:
-    """Yield every listing: all subsets of readings, with all subsets of `switches`."""
+    """Yield every listing of a program: all subsets of readings, with all subsets of `switches`."""
     for readings in subsets(names_of("reading", program)):
         for defects in subsets(switches(program)):
             yield Listing(program, defects, readings)
 
 
 def all_cells() -> Iterator[tuple[Listing, int]]:
-    """Yield every pair of a listing and a case number, for all programs.
+    """Yield every pair of a listing and a case number, for all three programs.
 
     For a case with an initial torque, each listing also occurs with the conjecture
     `initial-torque`.
@@ -47,7 +47,7 @@ def cell_name(listing: Listing, case: int) -> str:
 
 
 def listing_name(listing: Listing) -> str:
-    """Return a listing's name, as in ``original``, ``corrected:reading`` or ``defect+defect``."""
+    """Return a listing's name, as in ``original``, ``corrected:READING`` or ``DEFECT+DEFECT``."""
     if listing.label == "custom":
         return "+".join(sorted(listing.active))
     return ":".join([listing.label, *sorted(listing.readings)])

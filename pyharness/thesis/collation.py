@@ -1,4 +1,4 @@
-"""Comparisons of the scan, our text of the cards, the apparatus, the decks, and the thesis.
+"""Comparisons of the scan, our text of the cards, the apparatus, the decks and the thesis.
 
 `data/cards/collation.toml` lists the operations of the programs, and the statements of sections II
 to V about them. Whether the decks agree is computed from their statements.
@@ -21,10 +21,10 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 
 
 def expected_lines() -> list[tuple[str, str]]:
-    """Return the lines that our tables expect in the appendix, as pairs (text, name).
+    """Return the lines that our tables expect in the appendix of the thesis, as pairs (text, name).
 
-    The text has no blanks. The name is a card's, as in ``two-term:1660``, ``furniture`` for a line
-    that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The text has no blanks. The name is that of a card, such as ``two-term:1660``, or ``furniture``
+    for a line that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -41,7 +41,7 @@ def expected_lines() -> list[tuple[str, str]]:
 
 @cache
 def witness_lines() -> dict[str, str]:
-    """Return the scan's line of each card by the card's name, with the scan's blanks.
+    """Return the line of each card as scanned, with its blanks, by the name of the card.
 
     The blanks are from `data/cards/blanks.toml`. Callers must not change the dictionary.
     """
@@ -56,7 +56,7 @@ def witness_lines() -> dict[str, str]:
 
 
 def unexplained(scan: str) -> list[str]:
-    """Return a sentence for each line in which a scan of the thesis disagrees with our tables.
+    """Return a sentence for each line in which the text of a scan disagrees with our tables.
 
     Raise InputError if the text has no appendix.
     """
@@ -90,8 +90,8 @@ def unexplained(scan: str) -> list[str]:
 def undeclared() -> list[str]:
     """Return a sentence for each disagreement between the cards and the apparatus.
 
-    Each deviation must name an entry that declares it, and conversely. A lost card must name an
-    entry of the kind ``missing text``.
+    Each deviation of the scan must name an apparatus entry that declares it, and each declared
+    deviation must occur. A lost card must name an entry of the kind ``missing text``.
     """
     used: set[tuple[Any, ...]] = set()
     for card in chosen(()):
@@ -127,13 +127,13 @@ def undeclared() -> list[str]:
 
 
 class Row(NamedTuple):
-    """An operation, and whether the decks and the thesis agree on it.
+    """A row of the comparison: an operation, and whether the decks and the thesis agree on it.
 
-    `cards` has the numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all decks
-    with the operation have the same statements. It is ``names`` if only names differ, ``order`` if
-    only names and order, else ``differ``; ``-`` if no deck has it. `thesis` is ``agrees``,
-    ``differs`` or ``silent``; `text` is the place in the thesis, and `says` its statement.
-    `entries` of the apparatus, or `reason`, explain a disagreement.
+    `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
+    decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
+    only names and order differ, else ``differ``; it is ``-`` if no deck has the operation. `thesis`
+    is ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, and `says` the
+    statement there. `entries` (of the apparatus) or `reason` explain a disagreement.
     """
 
     what: str
@@ -198,7 +198,7 @@ def faults(found: list[Row]) -> list[str]:
 
 
 def statements(program: str, cards: str) -> list[str]:
-    """Return the statements on some cards, without blanks, labels and comments."""
+    """Return the statements on the `cards` of a program, without blanks, labels and comments."""
     texts = (deck(program).cards[number].text for number in numbers(cards))
     return [text for _, text in statements_of(texts)]
 
@@ -230,13 +230,13 @@ def _same(found: dict[str, list[str]]) -> bool:
 
 
 def _renamed(statement: str, names: str) -> str:
-    """Return a statement with names replaced as in ``A=A1 B=B1``."""
+    """Return a statement with replaced names; ``A=A1 B=B1`` replaces A by A1, and B by B1."""
     changes = dict(each.split("=") for each in names.split())
     return re.sub(r"[A-Z][A-Z0-9]*", lambda name: changes.get(name[0], name[0]), statement)
 
 
 def names_a_card(entry: dict[str, Any], cards: Mapping[str, Iterable[int]]) -> bool:
-    """Return whether an apparatus entry names one of some cards, or no card at all."""
+    """Return whether an apparatus entry names one of these `cards`, or no card at all."""
     return not entry["cards"] or any(
         set(numbers(entry["cards"].get(program, ""))) & set(named)
         for program, named in cards.items()

@@ -1,9 +1,9 @@
-"""Collocation as in IV.2 of the thesis, with up to five terms: a step, and a run.
+"""Collocation as in section IV.2 of the thesis, with up to five terms: one step, and a run.
 
-In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). Its derivative equals
-the right-hand side at as many collocation points as there are terms after x(0) (eq. 36). A first
-estimate assumes a constant right-hand side; one correction evaluates it at the points along the
-estimate.
+In a step, every unknown is a polynomial x(0) + c1 t + c2 t**2 + ... (eq. 34). At n collocation
+points, n the number of terms after x(0), its derivative equals the right-hand side (eq. 36). A
+first estimate assumes a constant right-hand side; one correction evaluates the right-hand side at
+the points along this estimate.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,9 +30,9 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    `points_of` returns the collocation points (s) from DT, the step as the program computes it.
-    `rates` returns the right-hand sides at point k (0 for the start). Its arguments are the torques
-    over the moments (1/s2) at the start and all points, k, and the unknowns.
+    `points_of` returns the collocation points (s) for DT, the step size (s) that the program
+    computes. `rates` returns the right-hand sides at point k (0 for the start). Its arguments are
+    the torques over the moments (rad/s2) at the start and at all points, k, and the six unknowns.
     """
     h = scene.step_size
     dt = h
@@ -66,8 +66,8 @@ def interval(
 ) -> tuple[list[float], int]:
     """Return all unknowns after one step, and the error code IER of the correction.
 
-    `points` and `end` are in seconds from the `start`. `rates` returns the right-hand sides at
-    point k (0 for the start), from k and the unknowns.
+    `points` and `end` are times (s) after the start of the step. `rates` returns the right-hand
+    sides at point k (0 for the start) from k and the unknowns.
     """
     constant = rates(0, start)
     estimate, _ = fit(points, [constant] * len(points))
@@ -77,13 +77,13 @@ def interval(
 
 
 def fit(points: Sequence[float], rates: Sequence[Vector]) -> tuple[list[list[float]], int]:
-    """Return c1, c2, ... of each unknown, and IER, from a row of `rates` at each point (s)."""
+    """Return c1, c2, ... of each unknown, and IER, from the `rates` at each point (s)."""
     by_unknown = [list(column) for column in zip(*rates, strict=True)]
     return leqt1f(collocation_matrix(points), by_unknown)
 
 
 def collocation_matrix(points: Sequence[float]) -> list[list[float]]:
-    """Return the derivatives of t, t**2, ... at the points (s), a row for each (eq. 36)."""
+    """Return the derivatives of t, t**2, ... at the points (s), a row for each point (eq. 36)."""
     return [
         [1.0, 2.0 * t, 3.0 * (t * t), 4.0 * (t * t * t), 5.0 * (t * t * t * t)][: len(points)]
         for t in points

@@ -1,4 +1,4 @@
-"""Runs of the compiled programs of the thesis's appendix on a scene."""
+"""Runs of the compiled programs (Fortran ports) of the thesis's appendix on a scene."""
 
 from dataclasses import replace
 from typing import Any
@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `run_program`, unchecked.
+    The arguments are those of `run_program`; they are not checked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)
@@ -38,8 +38,8 @@ def read_rows(
 
     `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
     velocity (m/s). `ier` has at least n codes. `stop_variable` is the number in `STOP_VARIABLES`,
-    from 1, of the variable that failed the stop test, or 0. `stop_quotient` is the change of the
-    right-hand side divided by the variable's (1/s).
+    from 1, of the variable that failed the stop test, or 0. `stop_quotient` is the change of its
+    right-hand side divided by its own change (1/s).
     """
     n = len(rows)
     return trajectory_of(
@@ -57,8 +57,9 @@ def program_arguments(
     """Return the arguments of the compiled function `run_program`, in its order.
 
     Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
-    m2), or A, B and C of Euler's equations; omega, masses, forces, constant and rate of the torque,
-    and the initial torque divided by the moments (1/s2), or zeros.
+    m2), or A, B and C of Euler's equations; omega (rad/s); masses (kg); forces (N); constant (N m)
+    and rate (N m/s) of the torque; and the initial torque divided by the moments (rad/s2), or
+    zeros.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):
@@ -88,5 +89,5 @@ def program_arguments(
 
 
 def stop_reads_velocity(listing: Listing, may_stop: bool) -> bool:
-    """Return whether the stop test reads the velocity, by the defect `lipschitz-tests-velocity`."""
+    """Return whether the stop test reads the velocity, as with `lipschitz-tests-velocity`."""
     return may_stop and listing.has("lipschitz-tests-velocity")

@@ -1,7 +1,7 @@
-"""Decks as fixed-form FORTRAN, and runs of them after compilation.
+"""Decks written as fixed-form FORTRAN, and their compilation and runs.
 
-They are a third path from the cards to the results: the author's statements, compiled with a
-separate LEQT1F (`data/cards/leqt1f.f`), share no code with the Fortran and Python ports.
+A compiled deck is a third path from the cards to the results: the author's statements and a
+separate LEQT1F (`data/cards/leqt1f.f`) share no code with the Fortran and Python ports.
 """
 
 import re
@@ -24,8 +24,8 @@ from pyharness.thesis.printer import TAPE5
 
 DIALECTS = ("1982", "gfortran", "ftn")
 SYSTEMS = ("nos", "nosbe")
-# Terms of two more collocation programs, which V.2 of the thesis uses for Case 6, but whose decks
-# it does not print.
+# Numbers of terms of two more collocation programs, which V.2 of the thesis uses for Case 6, but
+# does not print.
 MODELS = (3, 5)
 COMPILER = "gfortran"
 # REAL is binary64, variables are 0 until they are set, and no operations are fused.
@@ -53,14 +53,14 @@ def deck_text(
 ) -> str:
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
-    The default is the case on the published cards: Case 2 with 300 steps (collocation) or Case 5
-    with 100 (Runge-Kutta). Another `scene` of Table 1 replaces the numbers of its assignments and
-    DO statement.
+    By default the data are those of the published cards: Case 2 with 300 steps (collocation) or
+    Case 5 with 100 steps (Runge-Kutta). A `scene` of Table 1 replaces the numbers in the
+    assignments and in the DO statement.
 
-    `dialect` "1982" is the cards as they are; "ftn" adds the torque of Case 7, "gfortran" also
-    adaptations to a modern compiler; column 73 marks these cards. `terms`, 3 or 5, requests the
-    conjecture of `model_cards`. Raise InputError if the dialect is unknown, or no card can express
-    the request.
+    In the `dialect` "1982" the cards are as published; "ftn" adds the torque of Case 7, "gfortran"
+    also adaptations to a modern compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5,
+    requests the conjectural deck of `model_cards`. Raise InputError if the dialect is unknown, or
+    if the request can't be expressed in cards.
     """
     if dialect not in DIALECTS:
         raise unknown("dialect", dialect, DIALECTS, "--dialect")
@@ -96,7 +96,7 @@ def card_steps(program: str) -> int:
 
 
 def corrected_cards(program: str) -> dict[int, str]:
-    """Return the cards of the corrected program by number, including inserted ones."""
+    """Return the cards of the corrected program by number, including inserted cards."""
     lines = deck_text(Listing.corrected(program)).splitlines()
     return {int(line[73:]): line[:72].rstrip() for line in lines}
 
@@ -116,8 +116,8 @@ def corrections(program: str) -> dict[int, list[str]]:
 def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
     """Return a batch job that compiles and runs a deck in the dialect `ftn` with CDC's FTN.
 
-    It includes our LEQT1F if needed. `system` is "nos" or "nosbe"; `rounds` sets FTN's option ROUND
-    for sums, products and quotients. Raise InputError for another system.
+    The job includes our LEQT1F if the deck calls it. `system` is "nos" or "nosbe"; `rounds` sets
+    FTN's option ROUND for sums, products and quotients. Raise InputError for another system.
     """
     if system not in SYSTEMS:
         raise unknown("system", system, SYSTEMS, "--system")
@@ -133,7 +133,7 @@ def job_text(deck: str, system: str = "nos", rounds: bool = False) -> str:
 def _is_made(
     alteration: Mapping[str, Any], listing: Listing, dialect: str, case: int | None
 ) -> bool:
-    """Return whether all conditions of an alteration hold; `case` None is the published one."""
+    """Return whether all conditions of an alteration hold; None is the published `case`."""
     named = alteration.get
     return (
         named("program") == listing.program
@@ -158,10 +158,10 @@ def _model(terms: int, listing: Listing, scene: Scene | None) -> dict[int, str]:
 
 
 def model_cards(terms: int) -> dict[int, str]:
-    """Return the cards, by new number, of a collocation deck with `terms` terms.
+    """Return the cards of a collocation deck with `terms` terms, by their new numbers.
 
     The deck is a conjecture: V.2 uses three and five terms in Case 6, but the thesis prints no such
-    deck. The n collocation points are at k/(n+1) of the interval, k = 1 to n.
+    deck. The n collocation points are at the fractions k/(n+1) of the interval, k = 1 to n.
     """
     text = [card.text for card in deck("four-term").cards.values()]
     terms_range = range(1, terms + 1)
@@ -237,7 +237,7 @@ def _case_cards(program: str, scene: Scene) -> dict[int, str]:
 
 
 def solver_cards() -> int:
-    """Return the number of cards, except comments, in our LEQT1F."""
+    """Return the number of cards in our LEQT1F, without comments."""
     return sum(not line.startswith("C") for line in _SOLVER.read_text().splitlines())
 
 
@@ -249,8 +249,8 @@ def compiler() -> str | None:
 def run_deck(text: str, folder: Path | None = None) -> Run:
     """Compile and run a deck in the dialect `gfortran`, and return its output.
 
-    `folder` keeps the compiled solver for later calls. Raise RuntimeError if compiler or program
-    fails.
+    The compiled solver is kept in `folder` for later calls. Raise RuntimeError if the compiler or
+    the program fails.
     """
     with TemporaryDirectory() as place:
         here = Path(place)

@@ -1,4 +1,4 @@
-"""Right-hand sides, and the record of a run, for all three twins."""
+"""Right-hand sides, and the record of a run, for the Python ports of all three programs."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +16,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H of eqs. 16-18 (rad/s2) from A, B, C, torque over moment (1/s2), and omega."""
+    """Return F, G, H (rad/s2) of eqs. 16-18 of the thesis, the right-hand sides for omega."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -34,7 +34,7 @@ def velocity_rate(acceleration: Vector, u: Vector, v: Vector) -> list[float]:
 
 
 def accelerations(scene: Scene, listing: Listing) -> list[float]:
-    """Return force over mass (m/s2); with `three-masses` each axis has its own mass."""
+    """Return force over mass (m/s2); with the defect `three-masses` each axis has its own mass."""
     masses = scene.masses if listing.has("three-masses") else scene.masses[:1] * 3
     return [force / mass for force, mass in zip(scene.forces, masses, strict=True)]
 
@@ -59,7 +59,7 @@ def all_finite(values: Vector) -> bool:
 
 
 def trajectory_of(rows: NDArray[np.float64], **others: Any) -> Trajectory:
-    """Return rows of true time and TIME (s), omega (rad/s) and velocity (m/s) as a trajectory."""
+    """Return a trajectory from rows of true time, TIME (s), omega (rad/s) and velocity (m/s)."""
     return Trajectory(rows[:, 0], rows[:, 1], rows[:, 2:5], rows[:, 5:], len(rows), **others)
 
 
@@ -82,9 +82,9 @@ class Record:
     def trajectory(
         self, ended: str = "complete", stop: Stop | None = None, prints_ier: bool = True
     ) -> Trajectory:
-        """Return the trajectory of all rows, with IER if `prints_ier`.
+        """Return the trajectory of all rows, with the error codes IER if `prints_ier`.
 
-        A step that overflows has no row, but its evaluations are counted.
+        A step that overflowed has no row, but its evaluations are counted.
         """
         given = np.array(self._rows).reshape(-1, 8)
         rows = given.astype(np.float64)

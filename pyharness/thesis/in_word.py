@@ -1,7 +1,7 @@
-"""Runs of the programs in an arithmetic of `word.py`, such as the 48 bits of the CDC.
+"""Runs of the programs in a floating-point format of `word.py`, such as the CDC's 48 bits.
 
-The Python ports run in every arithmetic, the compiled programs in the formats of IEEE 754. Numbers
-pass to and from the extension module as bytes, in this machine's order.
+The Python ports run in every format, the compiled programs only in formats of IEEE 754. Numbers are
+passed to and from the extension module as bytes, in this machine's order.
 """
 
 import copy
@@ -37,7 +37,7 @@ def run(
 ) -> Trajectory:
     """Run the Python port of a listing in the arithmetic `word`; no argument is checked.
 
-    The results are rounded to floats; the attribute `exact` has them in that arithmetic.
+    The results are rounded to floats; the attribute `exact` has the unrounded results.
     """
     twin = importlib.import_module(f"pyharness.thesis.{listing.program.replace('-', '_')}")
     found: Trajectory = twin.run(scene_in(scene, word), listing, lipschitz, may_stop)
@@ -47,7 +47,7 @@ def run(
 
 
 def scene_in(scene: Scene, word: Word) -> Scene:
-    """Return a copy of a checked scene, with all numbers except counts in the arithmetic `word`."""
+    """Return a copy of a checked scene with all numbers, except counts, in the format `word`."""
     law = scene.law
 
     def converted(value: Any) -> Any:
@@ -73,8 +73,8 @@ def run_compiled(
 ) -> Trajectory:
     """Run a listing's compiled program in the arithmetic `word`; the result is that of `run`.
 
-    Raise InputError if the compiler does not support it, or angles of the torque are too large for
-    its sine; NotBuiltError if the extension is not built.
+    Raise InputError if the compiler does not support this arithmetic, or if angles in the torque
+    are too large for its sine; raise NotBuiltError if the extension is not built.
     """
     if word.p > 53:
         _check_angles(scene)
@@ -108,7 +108,7 @@ def run_compiled(
 
 
 def compiled_words() -> tuple[str, ...]:
-    """Return the arithmetics that the compiled programs support; none if not built."""
+    """Return the names of the compiled programs' arithmetics; empty if they are not built."""
     try:
         from pyharness import _build
     except ImportError:
@@ -129,12 +129,12 @@ def _check_angles(scene: Scene) -> None:
 
 
 def n_bytes(word: Word) -> int:
-    """Return the bytes of a number in binary32, binary64 or binary128."""
+    """Return the size (bytes) of a number in binary32, binary64 or binary128."""
     return _BITS[word.p] // 8
 
 
 def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
-    """Return numbers as bytes, shape (n_bytes(word), *shape).
+    """Return numbers of the format `word` as an array of bytes, shape (n_bytes(word), *shape).
 
     `numbers` and the result are in column-major order.
     """
@@ -145,7 +145,7 @@ def to_bytes(numbers: Iterable[Any], word: Word, *shape: int) -> Bytes:
 
 
 def from_bytes(given: Bytes, word: Word) -> NDArray[np.object_]:
-    """Return the numbers in bytes from `to_bytes`."""
+    """Return the numbers that `to_bytes` converted to bytes."""
     patterns = (each.tobytes() for each in given.reshape(n_bytes(word), -1, order="F").T)
     found = [_number(int.from_bytes(each, sys.byteorder), word) for each in patterns]
     return np.array(found, dtype=object).reshape(given.shape[1:], order="F")
@@ -156,7 +156,8 @@ def _pattern(x: Number) -> int:
     places, most = p - 1, (1 << _BITS[p] - p) - 1
     if x.m:
         sign, coefficient = x.m < 0, abs(x.m)
-        # A subnormal number has the field 0, but the unit of the field 1.
+        # A subnormal number has the exponent field 0, but the unit in the last place of the field
+        # 1.
         field = x.e + places + (most >> 1) if coefficient >> places else 0
         fraction = coefficient & (1 << places) - 1
     else:

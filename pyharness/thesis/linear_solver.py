@@ -9,10 +9,10 @@ SINGULAR = 129
 def leqt1f(
     matrix: list[list[float]], right_hand_sides: list[list[float]]
 ) -> tuple[list[list[float]], int]:
-    """Return the solutions x of A x = b for all right-hand sides b, and the error code IER.
+    """Return the solutions x of A x = b for each right-hand side b, and the error code IER.
 
-    If A is algorithmically singular, IER is `SINGULAR` (129), and each b replaces its x; otherwise
-    IER is 0.
+    If A is algorithmically singular, IER is `SINGULAR` (129), and each b is returned in place of
+    its x; otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]
     pivots = _factor(factors)
@@ -22,7 +22,7 @@ def leqt1f(
 
 
 def _factor(a: list[list[float]]) -> list[int] | None:
-    """Overwrite rows with LU factors; return each exchanged row's index, or None if singular."""
+    """Overwrite A with its LU factors; return the pivot row of each column, or None if singular."""
     n = len(a)
     pivots = []
     scale = []

@@ -36,9 +36,9 @@ _NOT_REACHED = -1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProgramEnsemble(BatchResult):
-    """The results of a program of the thesis for n bodies, with a row for each of m steps.
+    """The results of a program of the thesis for n bodies at m requested steps.
 
-    A row is NaN, and -1 in `ier`, if the run of the body ended before that step.
+    If the run of a body ended before a requested step, its values there are NaN, in `ier` -1.
 
     Attributes
     ----------
@@ -47,21 +47,21 @@ class ProgramEnsemble(BatchResult):
     status : ndarray of int8, shape (n,)
         How each run ended: COMPLETE, STOPPED or OVERFLOW of `pyharness.model.codes.Statuses`.
     at : ndarray of int, shape (m,)
-        The steps of the rows, counted from 1.
+        The requested steps, counted from 1.
     velocity : ndarray, shape (n, m, 3), or None
         Translational velocity along the body axes, m/s; None if it was not requested.
     recorded_time : ndarray, shape (m,), or (n, m) where the step sizes differ
-        The program's variable TIME, s. A row for all bodies has NaN at a step that no body reached.
+        The program's variable TIME, s. With shape (m,), it is NaN at a step that no body reached.
     n_rows : ndarray of int32, shape (n,)
         The number of steps of each body that have a result.
     stop_variable : ndarray of int8, shape (n,)
         The variable that failed the stop test, or 0: 1-3 for U1-U3 (angular velocity), 4-6 for
         V1-V3 (translational velocity), 7 for the norm of U, 8 for the norm of U and V.
     stop_quotient : ndarray, shape (n,)
-        The change of the right-hand side over that of the variable (1/s); infinite if the variable
-        did not change, NaN if the test did not end the run.
+        The change of the right-hand side divided by the change of the variable (1/s); infinite if
+        the variable did not change, NaN if the stop test did not end the run.
     ier : ndarray of int32, shape (n, m), or None
-        The error code of the collocation programs' linear solver; None for Runge-Kutta.
+        The error code of the linear solver in the collocation programs; None for Runge-Kutta.
     """
 
     at: NDArray[np.int32]
@@ -103,7 +103,7 @@ def run_many(
         The program with its active defects, readings and conjectures.
     omega, moments, coefficients, torque_constant : array_like, shape (n, 3) or (3,), optional
         Initial angular velocities (rad/s), moments of inertia (kg m2) or Euler coefficients A, B,
-        C, and constant torques (N m; 1/s2 for bodies specified by coefficients). At most one of
+        C, and constant torques (N m; rad/s2 for bodies specified by coefficients). At most one of
         `moments` and `coefficients` may be specified.
     step_size, lipschitz : array_like, shape (n,) or one number, optional
         Step sizes (s; by default the scene's) and Lipschitz constants of the stop test (1/s).
@@ -124,7 +124,8 @@ def run_many(
     Returns
     -------
     ProgramEnsemble
-        The results of n bodies. An array of one row applies to all; if no array has more, n is 1.
+        The results of n bodies, n the number of rows in the longest array. An array with one row
+        applies to all bodies.
 
     Raises
     ------
@@ -201,9 +202,9 @@ def _run(
     scene: Scene, listing: Listing, by_moments: bool, inputs: dict[str, Array], n: int,
     wanted: NDArray[np.int32], may_stop: bool, velocity: bool, threads: int,
 ) -> ProgramEnsemble:  # fmt: skip
-    """Run a compiled program for n bodies, with checked arguments.
+    """Run a compiled program for n bodies; the arguments are already checked.
 
-    `inputs` has the arrays of `run_many` by name, and "body" the moments or A, B, C.
+    `inputs` has the arrays of `run_many` by name; "body" is the array of moments or of A, B, C.
     """
     program = extension().run_programs
     one_step_size = bool((inputs["step_size"] == inputs["step_size"].flat[:1]).all())
@@ -251,12 +252,12 @@ def _run(
 
 
 def _pieces(n: int, steps: int, threads: int) -> Iterator[slice]:
-    """Yield the range of bodies for each call of the kernel: one call, or several per thread."""
+    """Yield the range of bodies of each kernel call: one call, or several calls for each thread."""
     size = n
     if threads > 1:
         fair = -(-n // (_PIECES * threads))
         size = max(fair, _LEAST_WORK // steps, 1)
-        # The kernel integrates so many bodies at once.
+        # A whole number of blocks: the kernel integrates LANE_COUNT bodies at once.
         size = -(-size // Blocks.LANE_COUNT) * Blocks.LANE_COUNT
     for begin in range(0, n, max(1, size)):
         yield slice(begin, min(n, begin + size))

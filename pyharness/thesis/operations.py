@@ -1,8 +1,8 @@
 """Counts of the floating-point operations in a step of a program, from its cards.
 
-The author's statements are interpreted with numbers that count operations; LEQT1F is our own
-version. `T**2` counts as one multiplication, `T**3` and `T**4` as two each. Subscripts, jumps, ABS
-and WRITE do not count.
+The author's statements are interpreted, and our version of LEQT1F is called, with numbers that
+count the operations on them. `T**2` counts as one multiplication, `T**3` and `T**4` as two each.
+Subscripts, jumps, ABS and WRITE do not count.
 """
 
 import operator
@@ -31,8 +31,8 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts all on the cards; `once` omits repetitions with the same operands. With unit
-    times as weights, both are times of sequential execution.
+    `written` counts every operation on the cards; `once` counts repetitions with the same operands
+    once. If each operation is weighted with its time, both are times of sequential execution.
     """
 
     written: int
@@ -40,7 +40,7 @@ class Count(NamedTuple):
 
 
 class _Counter:
-    """A counter of operations that stores the result of each distinct one."""
+    """A counter of operations that stores the result of each distinct operation."""
 
     def __init__(self, times: Mapping[str, int]) -> None:
         self.times, self.written = times, 0
@@ -117,7 +117,7 @@ def operations_per_step(listing: Listing, times: Mapping[str, int] = ALIKE) -> C
 
 
 def _moved(value: Any, counter: _Counter) -> Any:
-    """Return numbers from before a step as copies with `counter`, other values unchanged."""
+    """Return a copy of `value` whose numbers count in `counter`; other values are unchanged."""
     if isinstance(value, _Array):
         moved = {k: _moved(x, counter) for k, x in value.items()}
         return _Array(lambda: _Number(counter, 0.0), moved)

@@ -1,8 +1,8 @@
 """The output of a program, the printed page and TAPE5, made from its trajectory.
 
-The page lacks the first character of each record, the carriage control, always a blank.
-`data/printer.toml` has the FORMATs, and marks their conjectural parts. `fortranformat` writes the
-values; only zeros and values that are not finite are treated here.
+The page omits the first character of each record, the carriage control, which is always a blank.
+`data/printer.toml` has the FORMATs, and marks their conjectural parts. The package `fortranformat`
+writes the values; only negative zeros and values that are not finite are treated here.
 """
 
 import math
@@ -20,10 +20,10 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 from pyharness.thesis.equations import card_torque
 
-# Zero has no minus sign (FORTRAN 77, 13.5.9).
+# Zero is printed without minus sign (FORTRAN 77, 13.5.9).
 _MINUS_ZERO = re.compile(r"-(0?\.0*)(?!\d)")
-# A value that is not finite is printed as asterisks, like one too wide for its field. The machine
-# printed R or I, which has no more information.
+# A value that is not finite is printed as asterisks, like a value that is too wide for its field.
+# The CDC printed R or I instead, which says no more.
 _TOO_WIDE = 1e300
 _PLACES = re.compile(r"F\d+\.(\d+)")
 
@@ -31,8 +31,8 @@ _PLACES = re.compile(r"F\d+\.(\d+)")
 def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
     """Return the text that `program` prints for its run.
 
-    After the moments and torques of `scene`, which must have moments, it has a line for each row,
-    the last one for the step that failed the stop test. Lines have no trailing blanks.
+    The moments and torques of `scene`, which must have moments, are followed by a line for each
+    row; if the stop test failed, the last line is that step. Lines have no trailing blanks.
     """
     formats = formats_of(program)
     assert scene.moments is not None
@@ -50,8 +50,8 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
     """Return omega (rad/s) and velocity (m/s) of each row, as six floats.
 
-    Numbers of other arithmetics are rounded to the decimals of `form`, so that the floats print
-    alike.
+    Numbers of other arithmetics than binary64 are rounded to the decimals of the FORMAT `form`, so
+    that the floats are printed as those numbers would be.
     """
     if trajectory.exact is None:
         assert trajectory.velocity is not None
@@ -75,14 +75,14 @@ def _to_places(x: Any, places: int) -> float:
 def formats_of(program: str) -> dict[str, Any]:
     """Return a program's FORMATs: ``header`` (moments, torques), ``heads`` and ``rows``.
 
-    Further keys name their cards, and mark characters as certain or conjecture.
+    Further keys name the cards of the FORMATs, and mark their characters as certain or conjectural.
     """
     programs: list[dict[str, Any]] = facts("printer")["program"]
     return next(each for each in programs if each["name"] == program)
 
 
 def write(text: str, values: Sequence[float]) -> list[str]:
-    """Return the records, with carriage control, that a FORTRAN WRITE makes of values."""
+    """Return the records, with carriage control, of a WRITE of `values` with the FORMAT `text`."""
     printed: str = _writer(text).write([x if math.isfinite(x) else _TOO_WIDE for x in values])
     return [_MINUS_ZERO.sub(r" \1", record) for record in printed.split("\n")]
 

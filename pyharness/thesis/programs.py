@@ -1,4 +1,4 @@
-"""The three programs of the appendix, run as compiled programs or as twins."""
+"""The three programs of the appendix, run as compiled programs or as their Python ports."""
 
 import importlib
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ WORD_NAMES = (*COMPILED_WORDS, "cdc48", "cdc48-rounded")
 class Program:
     """One of the three programs of the appendix.
 
-    Its corrected version has a global error of O(h**order), h the step size. `source` names its
-    equation and sections.
+    The corrected version has a global error of O(h**order), h the step size. `source` names the
+    equation and the sections of the thesis that describe the program.
     """
 
     name: str
@@ -80,7 +80,7 @@ class Program:
 
 
 def work_of(word: str, implementation: str) -> str:
-    """Return the key of `check_steps` for an arithmetic and an implementation."""
+    """Return the key of an arithmetic and an implementation in the work limits of `check_steps`."""
     if word == BINARY64:
         return implementation
     return "another word" if implementation == "python" else word
@@ -132,14 +132,14 @@ def run_program(
     may_stop : bool
         Whether the stop test may end the run.
     velocity : bool
-        Whether the translational velocity is needed. If False, the compiled program computes it
-        only if the stop test reads it. The other results are the same.
+        Whether to compute the translational velocity. If False, the compiled program computes it
+        only if the stop test reads it; the other results are the same.
     effort : float
         Factor on the work limit. The work is the number of steps, increased for each sine or cosine
         of the torque.
     word : str
-        The arithmetic, one of `pyharness.thesis.programs.WORD_NAMES`. One that is not in
-        `pyharness.thesis.programs.COMPILED_WORDS` needs `implementation="python"`.
+        The floating-point arithmetic, one of `pyharness.thesis.programs.WORD_NAMES`. An arithmetic
+        that is not in `pyharness.thesis.programs.COMPILED_WORDS` needs `implementation="python"`.
 
     Returns
     -------

@@ -26,14 +26,14 @@ def run(
 ) -> Trajectory:
     """Run the program on a scene, and return its trajectory.
 
-    `lipschitz` is the constant of the stop test (1/s), which is skipped unless `may_stop`.
+    `lipschitz` is the constant of the stop test (1/s). The test is omitted unless `may_stop`.
     """
     a, b, c = scene.euler_coefficients
     acceleration = accelerations(scene, listing)
     dt = scene.step_size
     time = 0.0
     base = [*scene.omega, 0.0, 0.0, 0.0]
-    # Indices are the program's own.
+    # The indices are those of the program.
     zero = [0.0] * 6
     point = {1: base, 2: zero, 3: zero, 4: zero}
     slope = {1: zero, 2: zero, 3: zero, 4: zero}
@@ -104,12 +104,12 @@ def run(
 def lipschitz_test(
     listing: Listing, change_k: Vector, change_u: Vector, lipschitz: float
 ) -> tuple[str, float] | None:
-    """Return a variable that violates eq. 19, and its quotient (1/s), or None.
+    """Return a variable that violates eq. 19, and its quotient of changes (1/s), or None.
 
     `change_k` and `change_u` are absolute changes of the six right-hand sides and unknowns in a
-    step. Norms over omega are compared; with the defect `lipschitz-per-component` single
-    components, and with `lipschitz-tests-velocity` the velocity too. The quotient is infinite if
-    the unknowns do not change.
+    step. The norms of the changes of omega are compared; with the defect `lipschitz-per-component`,
+    its single components; with `lipschitz-tests-velocity`, the velocity is included. The quotient
+    is infinite if the unknowns do not change.
     """
     velocity_counts = listing.has("lipschitz-tests-velocity")
     last = 6 if velocity_counts else 3

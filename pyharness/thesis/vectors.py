@@ -1,12 +1,13 @@
 """Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
 
 A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
-60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal), plus
-one if the field is below 2000 (octal).
+60 bits of a negative number are complemented. The exponent is the exponent field minus 2000
+(octal), plus one if the field is below 2000 (octal).
 
-The test vectors `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC 60463560; a
-public emulator agrees. A file is a JSON object with `schema` and `vectors`: objects with `name`,
-`op` (as in `operated`), and `x`, `y` and `result` in octal.
+The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
+60463560; a public emulator agrees with them. A file of test vectors is a JSON object with `schema`
+and `vectors`. Each vector has `name`, `op` (an instruction of `operated`), and `x`, `y` and
+`result` in octal.
 """
 
 import json
@@ -45,7 +46,7 @@ class Vector(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A test vector, and `found`, our own result (octal)."""
+    """A test vector, and `found`, the result of our arithmetic (octal)."""
 
     vector: Vector
     found: str
@@ -57,7 +58,7 @@ class Answer(NamedTuple):
 
 
 def answers(path: str | Path = OURS) -> list[Answer]:
-    """Return the vectors of a JSON file with our results; raise InputError if it is invalid."""
+    """Return the vectors of a JSON file, with our results; raise InputError if it is invalid."""
     content = read_input(path, f"vectors '{path}'", _LARGEST, "a JSON file")
     try:
         data = json.loads(content)
@@ -89,10 +90,11 @@ def _answer(where: str, entry: Any) -> Answer:
 
 
 def from_octal(text: str) -> Pair:
-    """Return the number m 2**e that 20 octal digits represent, as the pair (m, e).
+    """Return the number m 2**e that a CDC word of 20 octal digits represents, as the pair (m, e).
 
-    Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e the value
-    as a float. Raise InputError for other texts, and if the coefficient is not normalised.
+    Words with all bits 0 or all bits 1 are zero. For zero, infinity and nan, m is 0 and e is the
+    value as a float. Raise InputError if `text` is no such word, or if the coefficient is not
+    normalised.
     """
     digits = "".join(text.split()) if isinstance(text, str) else ""
     if not _WORD.fullmatch(digits):
@@ -115,7 +117,7 @@ def from_octal(text: str) -> Pair:
 
 
 def to_octal(number: Pair) -> str:
-    """Return the CDC word of a pair (m, e), as in `from_octal`, in groups of four digits."""
+    """Return the CDC word of a pair (m, e) as in `from_octal`, in groups of four octal digits."""
     m, e = number
     if m:
         return _written(m < 0, e, abs(m))
@@ -128,7 +130,7 @@ def to_octal(number: Pair) -> str:
 def operated(name: str, x: str, y: str) -> str:
     """Return the result of a CDC instruction on the words `x` and `y`, all in octal.
 
-    `name` is F (truncating) or R (rounding), X, and +, -, * or /, as in ``FX*``. A sum or
+    `name` is FX (truncating) or RX (rounding) followed by +, -, * or /, as in ``FX*``. A sum or
     difference is normalised only if NX follows, as in ``RX+ NX``. Raise InputError for other names.
     """
     if name not in _INSTRUCTIONS:

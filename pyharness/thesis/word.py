@@ -1,13 +1,14 @@
 """Words: floating-point formats of p bits with a rounding rule, for runs of the Python ports.
 
-A number of a word has the operators of a float, also with integers, floats and numbers of the same
-word. A float counts as a literal of a source text: its shortest decimal representation is rounded,
-not its exact binary value.
+A number of such a format has the operators of a float. The other operand may be an integer, a
+float, or a number of the same format. A float is converted like a literal in a source text: its
+shortest decimal representation is rounded, not its exact binary value.
 
-Rules are functions of pairs of integers (m, e), for a number m 2**e; m has p bits, or fewer if
-subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf, -inf or nan. Operands of an
-`Operation` have m other than 0. No library has all these rules: mpmath and gmpy2 do not limit
-exponents, SoftFloat and numpy have only IEEE 754, and none has the rules of the CDC machines.
+The rules of arithmetic are functions of pairs of integers (m, e), for a number m 2**e; m has p
+bits, or fewer if the number is subnormal. If m is 0, e is the value as a float: 0.0, -0.0, inf,
+-inf or nan. Operands of an `Operation` have m other than 0. No library has all these rules: mpmath
+does not limit exponents; gmpy2, SoftFloat and numpy round only as IEEE 754 does; and none has the
+rules of the CDC machines.
 """
 
 import math
@@ -32,9 +33,9 @@ _LEAST, _MOST = -1023, 1022
 class Rules(NamedTuple):
     """The arithmetic of a format, as functions of integers m and e.
 
-    `nearest` (ties to even) is for square roots, sines, cosines and literals, `cut` (towards zero)
-    for literals if the format truncates them. A difference is the sum with the negative;
-    `difference` is for comparisons only: numbers are equal if it is zero.
+    `nearest` (ties to even) rounds square roots, sines, cosines and literals; `cut` (towards zero)
+    rounds literals if the format truncates them. Subtraction is addition of the negative number.
+    `difference` serves comparisons only: two numbers are equal if it is zero.
     """
 
     nearest: Rounding
@@ -50,8 +51,8 @@ def rounding(p: int, least: int, most: int, cut: bool, gradual: bool) -> Roundin
     """Return a function that rounds m 2**e to p bits and an exponent from `least` to `most`.
 
     The integer m may have any length. Rounding is towards zero if `cut`, else to nearest, ties to
-    even. A larger exponent gives infinity; a smaller one underflows to zero or, if `gradual`,
-    gradually as in IEEE 754.
+    even. A number with a larger exponent becomes infinite. A number with a smaller one becomes zero
+    or, if `gradual`, subnormal or zero as in IEEE 754.
     """
     shortened = _cut if cut else _to_even
 
@@ -91,8 +92,8 @@ def _to_even(m: int, shift: int) -> int:
 def ieee(p: int, largest: int, cut: bool) -> Rules:
     """Return the rules of IEEE 754 for p-bit coefficients and numbers below 2**(largest + 1).
 
-    If `cut`, sums, products and quotients are truncated towards zero. A result that is then too
-    large becomes infinite, as on machines that truncated; IEEE 754 requires the largest number.
+    If `cut`, sums, products and quotients are truncated towards zero. A result that is too large
+    becomes infinite, as on machines that truncated, although IEEE 754 requires the largest number.
     """
     least, most = 2 - largest - p, largest - p + 1
     fit = rounding(p, least, most, cut, gradual=True)
@@ -124,9 +125,10 @@ def cdc(p: int, rounds: bool) -> Rules:
 
     The source is the CYBER 170 hardware reference, CDC 60463560. A number is an integer coefficient
     of p = 48 bits and an exponent; a sum is formed in a register of 2 p bits, the frame. Without
-    `rounds` it is `FX`, truncating sum, difference, product and quotient (octal 30, 31, 40 and 44);
-    with it `RX`, rounding ones (34, 35, 41 and 45). There is no guard bit: the bits below the unit
-    of the larger operand are truncated before NX (24) normalises a sum.
+    `rounds` the instructions are `FX`, with truncated sum, difference, product and quotient (octal
+    30, 31, 40 and 44); with `rounds` they are `RX`, with rounded results (34, 35, 41 and 45). There
+    is no guard bit: the bits below the unit of the larger operand are truncated before NX (24)
+    normalises a sum.
 
     Literals are rounded to nearest, an assumption: no source states how CDC's FTN converted them.
     """
@@ -155,8 +157,8 @@ def framed(p: int, rounds: bool, xm: int, xe: int, ym: int, ye: int) -> tuple[in
     """Return the sum of xm 2**xe and ym 2**ye before normalisation, as a pair (frame, e).
 
     The frame is in units of 2**(e - p), where e is the larger exponent; coefficients have p bits.
-    The smaller operand is shifted and truncated. If `rounds`, half a unit in the last place is
-    first added to each operand, as RX does.
+    The operand with the smaller exponent is shifted and truncated. If `rounds`, half a unit in the
+    last place is first added to each operand, as RX does.
     """
     if xe <= ye:
         xm, xe, ym, ye = ym, ye, xm, xe
@@ -263,7 +265,7 @@ class Number:
             return math.copysign(math.inf, self.m)
 
     def __repr__(self) -> str:
-        """Return format and value: ``Word(48, 'FX')(m * 2**e)``."""
+        """Return format and value, as in ``Word(48, 'FX')(m * 2**e)``."""
         value = f"{self.m} * 2**{self.e}" if self.m else str(self.e)
         return f"{self.word}({value})"
 
@@ -277,7 +279,7 @@ class Number:
         return Fraction(self.m) * Fraction(2) ** self.e if self.m else Fraction(self.e)
 
     def sqrt(self) -> "Number":
-        """Return the square root, rounded to nearest; nan below zero."""
+        """Return the square root, rounded to nearest; nan for a negative number."""
         if self.m <= 0:
             return self._without_sign_of_zero(
                 self.e if not self.m and not self.e < 0.0 else math.nan
@@ -309,7 +311,8 @@ class Number:
     def _special(self, operation: Callable[[float, float], float], other: "Number") -> "Number":
         """Return the result of an operation with an operand that is zero, infinite or nan.
 
-        It is computed from `_shadow`; a finite result other than 0 means that 0 was added.
+        It is computed from the floats `_shadow`. If they give a finite result other than 0, one
+        operand was 0, and the other is the result.
         """
         found = operation(self._shadow, other._shadow)
         if found and math.isfinite(found):
@@ -321,13 +324,13 @@ class Number:
 
     @property
     def _shadow(self) -> float:
-        """Return a zero, infinity or nan as a float; for other numbers 1.0 or -1.0, the sign."""
+        """Return a zero, infinity or nan as a float, any other number as its sign, 1.0 or -1.0."""
         if self.m:
             return 1.0 if self.m > 0 else -1.0
         return float(self.e)
 
     def _order(self, other: Any) -> float:
-        """Return a number with the sign of the exact difference; nan if an operand is nan."""
+        """Return a number with the sign of self - other, exact; nan if an operand is nan."""
         x, y = self, self.word(other)
         if not (x.m and y.m):
             return 0.0 if x._shadow == y._shadow else x._shadow - y._shadow
@@ -340,9 +343,9 @@ class Word:
 
     `rule` is "nearest-even", "chop" (towards zero), or the CDC's "FX" (truncating) or "RX"
     (rounding). Except for FX and RX, numbers are below 2**(largest + 1), and the smallest exponent
-    follows as in IEEE 754. `largest` is by default that of binary64 if p is at most 53, else of
-    binary128. With `cut_literals`, converted values are truncated. Raise InputError for an unknown
-    rule, or p below 4.
+    follows from `largest` as in IEEE 754. By default `largest` is that of binary64 if p is at most
+    53, else that of binary128. With `cut_literals`, converted values are truncated towards zero.
+    Raise InputError for an unknown rule, or p below 4.
     """
 
     def __init__(
@@ -369,11 +372,11 @@ class Word:
         self._literals: dict[float, Number] = {}
 
     def __repr__(self) -> str:
-        """Return bits and rounding rule: ``Word(48, 'FX')``."""
+        """Return bits and rounding rule, as in ``Word(48, 'FX')``."""
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a float, integer, fraction, decimal text or own number as a number of this format.
+        """Return a float, integer, fraction, decimal text or number as a number of this format.
 
         A float is converted from its shortest decimal representation. Raise TypeError for any other
         type, and for a number of another format.

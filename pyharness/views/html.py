@@ -9,14 +9,14 @@ from pyharness.model.report import Field, Line, Section, Table
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return sections as HTML, with numbers as for a terminal."""
+    """Return sections as HTML, with numbers written as in text output."""
     return "\n".join(part for section in text if section for part in _write_section(section))
 
 
 def table(given: Table, label: str = "table", links: Mapping[str, str] | None = None) -> str:
     """Return a table as HTML, which scrolls if it is wider than the page.
 
-    `label` is for screen readers; `links` maps the text of a cell to an address.
+    `label` is read by screen readers; `links` maps the text of a cell to the address of its link.
     """
     (head, *rows), columns = given.written(), given.columns
     lines = [f'<div class="wide" role="group" tabindex="0" aria-label="{escape(label)}">']
@@ -39,7 +39,8 @@ def _cell(tag: str, text: str, left: bool, link: str | None = None) -> str:
 def _write_section(section: Section) -> Iterator[str]:
     """Yield the HTML elements of a section.
 
-    Successive lines form one `pre`, successive labelled paragraphs (Field) one `dl`.
+    Successive lines form one `pre` element, successive labelled paragraphs (Field) one `dl`
+    element.
     """
     grouped: Any = groupby(section, type)
     for kind, parts in grouped:

@@ -31,7 +31,7 @@ def check_picture(path: str) -> None:
 
 
 def check_matplotlib(what: str) -> None:
-    """Raise InputError if matplotlib, which `what` needs, is missing."""
+    """Raise InputError if matplotlib is missing, which `what` (an option or verb) needs."""
     check_package("matplotlib", what, install_command("plots"))
 
 
@@ -41,7 +41,7 @@ def numbers_beside(path: str) -> str:
 
 
 def saved(picture: Picture, *paths: str) -> dict[str, bytes]:
-    """Return, by path, the images at `paths` and a CSV file beside the first."""
+    """Return, by path, the content of the images at `paths`, and of a CSV file beside the first."""
     _set_title(picture)
     content = {path: _image(picture.figure, _form(path)) for path in paths}
     return content | {numbers_beside(paths[0]): csv_text(picture.numbers).encode()}

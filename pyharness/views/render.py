@@ -1,6 +1,6 @@
 """Reports in every output format: text, CSV, Markdown, JSON, JUnit XML, and HTML.
 
-Text has paragraphs wrapped at 100 columns, and aligned tables.
+In text, paragraphs are wrapped at 100 columns, and tables are aligned.
 """
 
 import io
@@ -40,7 +40,7 @@ def _text(report: Report) -> str:
 
 
 def _lines(told: str | Field | Table) -> list[str]:
-    """Return a part's lines; a Line is not wrapped, a Field has a label."""
+    """Return the lines of a part: a Line is not wrapped, a Field begins with its label."""
     if isinstance(told, Line):
         return [told]
     if isinstance(told, Table):
@@ -54,7 +54,7 @@ def _lines(told: str | Field | Table) -> list[str]:
 
 
 def _aligned(table: Table) -> list[str]:
-    """Return a table's lines, aligned; above 200 rows only the first and last ten."""
+    """Return a table's aligned lines; of more than 200 rows, only the first and the last ten."""
     n = len(table.rows)
     if n > _MOST_ROWS:
         table = table._replace(rows=[*table.rows[:_END_ROWS], *table.rows[-_END_ROWS:]])
@@ -82,7 +82,7 @@ def _aligned(table: Table) -> list[str]:
 
 
 def csv_text(table: Table) -> str:
-    """Return a table as CSV with heads."""
+    """Return a table as CSV; the first line has the heads."""
     import csv
 
     buffer = io.StringIO()
@@ -140,9 +140,9 @@ def _finite(value: Any) -> Any:
 
 
 def _junit(report: Report) -> str:
-    """Return a test suite with a case for each check.
+    """Return a report as JUnit XML: a test suite with a test case for each check.
 
-    A failed case has the reason, and the command that repeats the check.
+    A failed test case contains the reason, and the command that repeats the check.
     """
     from xml.etree import ElementTree as xml
 

@@ -128,7 +128,7 @@ def _absent() -> str:
 
 
 def _count(options: argparse.Namespace) -> int:
-    """Return --draws, or 0; set the seed, by default the present year and week."""
+    """Return the value of --draws, or 0; set the seed, by default the present year and week."""
     if options.draws is None:
         if options.seed is not None:
             raise InputError("--seed has no meaning without --draws, --ensemble or --terms")
@@ -143,9 +143,9 @@ def _count(options: argparse.Namespace) -> int:
 def chosen(
     contenders: Sequence[SceneContender], text: str | None, what: str, attitude: bool = False
 ) -> list[SceneContender]:
-    """Return the solvers for single scenes that an option selects, by default all.
+    """Return the solvers for single scenes that the option `text` selects, by default all.
 
-    Raise InputError if `attitude` is true and a listed solver can't compute it.
+    Raise InputError if `attitude` is true and a solver named in `text` can't compute attitudes.
     """
     found = named(contenders, text, what)
     lacking = [each.name for each in found if not each.attitude]

@@ -20,7 +20,7 @@ from pyharness.thesis.cards import chosen
 from pyharness.thesis.collation import expected_lines, faults, rows, undeclared, unexplained
 
 _LARGEST_SCAN = 1 << 24  # bytes
-# Shown instead of cards. TEI needs the whole edition for its header and apparatus.
+# Outputs instead of cards. TEI, with its header and apparatus, is always of all cards.
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")
 OPTIONS = {
@@ -48,8 +48,8 @@ EXAMPLE = "cards runge-kutta:860"
 def run(options: argparse.Namespace) -> int:
     """Print cards, or the comparison that an option requests.
 
-    Return 1 if --scan or --collate finds a difference that the apparatus does not explain, or
-    --origins a mistake in its table.
+    Return 1 if --scan or --collate finds a difference that the apparatus (the notes) does not
+    explain, or --origins finds a mistake in its own table.
     """
     given = [options.format == "tei", options.classes, options.collate, options.origins]
     given += [options.second_reading, options.scan is not None]

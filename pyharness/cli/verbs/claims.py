@@ -34,7 +34,7 @@ EXAMPLE = "claims --explain abstract-superior"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print verdicts on the claims of the thesis, or the effect of values that it leaves open.
+    """Print verdicts on the claims of the thesis, or the effect of values that the thesis omits.
 
     --assignments, --evidence and --atlas test for which of these values, such as the initial omega,
     the claims hold.

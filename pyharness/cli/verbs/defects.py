@@ -20,7 +20,7 @@ EXAMPLE = "defects stage-base"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print apparatus entries, or one with its effect in the seven cases."""
+    """Print the list of defects, readings and conjectures, or one with its effect in each case."""
     listed = entries(options.kind)
     if options.name is None:
         shared.check_outputs(options)

@@ -14,7 +14,8 @@ EXAMPLE = "doctor"
 def run(options: argparse.Namespace) -> int:
     """Print build, machine and versions.
 
-    Return 3 if the extension is not built, 1 if its arithmetic is not as written.
+    Return 3 if the Fortran extension is not built, 1 if a compiler option or a library changes its
+    arithmetic.
     """
     shared.check_outputs(options)
     found, here = build(), installation() | {"leaves": about_leaves()}

@@ -65,8 +65,8 @@ EXAMPLE = "run --case 5 --method auto --times 1,2,3"
 def run(options: argparse.Namespace) -> int:
     """Print one trajectory.
 
-    With --strict, return 1 if amplified rounding errors exceed the tolerance, or if the integration
-    may have stepped over a short change of the torque.
+    With --strict, return 1 if amplified rounding errors may exceed the tolerance, or if the
+    integration may have stepped over a short change of the torque.
     """
     if options.scene is not None and options.program is None and options.method is None:
         options.method = "auto"

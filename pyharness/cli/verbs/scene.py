@@ -1,4 +1,4 @@
-"""The verb `scene`: write a scene file to begin with, check one, or print the schema of all."""
+"""The verb `scene`: write a sample scene file, check one, or print the schema of scene files."""
 
 import argparse
 import os

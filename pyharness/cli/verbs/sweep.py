@@ -1,6 +1,6 @@
 """The verb `sweep`: solve a grid of scenes, and store the results in a folder.
 
-A later run completes an interrupted one.
+If a run was interrupted, the next one continues it.
 """
 
 import argparse
@@ -41,7 +41,7 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute a sweep's missing chunks, and report on its store."""
+    """Compute the chunks (blocks of the grid) that the store lacks, and report on the store."""
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:

@@ -74,7 +74,7 @@ EXAMPLE = "verify --only cells,methods"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run checks of programs and methods, or what an option requests; return 1 if one fails."""
+    """Run checks of programs and methods, or what an option requests; return 1 if a check fails."""
     if options.listing_output is not None:
         return _listing_output(options)
     if options.integrator is not None:
@@ -182,7 +182,7 @@ def _title(chosen: Selection) -> list[str]:
 
 
 def _unjudged(chosen: Selection, checks: list[Check]) -> list[str]:
-    """Return at most one line, on checks that were not made."""
+    """Return at most one line, on checks that were not made or have no verdict."""
     if chosen.may_ask("decks") and compiler() is None:
         return ["decks: not run, as there is no gfortran on the PATH"]
     count = sum(check.passed and check.value is None for check in checks)

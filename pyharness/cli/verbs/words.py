@@ -1,6 +1,6 @@
 """The verb `words`: run the programs in other floating-point formats.
 
-It also checks our emulation of the CDC's arithmetic by test vectors.
+With --vectors, check our emulation of the CDC's arithmetic against given operations and results.
 """
 
 import argparse
@@ -30,7 +30,7 @@ EXAMPLE = "words --case 2 --program runge-kutta"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the programs' errors, or with --vectors check test vectors; return 1 if one fails."""
+    """Print the programs' errors; with --vectors, check test vectors, and return 1 if one fails."""
     if options.vectors is not None:
         shared.refuse(options, "--vectors", ("case", "program", "lengths", "all", "plot"))
         return _vectors(options)

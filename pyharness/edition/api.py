@@ -13,7 +13,7 @@ from pyharness.edition.markdown import inline
 
 
 class Item(NamedTuple):
-    """A parameter, attribute, result or exception of a docstring."""
+    """A parameter, attribute, result or exception that a docstring describes."""
 
     name: str
     type: str
@@ -23,8 +23,8 @@ class Item(NamedTuple):
 class Entry(NamedTuple):
     """A public name on the API page.
 
-    `kind` is "function", "class" or "property". `summary` is the docstring's first line, `text` its
-    further paragraphs, and `groups` has its sections by title.
+    `kind` is "function", "class" or "property". `summary` is the first line of the docstring,
+    `text` its further paragraphs, and `groups` its sections by title.
     """
 
     name: str
@@ -83,7 +83,7 @@ def _signature(of: Any) -> str:
             told = re.sub(r" -> \w+$", "", told)
     except (TypeError, ValueError):
         return ""
-    # Types without their modules; array types as in the source files.
+    # Types are written without their modules, array types as in the source files.
     told = re.sub(r"<class '(.*?)'>", r"\1", told).replace("NoneType", "None")
     told = re.sub(r"numpy\.ndarray\[tuple\[.*?\], numpy\.dtype\[(.*?)\]\]", _array, told)
     return re.sub(r"\b(?:[a-z_]+\.)+(?=[A-Za-z])", "", told)

@@ -1,4 +1,4 @@
-"""The data of the page on which a torque-free body tumbles, by its closed form.
+"""The data of the page that animates a torque-free body, by the closed form of its motion.
 
 Readers without JavaScript see a picture, and a Python program with its output.
 """
@@ -47,8 +47,8 @@ _STYLES = ("-", "--", "-.")
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `data` is the script's `window.bodyData`, `first` the first scene, and `flip` the time between
-    its flips (s).
+    `data` is the script's `window.bodyData`, `first` the first scene, and `flip` the time (s)
+    between flips of its body.
     """
     first = _first()
     printed = io.StringIO()
@@ -62,7 +62,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the page's bodies, the first body shown, and the latest time (s).
+    """Return the page's bodies, the body shown first, and the largest time (s).
 
     Moments are in kg m2, omegas in rad/s; a body of the thesis has its case number.
     """
@@ -79,7 +79,7 @@ def data() -> dict[str, Any]:
 
 
 def moments_of_box(edges: list[float], mass: float) -> list[float]:
-    """Return the moments (kg m2) of a homogeneous box (in m and kg), rounded only once."""
+    """Return the moments (kg m2) of a homogeneous box (edges in m, mass in kg), rounded once."""
     squares = [Fraction(str(edge)) ** 2 for edge in edges]
     twelfth = Fraction(str(mass)) / 12
     return [float(twelfth * (sum(squares) - square)) for square in squares]
@@ -139,7 +139,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return omega in space (rad/s), perpendicular to the angular momentum, shape (n, 2)."""
+    """Return the part of omega in space (rad/s) perpendicular to the momentum, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

@@ -1,8 +1,8 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
-Browsers do not import modules into a page opened from a file. In the script, every module is a
-function that returns its exports, and follows its imports. Only the project's forms of import and
-export are supported.
+Browsers do not import modules into a page that is opened from a file. In the script, every module
+is a function that returns its exports, and stands after the modules that it imports. Only the forms
+of import and export that this project uses are supported.
 """
 
 import re
@@ -14,7 +14,7 @@ _IMPORT = re.compile(
 _EXPORT = re.compile(r"^export (?=(?:function|const|class) (?P<name>\w+))", re.M)
 # An unsupported import or export, which remains after replacing the supported ones.
 _UNKNOWN = re.compile(r"^\s*(?:import|export)\b.*|\bimport\s*[(.]", re.M)
-# Readers find the comments in the modules.
+# Comments are removed; readers find them in the modules.
 _COMMENT = re.compile(r"^ *//.*\n", re.M)
 
 
@@ -35,7 +35,8 @@ def _add(
 ) -> None:
     """Append a module to `parts`, after the modules that it imports.
 
-    `importing` is the chain of modules that import it; `exports` collects the exported names.
+    `importing` is the chain of modules that led to this import; `exports` collects the names that
+    each module exports.
     """
     text = path.read_text(encoding="utf-8")
 

@@ -36,18 +36,18 @@ def codemeta() -> dict[str, Any]:
 
 
 def release_date() -> str:
-    """Return the date of publication or, before it, the year of the copyright."""
+    """Return the date of publication or, before publication, the year of the copyright."""
     described = codemeta()
     return str(described.get("datePublished", described["copyrightYear"]))
 
 
 def address() -> str:
-    """Return the address of the published pages, with a slash at its end; empty without one."""
+    """Return the address of the published pages, ending with a slash; "" before publication."""
     return str(facts("edition")["address"])
 
 
 def check_publishable() -> None:
-    """Raise InputError if the pages have an address and CITATION.cff has placeholders."""
+    """Raise InputError if the pages have an address, but CITATION.cff still has placeholders."""
     lines = shipped("CITATION.cff").read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines, 1):
         found = [each for each in _PLACEHOLDERS if each in line]
@@ -59,9 +59,10 @@ def check_publishable() -> None:
 
 
 def bibtex(place: str = "", path: str = "") -> str:
-    """Return the BibTeX entries of the edition, or of a `place` at a `path` in it, and the thesis.
+    """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
 
-    Without an address of the pages, the path takes its place.
+    `path` is the path of the place in the pages. It is given instead of an address if the pages
+    have none.
     """
     described = codemeta()
     version, thesis = described["version"], described["referencePublication"]
@@ -97,7 +98,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data of the citation script, which fills in the place and the path."""
+    """Return the data of the script that cites a place; it fills in the place and the path."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),
@@ -155,8 +156,8 @@ def _entry(kind: str, key: str, fields: dict[str, str]) -> str:
 class Part(NamedTuple):
     """A file of the data package.
 
-    `path` is relative to the package, `media_type` is as in ``text/csv``. `content` is empty for
-    files that describe the others.
+    `path` is relative to the package; `media_type` is a MIME type, as in ``text/csv``. `content` is
+    empty for the files that describe the other files.
     """
 
     path: str
@@ -188,9 +189,9 @@ _DATA = "Software Heritage identifier of the edition's data"
 
 
 def crate_record(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return the RO-Crate record of files other than `KEPT`.
+    """Return the RO-Crate record of `parts` and of the files `KEPT`.
 
-    Entities are items of one list, and refer to each other by identifier.
+    The entities of a crate are items of one list, and refer to each other by identifier.
     """
     software, thesis = codemeta(), thesis_record()
     files = [_file(each) for each in (*parts, *KEPT) if each.path != CRATE]

@@ -1,6 +1,7 @@
 """The edition as plain data: cards, apparatus, verdicts, runs and printed pages.
 
-The package is an RO-Crate. Without times and paths, two runs write the same bytes.
+The package is an RO-Crate. It contains no times and no paths of the machine, so that two runs write
+the same bytes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -59,7 +60,7 @@ _COLUMNS = "card kind text scan entries port twin swhid"
 def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     """Return all files of the data package, content by path.
 
-    `progress` receives the numbers of completed and of all parts, and the part's name.
+    `progress` receives the number of completed parts, the number of all parts, and a part's name.
     """
     parts = [*_list_files(progress)]
     parts.append(_readme(parts))
@@ -67,7 +68,8 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
     content[CRATE] = json_text(crate_record(parts), indent=2).encode()
     listed = {path: content_identifier(each) for path, each in content.items()}
     mark = {"schema": SCHEMAS["data package"], "version": codemeta()["version"]}
-    # The manifest has this file's checksum, so its identifier is not known here.
+    # The manifest contains the checksum of this file, so that the manifest's identifier is not
+    # known here.
     files = {**listed, MANIFEST: None}
     mark |= {"text": text_digest(), "data": data_identifier(), "files": files}
     content[PACKAGE_MARK] = json_text(mark, indent=2).encode()
@@ -78,7 +80,7 @@ def data_package(progress: Progress = no_progress) -> dict[str, bytes]:
 
 
 def archive(content: Mapping[str, bytes], folder: str) -> bytes:
-    """Return a ZIP file, without times, of files by path in `folder`."""
+    """Return a ZIP file, without times, of the files in `content`, by path in `folder`."""
     found = BytesIO()
     with ZipFile(found, "w") as packed:
         for path, each in content.items():
@@ -153,7 +155,7 @@ def run_parts() -> Iterator[Part]:
 
 @cache
 def _listings() -> dict[tuple[str, str], Listing]:
-    """Return the listings by program and name; those with one fault are in apparatus order."""
+    """Return the listings by program and name; those with one defect are in apparatus order."""
     found = {}
     for program in PROGRAMS:
         found[program, "original"] = Listing.original(program)
@@ -228,7 +230,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of the conclusions from each outcome of a job."""
+    """Return a Markdown table of what each possible outcome of a job would show."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 
@@ -239,7 +241,7 @@ def _name(program: str, case: int, listing: str, word: str) -> str:
 
 
 def _jobs(texts: dict[str, str]) -> Iterator[Part]:
-    """Yield the jobs, also with rounding if it changes the program's page."""
+    """Yield the jobs for each system, also with the option ROUND if it changes the printed page."""
     for program, case in facts("cases")["published"].items():
         first, second = (texts[_name(program, case, "original", word)] for word in _MACHINE)
         for system in SYSTEMS:

@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-The port is in modern Fortran. A note is a numbered entry of the critical apparatus; `entry` and
-`switch` are identifiers of entries.
+The ports are in modern Fortran. A note is a numbered entry of the critical apparatus; `entry` is
+the identifier of an entry.
 """
 
 import math
@@ -26,7 +26,7 @@ TITLES = {
 }
 """The names of the programs in headings."""
 
-# By precedence: the first kind of a card determines its colour.
+# The kinds of entries by precedence: the first kind of a card determines its colour.
 _ORDER = (
     "defect", "reading", "conjecture", "missing text", "unreachable", "unread", "redundant",
     "dialect", "normalization", "misreading",
@@ -34,9 +34,9 @@ _ORDER = (
 
 
 class Run(NamedTuple):
-    """Successive characters of a card or its scanned line.
+    """Successive characters of a card or of its line in the scan.
 
-    `entry` explains their difference, if card and scan differ.
+    If card and scan differ here, `entry` explains the difference.
     """
 
     text: str
@@ -46,7 +46,7 @@ class Run(NamedTuple):
 class Note(NamedTuple):
     """A numbered entry of the apparatus, with the cards of one program to which it applies.
 
-    Defects come first, by what they change. `cards` is text, as in ``860-910, 1040-1090``.
+    `cards` is a text, as in ``860-910, 1040-1090``.
     """
 
     number: int
@@ -62,8 +62,8 @@ class Note(NamedTuple):
 class Corrected(NamedTuple):
     """The corrected form of a card.
 
-    `text` is None for a deleted card; `changes` is whether the card is deleted or replaced.
-    `inserted` has number and text of cards inserted after it.
+    `text` is None for a deleted card; `changes` tells whether the card is deleted or replaced.
+    `inserted` has number and text of each card inserted after it.
     """
 
     text: str | None
@@ -75,12 +75,13 @@ class Corrected(NamedTuple):
 class CardView(NamedTuple):
     """A card as shown on a page.
 
-    `card` is in brackets if the scan lacks it. `witness` is the card with the names of the print
-    where ours are uniform, empty if the scan lacks it, or None if it equals `card`. `after` are the
-    scan's lines after it that belong to no card, each with its entry. `scan` has the scan's blanks,
-    or is None. `port` has each line of the Fortran port, with the defect or reading on which it
-    depends, if any, and whether it is executed with this switch on. `notes` begin with the most
-    important kind; `begins` has those whose range of cards begins here, with this range alone.
+    `card` is in brackets if the scan lacks the card. `witness` is the card with the names as
+    printed, where we made them uniform; it is empty if the scan lacks the card, and None if it
+    equals `card`. `after` has the following lines of the scan that belong to no card, each with its
+    entry. `scan` is the line of the scan with its blanks, or None. `port` has each line of the
+    Fortran port, with the defect or reading on which the line depends, if any, and whether the line
+    is executed if that is active. `notes` begin with the most important kind; `begins` has the
+    notes whose range of cards begins here, each with this range alone.
     """
 
     number: int
@@ -98,7 +99,7 @@ class CardView(NamedTuple):
 class Sheet(NamedTuple):
     """A printed page: its number from 1 and its cards.
 
-    `moved` explains an unexpected place in the scan, or is None.
+    `moved` is the entry that explains an unexpected place in the scan, or None.
     """
 
     number: int
@@ -145,7 +146,7 @@ def _changes(name: str, program: str) -> tuple[float, float]:
 
 
 def _change(one: float, other: float) -> float:
-    """Return the difference of two errors to three digits; of an overflow, infinity."""
+    """Return the difference of two errors to three digits; infinity if only one is finite."""
     if math.isfinite(one) and math.isfinite(other):
         return float(f"{abs(one - other):.2e}")
     return math.inf if math.isfinite(one) or math.isfinite(other) else 0.0
@@ -187,7 +188,7 @@ def _card(card: Card) -> list[Run]:
     """Return a card's text as runs, in brackets if the scan lacks it."""
     if card.lost:
         statement = card.text.lstrip()
-        # The bracket replaces a blank; the statement keeps its columns.
+        # The bracket replaces a blank, so that the statement keeps its columns.
         blanks = card.text[: max(len(card.text) - len(statement) - 1, 0)]
         return [Run(f"{blanks}[{statement}]")]
     return [Run(text, each and each.entry) for text, each in card.passages()]

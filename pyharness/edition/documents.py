@@ -21,9 +21,9 @@ _PICTURES = (".png", ".svg")
 _BESIDE = (*_PICTURES, ".csv", ".schema.json")
 # Folder for contributors, which the site omits.
 _OFF_SITE = "contributing/"
-# Their documents with Python examples also become notebooks.
+# Folders whose documents also become notebooks if they have Python examples.
 _NOTEBOOKS = ("gallery", "tutorials")
-# The site's other pages link them.
+# Documents to which other pages of the site link.
 _LINKED = (
     "index.md",
     "article/article.md",
@@ -42,7 +42,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^]]*\])*)\]\([^):]*\)")
 def documents_folder(given: str | None = None) -> Path:
     """Return `given` or the checkout's `docs`; raise InputError if documents are missing.
 
-    An installed package lacks them.
+    An installed package does not contain the documents.
     """
     folder = shipped("docs") if given is None else Path(given)
     missing = [name for name in _LINKED if not (folder / name).is_file()]
@@ -102,8 +102,8 @@ def notebooks(folder: Path) -> dict[str, bytes]:
 def notebook(text: str, pictures: Mapping[str, bytes]) -> bytes:
     """Return a document as a notebook, JSON in format 4.5.
 
-    `pictures` has contents by file name. Links to documents become plain text, because a notebook
-    may be in any folder.
+    `pictures` maps file names to contents. Links to other documents become plain text, because a
+    notebook may be in any folder.
     """
     cells: list[dict[str, Any]] = []
 

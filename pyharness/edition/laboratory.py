@@ -40,8 +40,8 @@ _SHOWN = 3
 def context() -> dict[str, Any]:
     """Return the values for the page's template.
 
-    `switches` has defects, readings and conjectures by heading. `first` is the run of `DEFAULTS`.
-    `titles` are the cases' names.
+    `switches` has defects, readings and conjectures, each kind with its heading. `first` is the run
+    of `DEFAULTS`. `titles` has the names of the cases.
     """
     titles, flags = {n: case_scene(n).name for n in case_numbers()}, data()["flags"]
     by_kind = {kind: [flag for flag in flags if flag["kind"] == kind] for kind in _KINDS}
@@ -51,7 +51,7 @@ def context() -> dict[str, Any]:
 
 
 def data() -> dict[str, Any]:
-    """Return the script's `window.laboratoryData`, to run any program on any case."""
+    """Return the script's `window.laboratoryData`, with which it runs any program on any case."""
     cases = {number: case_scene(number) for number in case_numbers()}
     return {
         "scenes": list(map(requested_scene, cases.values())),
@@ -89,7 +89,7 @@ def _deck_data() -> dict[str, Any]:
     """Return the cards that are executed in a step, and how corrections alter them.
 
     A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
-    are joined; alterations for compilers are left out.
+    are joined to statements. Alterations for compilers are omitted.
     """
     order = facts("cards/passes")
     found: dict[str, Any] = {}

@@ -1,8 +1,9 @@
-"""The data of the pages on claims, thesis, figures and apparatus.
+"""The data of the pages on the claims, the thesis, its figures and the apparatus.
 
 A claim is a statement of the thesis that we test; a judgement has our verdicts on it, for original
-and corrected programs. `judged` has the judgements of all claims, `told` those of all sentences.
-`figures` has Figures 6 to 12, drawn from computed curves, by file name without suffix.
+and corrected programs. Common arguments: `judged` has the judgements of all claims, `told` all
+sentences with their judgements, and `figures` Figures 6 to 12, drawn from computed curves, by file
+name without suffix.
 """
 
 from collections import Counter
@@ -38,9 +39,9 @@ class SentenceVerdicts(NamedTuple):
 class Formula(NamedTuple):
     """A displayed formula of the thesis.
 
-    `number` is as in ``34a`` or ``13-15``, or empty; `lines` are MathML, `what` is a sentence in
-    HTML. `cards` has the numbers of the cards that compute it, by program; `entry` is its apparatus
-    entry, or empty.
+    `number` is a text such as ``34a`` or ``13-15``, or empty; `lines` are MathML; `what` is a
+    sentence on the formula in HTML. `cards` has, by program, the numbers of the cards that compute
+    the formula; `entry` is the identifier of its apparatus entry, or empty.
     """
 
     number: str
@@ -68,10 +69,10 @@ def counts(judged: Sequence[Judgement]) -> dict[str, tuple[int, int]]:
 
 
 def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
-    """Return the verdicts to show, each with its programs.
+    """Return the verdicts to show, each with a text on the programs that it judges.
 
-    A claim about results has two. Another has one: on a design that of the programs as printed,
-    else that of the corrected ones.
+    A claim about results has two verdicts, any other claim one: that on the programs as printed for
+    a claim about a design, else that on the corrected programs.
     """
     original, corrected = judgement.original.verdict, judgement.corrected.verdict
     if judgement.claim["kind"] == "result":
@@ -80,7 +81,7 @@ def verdicts(judgement: Judgement) -> list[tuple[str, str]]:
 
 
 def assumption(case: int, programs: Iterable[str] = (), listing: str = "original") -> str:
-    """Return what we supply in a case of Table 1 and in runs of programs, or an empty text."""
+    """Return a text on what we supply in a case of Table 1 and in runs of `programs`, or ""."""
     found = ["its initial omega"] if case in open_starts() else []
     start = " and ".join([*found, *(["its cards"] if case_scene(case).torque.varies else [])])
     among = assumed(case_scene(case), map(SETS[listing], programs))
@@ -134,9 +135,9 @@ def thesis(judged: Sequence[Judgement]) -> list[SentenceVerdicts]:
 
 
 def thesis_context(told: Sequence[SentenceVerdicts]) -> dict[str, Any]:
-    """Return the data of the page of the thesis: sentences and formulas by section, and a table.
+    """Return the data of the page on the thesis: sentences and formulas by section, and a table.
 
-    The table counts sentences and claims; only claims about results count as reproduced.
+    The table counts sentences and claims. It counts as reproduced only claims about results.
     """
     columns = [
         Column("section", left=True), Column("sentences"), Column("that make a claim"),
@@ -174,7 +175,7 @@ def formulas() -> dict[str, list[Formula]]:
 def draw_figures(figures: Mapping[str, FigureFinding]) -> dict[str, bytes]:
     """Return the figures as SVG and CSV, and Figure 7 with both versions of its programs.
 
-    This figure also has the limit of the original program's omega as the step size goes to 0.
+    That figure also shows the limit of the original program's omega as the step size goes to 0.
     """
     together = together_picture(figures["figure-07"], figures["figure-07-corrected"])
     files = saved(together, "figure-07-together.svg", "preview.png")
@@ -188,8 +189,8 @@ def printed_figures(
 ) -> list[dict[str, Any]]:
     """Return the thesis's figures in order, each with its number, caption and place.
 
-    `drawn` has our drawings. `says` has the thesis's sentences on the figure, with anchors, which
-    are empty for sections I to IV. `ours` is the text for a figure that is not drawn.
+    `drawn` has our drawings of the figure. `says` has the thesis's sentences on it, each with its
+    anchor, which is empty for sections I to IV. `ours` is our text on a figure that is not drawn.
     """
     found = []
     for each in facts("figures")["printed"]:

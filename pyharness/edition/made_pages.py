@@ -1,4 +1,4 @@
-"""Parts of Markdown documents made from data."""
+"""Parts of Markdown documents that are made from data."""
 
 from collections.abc import Sequence
 

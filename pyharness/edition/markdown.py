@@ -1,7 +1,7 @@
 """Conversion of the project's Markdown to HTML.
 
-Anchors are GitHub's, formulas become MathML, and links between documents become links between
-pages.
+Headings get the anchors that GitHub gives them, formulas become MathML, and links between documents
+become links between pages.
 """
 
 import re
@@ -34,10 +34,10 @@ class Document(NamedTuple):
 
 
 def document(text: str, link: Callable[[str], str | None]) -> Document:
-    """Return a document, whose first line is its title, as HTML.
+    """Return a Markdown text, whose first line is the title, as a Document.
 
-    `link` maps a target to the site's target, or to None: then a link becomes plain text, and a
-    picture raises ValueError.
+    `link` maps the target of a link or picture to its target on the site, or to None. With None a
+    link becomes plain text, and a picture raises ValueError.
     """
     tokens = _parser().parse(text)
     for token in _walk(tokens):
@@ -76,7 +76,7 @@ def _parser() -> MarkdownIt:
     parser.use(dollarmath_plugin, allow_digits=False, allow_space=False, renderer=write)
     renderer: Any = parser.renderer
     rules = renderer.rules
-    # Elements wider than the page scroll separately, also by keyboard.
+    # Elements wider than the page scroll separately; the keyboard can scroll them too.
     opening = '<div class="wide" role="group" tabindex="0" aria-label="table"><table>\n'
     rules["table_open"] = lambda *_: opening
     rules["table_close"] = lambda *_: "</table></div>\n"

@@ -1,4 +1,4 @@
-"""The data of the page that compares the cards of the three decks, and explains disagreements.
+"""The data of the page that compares the cards of the three decks, and explains differences.
 
 Within an operation of `data/cards/collation.toml`, cards are aligned by similarity.
 """
@@ -15,12 +15,12 @@ from pyharness.model.listing import PROGRAMS
 from pyharness.thesis import collation
 from pyharness.thesis.cards import Card, deck, numbers
 
-# By kind; an operator may be a relation such as .GT., or a power.
+# The parts of a card, by kind; an operator may be a relation such as .GT., or a power.
 _PART = re.compile(
     r"(?P<operator>\.[A-Z]+\.|\*\*|[-+*/=]|\.(?!\d))|(?P<name>[A-Z][A-Z0-9]*)"
     r"|(?P<number>\d+\.?\d*|\.\d+)|(?P<punctuation>\S)"
 )
-# Least ratio of equal parts of aligned cards.
+# Two cards are aligned only if at least this fraction of their parts is equal.
 _ALIKE = 0.5
 _LABEL = "statement number"
 KINDS = (_LABEL, "name", "number", "operator", "punctuation")
@@ -28,7 +28,7 @@ KINDS = (_LABEL, "name", "number", "operator", "punctuation")
 
 
 class _Part(NamedTuple):
-    """A part of a card; columns are from 0."""
+    """A part of a card; the column is counted from 0."""
 
     column: int
     text: str
@@ -36,14 +36,14 @@ class _Part(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """A card in an aligned row; the `entry` of a marked run is the kind of its difference."""
+    """A card in an aligned row; if a run differs, its `entry` is the kind of the difference."""
 
     card: Card
     runs: list[Run]
 
 
 class AlignedRow(NamedTuple):
-    """Corresponding cards by program, None where missing; kinds of differences, of `KINDS`."""
+    """Corresponding cards by program, None if missing, and the kinds of their differences."""
 
     cells: dict[str, Cell | None]
     differences: list[str]
@@ -62,7 +62,7 @@ def operations() -> list[Operation]:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return the equations and the place in the thesis of a disagreement."""
+    """Return text on the equations and the place of the thesis that a disagreement concerns."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))
@@ -79,9 +79,10 @@ def _aligned(ranges: dict[str, str]) -> list[AlignedRow]:
 def _merged(rows: Sequence[dict[str, Card]], cards: Sequence[Card]) -> list[dict[str, Card]]:
     """Return aligned rows with a further deck's cards inserted.
 
-    The alignment keeps the order and has the largest sum of similarities.
+    Among all alignments that keep the order of the cards, the result has the largest sum of
+    similarities.
     """
-    # largest sum for the rows from i and the cards from j on
+    # best[i][j] is the largest sum for the rows from i on and the cards from j on.
     best = [[0.0] * (len(cards) + 1) for _ in range(len(rows) + 1)]
     pairs = [[max(_likeness(x, card) for x in row.values()) for card in cards] for row in rows]
     for i in reversed(range(len(rows))):

@@ -1,6 +1,6 @@
 """The reports of `edition`, and the check of its libraries.
 
-`content` maps paths of written files to their content.
+`content` maps the path of each written file to its content.
 """
 
 import shlex
@@ -18,7 +18,7 @@ LIBRARIES = (
     "docstring_parser", "jinja2", "latex2mathml", "markdown_it", "markupsafe", "matplotlib",
     "mdit_py_plugins",
 )  # fmt: skip
-# Marks a folder as written by `edition`, and lists the site's files.
+# The file that marks a folder as written by `edition`, and lists the files of the site.
 MARK = "edition.json"
 _KINDS = (*words("files"), Column("number"), Column("kB", digits(".0f", 1e-3)))
 

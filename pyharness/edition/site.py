@@ -1,7 +1,7 @@
 """The pages of the web site.
 
-A page is a template with data and reports. It works from a server or a file, under any path,
-without JavaScript, and loads nothing from other sites. Each result is computed once.
+A page is a template filled with data and reports. It works from a server or a file, under any path
+and without JavaScript, and loads nothing from other sites.
 """
 
 import json
@@ -45,7 +45,7 @@ from pyharness.model.schema import SCHEMAS
 from pyharness.thesis.cards import deck, parallels
 from pyharness.views.render import json_text
 
-# By section, path by title.
+# For each section of the menu, the path of each page by title.
 MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="utf-8"))
 
 
@@ -72,7 +72,7 @@ class Page(NamedTuple):
 def build_site(progress: Progress = no_progress, docs: Path | None = None) -> dict[str, bytes]:
     """Return all files of the site, content by path.
 
-    `progress` is as in `data_package`; `docs` is by default the checkout's folder.
+    `progress` is as in `data_package`; `docs` is by default the folder of the source checkout.
     """
     check_publishable()
     docs = docs or documents.documents_folder()
@@ -188,7 +188,7 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _sections(path: str, html: str) -> Iterator[Found]:
-    """Yield the sections of a page, for the search, with their text."""
+    """Yield the sections of a page, each with its text, for the search."""
     heads = r'<h[12](?: id="(?:h-)?([\w-]+)")?>(.*?)</h[12]>'
     _, *parts = re.split(heads, html.partition("</main>")[0])
     for anchor, title, text in zip(*(parts[n::3] for n in range(3)), strict=True):
@@ -199,7 +199,7 @@ def _sections(path: str, html: str) -> Iterator[Found]:
 def _rendered(page: Page) -> bytes:
     here = page.menu or page.path
     section = next(name for name, of in MENU.items() if here in of.values())
-    # Relative, so that the site works under any path.
+    # Links are relative, so that the site works under any path.
     root = "../" * page.path.count("/")
     html = _templates().get_template(page.template).render(
         {"page": page, "root": root, "menu": MENU, "here": here, "section": section,

@@ -1,6 +1,7 @@
 """The data of the story, the home page: charts and numbers of its seven scenes.
 
-They are from runs of the Python ports, which a script repeats when a visitor changes a value.
+The data come from runs of the Python ports; a script repeats such runs when a visitor changes a
+value.
 """
 
 import math
@@ -30,7 +31,7 @@ BLIND_CASES = (1, 2, 5)
 RACE_CASES = (2, 3, 4, 5, 6, 7)
 # Plot area in the chart's units: left, top, right, bottom.
 BOX = (40, 10, 350, 196)
-# Shown at first: the two-term program overflows in it.
+# The step shown at first, in which the two-term program overflows.
 POINTS_STEP = 57
 STEP_SIZES = (0.01, 0.005, 0.0025, 0.00125)  # s
 _LOG_STEP = 2  # powers of ten between labels
@@ -48,9 +49,9 @@ class Curve(NamedTuple):
 class Chart(NamedTuple):
     """A chart with fixed axes, as numbers for SVG.
 
-    `x` and `y` are ranges, in exponents of ten for a logarithmic `y`. Ticks are pairs of position
-    and label. If `is_marked`, points are marks without lines. `marks` tell apart curves that
-    coincide.
+    `x` and `y` are the ranges of the axes; for a logarithmic `y`, exponents of ten. Ticks are pairs
+    of position and label. If `is_marked`, points are drawn as marks without lines. `marks` make
+    coinciding curves distinguishable.
     """
 
     name: str
@@ -157,14 +158,14 @@ def _largest_error(case: int, program: str, listing: str) -> float:
 
 
 def _ratios(case: int) -> dict[str, float]:
-    """Return the corrected collocation programs' errors over the corrected Runge-Kutta error."""
+    """Return the ratio of each corrected collocation program's error to that of Runge-Kutta."""
     errors = {name: _largest_error(case, name, "corrected") for name in PROGRAMS}
     least = errors.pop("runge-kutta")
     return {name: error / least for name, error in errors.items()}
 
 
 def _span(case: int) -> Range:
-    """Return a range for a case's true omega1 (rad/s), with a margin."""
+    """Return an axis range for a case's true omega1 (rad/s), with a margin."""
     values = [case_scene(case).omega[0], *case_truth(case).omega[:, 0]]
     low, high = min(values), max(values)
     margin = 0.25 * (high - low)
@@ -188,7 +189,7 @@ def _chart_of_case(
 
 
 def _marks(chart: Chart, runs: Mapping[str, Trajectory]) -> list[Curve]:
-    """Return marks on the curves of omega1 over time, at other steps on each curve."""
+    """Return marks on the curves of omega1 over time, at different steps on each curve."""
     return [
         _curve(chart, name, run.time[first::15].tolist(), run.omega[first::15, 0].tolist())
         for first, (name, run) in zip((7, 4, 12), runs.items(), strict=True)

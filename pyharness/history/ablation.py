@@ -1,4 +1,4 @@
-"""Apparatus entries, such as defects, and their effects on the errors of the programs."""
+"""Entries of the critical apparatus, such as defects, and their effects on the programs' errors."""
 
 import math
 import string
@@ -37,10 +37,10 @@ for _a in "abcd":
 
 @dataclass(frozen=True)
 class Effect:
-    """The outcome of one listing on one scene.
+    """The outcome of one listing (a program with a choice of defects) on one scene.
 
     `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`; `common`
-    has both over the steps that all compared listings completed, or NaN.
+    has both errors over only the steps that all compared listings completed, or NaN.
     """
 
     listing: Listing
@@ -54,9 +54,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class CaseEffects:
-    """The outcomes of four listings in one program and case, which show the effect of one entry.
+    """The outcomes of four listings of a program in one case, which show the effect of one entry.
 
-    `corrected_alone` corrects only this entry; `kept_alone` keeps only this one.
+    `corrected_alone` is the original with only this entry corrected, `kept_alone` the corrected
+    listing with only this entry kept.
     """
 
     program: str
@@ -107,7 +108,8 @@ def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of an apparatus entry in each of its programs and every case.
 
     For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
-    and without it; `kept_alone` and `corrected` are the corrected listing with and without it.
+    and without the entry; `kept_alone` and `corrected` are the corrected listing with and without
+    it.
     """
     known = entry(name)
     for program in known["programs"]:
@@ -124,8 +126,8 @@ def lattice(
 ) -> list[Effect]:
     """Return a program's outcomes with every subset of its defects, the largest error first.
 
-    The order is by the error over the steps that all runs completed. The `readings` and, under a
-    varying torque, the conjectures vary too. A reading has no effect if a defect in the same
+    Errors are compared over the steps that all runs completed. The subsets include the `readings`
+    and, under a varying torque, the conjectures. A reading has no effect if a defect in the same
     statement is corrected.
     """
     check_steps(scene, program, "fortran", effort)
@@ -148,7 +150,7 @@ def switched(scene: Scene, program: str) -> tuple[str, ...]:
 
 
 def _size(found: Effect) -> list[float]:
-    # To three digits, so that rounding errors do not affect the order.
+    # Rounded to three digits, so that rounding errors do not affect the order.
     return [float(f"{each:.2e}") for each in (*found.common, found.omega, found.velocity)]
 
 

@@ -72,7 +72,7 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null where the scan agrees with our text, and empty where it lacks the card.
+    `scan` is null if the scan agrees with our text, and empty if the scan lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -89,7 +89,7 @@ def scan_report(
 ) -> Report:
     """Return the report on whether our text explains every line of a scan.
 
-    `faults` are unexplained lines, `undeclared` disagreements of cards and apparatus.
+    `faults` names unexplained lines, `undeclared` disagreements between cards and apparatus.
     """
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     deviating = sum(bool(each.differences or each.lost) for each in cards)
@@ -112,7 +112,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report of the numbers of apparatus entries and of their cards, by kind."""
+    """Return the report of how many apparatus entries there are, on how many cards, by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)

@@ -1,10 +1,10 @@
-"""The family of weighted residual methods in III.1 and IV.2 of the thesis, and their orders.
+"""The weighted residual methods in sections III.1 and IV.2 of the thesis, and their orders.
 
 One step of length h solves omega' = f(t, omega), equations 16-18, with a polynomial trial function
-omega(0) + c1 t + ... + cn t**n. The first estimate takes f constant. Each correction evaluates f
-along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) vanish
-for n weight functions W (eq. 26). The thesis makes one correction. `checks.theory.tableau` computes
-the coefficients of a method.
+omega(0) + c1 t + ... + cn t**n. The first estimate assumes constant f. Each correction evaluates f
+along the previous estimate, and chooses c1, ..., cn so that the integrals of W (omega' - f) over
+the step vanish for n weight functions W (eq. 26). The thesis makes one correction.
+`checks.theory.tableau` computes the coefficients of a method.
 """
 
 import math
@@ -31,20 +31,20 @@ WEIGHTINGS = ("collocation", "subdomain", "galerkin", "least-squares")
 POINTS = ("thesis", "gauss")
 MOST_TERMS = 12
 MOST_CORRECTIONS = 100
-# With a larger one the points are so close that half the digits are lost.
+# Largest condition number; above it the points are so close that half of the digits are lost.
 _WORST_CONDITION = 1e8
 SCHEMES: tuple[tuple[str, str | None], ...] = (
     *(("collocation", points) for points in POINTS),
     *((other, None) for other in WEIGHTINGS[1:]),
 )
 # Numbers of steps to the horizon, each twice the number two places before, and horizons as
-# fractions of the end time. Over the first, the leading term of the error dominates even at large
-# steps. Longer ones serve members whose error is then mostly rounding; the last three serve long
-# scenes.
+# fractions of the end time. Up to the first horizon, the leading term of the error dominates even
+# with large steps. Longer horizons are for methods whose error there is mostly rounding, the last
+# three for long scenes.
 _LADDER = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
 _HORIZONS = (1 / 4, 1 / 2, 1, 1 / 16, 1 / 64, 1 / 256)
-# Orders are from errors in this range, relative to the largest omega at the horizon: above it,
-# higher terms matter; below it, rounding error (at most 1e-15).
+# Orders are computed from errors in this range, relative to the largest omega at the horizon. Above
+# it, higher terms of the error matter; below it, rounding error (at most 1e-15) does.
 _LARGEST, _SMALLEST = 1e-2, 5e-14
 _SLOPES_WANTED = 4
 _SETTLED = 0.1
@@ -56,9 +56,10 @@ MOST_STEPS = 2_000
 class Member:
     """A weighted residual method of the thesis.
 
-    The weights of least squares are i t**(i-1), the derivatives of the residual with f held
-    constant (eq. 25). `points`, for collocation only, are fractions of the step: k/(n+1)
-    (`thesis`), Gauss-Legendre (`gauss`), or n different numbers from 0 to 1.
+    The weight functions of least squares are i t**(i-1), the derivatives of the residual with f
+    held constant (eq. 25). `terms` is n. `points`, for collocation only, are fractions of the step:
+    k/(n+1), k = 1 to n (`thesis`), the Gauss-Legendre points (`gauss`), or n different numbers from
+    0 to 1.
     """
 
     weighting: str = "collocation"
@@ -136,8 +137,8 @@ def predicted_order(member: Member) -> int:
 def run(scene: Scene, member: Member) -> Trajectory:
     """Integrate a scene by a weighted residual method (Jacobs 1982, III.1, eq. 20-27, and IV.2).
 
-    The first estimate uses the torque at the beginning of the step, corrections the torque at their
-    nodes. Each step rounds omega by about one unit in the last place.
+    The first estimate uses the torque at the beginning of the step, a correction the torque at its
+    nodes. Each step has a rounding error of about one unit in the last place of omega.
     """
     omega = integrate(scene, [member])[0]
     rows = int(np.logical_and.accumulate(np.isfinite(omega).all(axis=1)).sum())
@@ -154,7 +155,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
     Values after an overflow are not finite.
     """
-    # Sorted so that the members that need another correction are contiguous in memory.
+    # The members are sorted, so that those that need another correction are contiguous in memory.
     order = sorted(range(len(members)), key=lambda i: -members[i].corrections)
     members = [members[i] for i in order]
     schemes = [tableau(m.weighting, m.terms, m.points) for m in members]
@@ -195,7 +196,7 @@ def integrate(scene: Scene, members: Sequence[Member]) -> Array:
 
 
 def _stages(matrix: Array, rates: Array) -> Array:
-    """Return the products of `_sums` in a third of the time, from matrices (i, j, members)."""
+    """Return the products of `_sums` three times as fast, from matrices (i, j, members)."""
     side_by_side = np.ascontiguousarray(rates.transpose(1, 2, 0))
     total: Array = matrix[:, 0, None] * side_by_side[0]
     product = np.empty_like(total)
@@ -206,7 +207,7 @@ def _stages(matrix: Array, rates: Array) -> Array:
 
 
 def _sums(factors: Array, rates: Array) -> Array:
-    """Return the products of factors (members, i, j) and rates (members, j, 3), without BLAS."""
+    """Return the products of factors (members, i, j) and rates (members, j, 3) without BLAS."""
     return np.asarray(np.einsum("mij,mjk->mik", factors, rates))
 
 
@@ -232,10 +233,11 @@ def _torque(scene: Scene, times: Array) -> Array:
 
 @dataclass(frozen=True)
 class OrderFinding:
-    """The derived and measured order of convergence of a method in a scene, and its error.
+    """The derived and the measured order of convergence of a method in a scene, and its error.
 
-    `measured` is None if all errors are too large or only rounding, and `settled` if its last two
-    values differ by at most a tenth. `error` is of omega with the scene's step (rad/s).
+    `measured` is None if all errors are too large or only rounding. It is `settled` if the last two
+    measurements differ by at most a tenth. `error` (rad/s) is the error of omega with the scene's
+    step size.
     """
 
     member: Member
@@ -251,12 +253,12 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the order is too low; a higher order may be due to a special scene."""
+        """Return whether the measured order is too low; a special scene may cause a higher one."""
         return self.settled and self.deviation < -SLACK
 
 
 def family_members() -> list[Member]:
-    """Return each scheme of `SCHEMES` with 1 to 5 terms and 1 to 8 corrections."""
+    """Return each weighting of `SCHEMES` with 1 to 5 terms and 1 to 8 corrections."""
     return [Member(w, n, p, k) for w, p in SCHEMES for n in range(1, 6) for k in range(1, 9)]
 
 
@@ -320,7 +322,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each usable pair of errors, whose step sizes have the ratio 2."""
+    """Return the order from each usable pair of errors; its step sizes have the ratio 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)
@@ -329,7 +331,7 @@ def _slopes(errors: Array) -> list[float]:
 
 
 def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
-    """Return the report of orders and errors in a scene, by n terms and k corrections."""
+    """Return the report of orders and errors in a scene, by numbers of terms and corrections."""
     names = ("predicted", "measured", "settled", "error")
     members = [each.member for each in found]
     measures = [{name: getattr(each, name) for name in names} for each in found]
@@ -347,7 +349,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def _finding(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence on the order with one correction, if several methods have one."""
+    """Return a sentence on the order with one correction, if several methods make just one."""
     alike = (each.measured for each in found if each.member.corrections == 1)
     orders = Counter(round(order) for order in alike if order is not None)
     if orders.total() < 2:
@@ -362,7 +364,7 @@ def _finding(found: Sequence[OrderFinding]) -> list[str]:
 
 
 def verdict(found: Sequence[OrderFinding]) -> list[str]:
-    """Return sentences on measured and derived orders: one for each miss, else one for all."""
+    """Return a sentence for each order below the derived one, or else one sentence for all."""
     unexpected = _unexpected(found)
     if unexpected:
         return [f"UNEXPECTED: {each}" for each in unexpected]

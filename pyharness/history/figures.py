@@ -1,6 +1,6 @@
 """Figures 6 to 12 of the thesis, redrawn: omega of the programs against the reference.
 
-One set shows the original programs, another the corrected ones.
+One set of figures shows the original programs, another set the corrected programs.
 """
 
 import textwrap
@@ -33,7 +33,7 @@ ENDINGS = ("svg", "png", "csv")
 TERMS = {"two-term": 2, "four-term": 4}
 _POINTS_STEPS = 10
 _NUMBERS = "curve listing time recorded_time omega1 omega2 omega3"
-# Distinct without colour.
+# These styles can be told apart without colour.
 _REFERENCE: dict[str, Any] = {"color": "#bdbdbd", "linestyle": "-", "linewidth": 5.0}
 _LIMIT: dict[str, Any] = {"color": "#107040", "linestyle": (0, (3, 1.5)), "linewidth": 1.0}
 _STYLES = {
@@ -54,7 +54,7 @@ _END: dict[str, Any] = {
 class FigurePlan:
     """The plan of a redrawn figure of the thesis.
 
-    `source` supports the choice of programs; `caption` is ours.
+    `source` is the passage of the thesis that supports the choice of programs; `caption` is ours.
     """
 
     number: int
@@ -92,7 +92,7 @@ class Curve:
 
     @property
     def ending(self) -> str:
-        """Return the step and reason of an early end, or ""."""
+        """Return the step and the reason of an early end; "" for a complete run."""
         run = self.trajectory
         if run.stop is not None:
             return f"stopped at step {run.stop.step} by {run.stop.variable}"
@@ -100,7 +100,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return the program and any early end, for a legend."""
+        """Return the name of the program and any early end, as text for a legend."""
         return self.listing.program + (f" ({self.ending})" if self.ending else "")
 
 
@@ -116,7 +116,7 @@ class FigureFinding:
 
     @property
     def known(self) -> list[tuple[str, Array]]:
-        """Return label and omega (rad/s) of the reference solution and of any limit."""
+        """Return label and omega (rad/s) of the reference solution and, if drawn, of the limit."""
         return [("reference", self.reference.omega), *([self.limit] if self.limit else [])]
 
 
@@ -194,7 +194,7 @@ def _from_zero(values: Array, start: Array | float = 0.0) -> Array:
 
 
 def figure_picture(finding: FigureFinding) -> Picture:
-    """Return a picture of each omega component over time, in front of the reference solution."""
+    """Return a picture of each omega component over time, drawn over the reference solution."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 8.6), dpi=110, layout="constrained")
@@ -221,8 +221,8 @@ def figure_picture(finding: FigureFinding) -> Picture:
 def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
     """Return omega1 of an original and of a corrected figure in one picture.
 
-    The limit in `first` continues a run that ended early. The curves of `second` coincide, so only
-    the last is drawn.
+    The limit in `first` continues a run that ended early. Of the curves in `second`, which
+    coincide, only the last is drawn.
     """
     from matplotlib.figure import Figure
 
@@ -244,7 +244,7 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 def points_picture() -> Picture:
     """Return a picture of the collocation points of each printed program in the first steps.
 
-    A row is a step; a grey band is the step itself. Times are in s after its beginning.
+    Each row is a step, with times (s) after its beginning; the grey band is the step itself.
     """
     from matplotlib.figure import Figure
 
@@ -274,7 +274,7 @@ def points_picture() -> Picture:
 def _draw_panel(
     axes: "Axes", finding: FigureFinding, row: int, curves: Iterable[tuple[Curve, dict[str, Any]]]
 ) -> None:
-    """Draw one omega component of the known solutions and of curves with their styles."""
+    """Draw one omega component of the reference, any limit, and `curves` with their styles."""
     time, start = _from_zero(finding.reference.time), np.array(finding.scene.omega)
     for (label, omega), style in zip(finding.known, (_REFERENCE, _LIMIT), strict=False):
         axes.plot(time, _from_zero(omega, start)[:, row], label=label, **style)
@@ -298,7 +298,7 @@ def _draw_panel(
 def _frame(finding: FigureFinding, row: int) -> tuple[float, float]:
     """Return the bottom and top (rad/s) of the plot of one omega component.
 
-    A curve may leave the plot where it exceeds the reference's range by more than max |omega|.
+    A curve leaves the plot where it is outside the reference's range by more than max |omega|.
     """
     truth = finding.reference.omega
     least, largest = float(truth[:, row].min()), float(truth[:, row].max())

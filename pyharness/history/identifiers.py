@@ -1,7 +1,7 @@
 """Identifiers of the edition: Software Heritage identifiers (SWHIDs), and a digest of its text.
 
-A SWHID (ISO/IEC 18670) is git's SHA-1 hash of a file or folder. Anyone can recompute it from the
-content, and the archive finds a copy by it.
+A SWHID (ISO/IEC 18670) contains git's SHA-1 hash of a file or folder. Anyone can recompute it from
+the content, and the archive Software Heritage finds a copy by it.
 """
 
 import json
@@ -37,7 +37,7 @@ def directory_identifier(files: Mapping[str, bytes]) -> str:
 def source_files() -> dict[str, bytes]:
     """Return the files of the edition's data and of the Fortran port, by repository path.
 
-    An installed package has some of them in other places.
+    An installed package has some of the files in other places.
     """
     folder = facts_folder()
     found = {
@@ -58,7 +58,7 @@ def data_identifier() -> str:
 
 
 def card_identifier(card: Card) -> str:
-    """Return the SWHID of a card: its deck's file, qualified by its line."""
+    """Return the SWHID of a card: that of the deck's file, qualified by the line of the card."""
     content = source_files()[f"{DATA}/cards/{card.program}.toml"]
     return f"{content_identifier(content)};lines={card_lines(content)[card.number]}"
 
@@ -94,9 +94,9 @@ def _tree(files: Mapping[str, bytes]) -> bytes:
 
 
 def text_digest(table: Callable[[str], Mapping[str, Any]] = facts) -> str:
-    """Return a digest of cards and apparatus, which identifies their text in citations.
+    """Return a digest of cards and apparatus, which identifies the edition's text in citations.
 
-    It is 12 hexadecimal digits of the SHA-256 of `TABLES`, without comments.
+    It has the first 12 hexadecimal digits of the SHA-256 of the data in `TABLES`.
     """
     told = {name: table(name) for name in TABLES}
     text = json.dumps(told, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

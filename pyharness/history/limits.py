@@ -2,7 +2,7 @@
 
 An original program may converge to the solution of Euler's equations, to another function of time,
 or to no function (docs/article/article.md). Each limit is computed independently of the programs,
-and compared with their runs as the step is halved. `effort` multiplies the work limit.
+and compared with their runs as the step size is halved. `effort` multiplies the work limit.
 """
 
 import math
@@ -52,7 +52,7 @@ Rate = Callable[[float, Sequence[float]], list[float]]
 
 @dataclass(frozen=True)
 class Halving:
-    """A run's largest distances (rad/s) from limit and reference, infinite after an overflow."""
+    """A run's largest distances (rad/s) from limit and reference; infinite after an overflow."""
 
     step_size: float
     from_limit: float
@@ -63,8 +63,9 @@ class Halving:
 class Limit:
     """The limit of an original program as the step size goes to zero, and the convergence.
 
-    `order`, from the last two halvings, is None if one of them overflows or has only rounding
-    errors, if there is no limit, or if the limit is unbounded at `blow_up` (s).
+    `order` is measured with the last two step sizes. It is None if a run with one of them overflows
+    or has only rounding errors, if there is no limit, or if the limit is unbounded at `blow_up`
+    (s).
     """
 
     program: str
@@ -75,7 +76,7 @@ class Limit:
 
     @property
     def approach(self) -> str:
-        """Return a phrase on the convergence, as in `order 1.00 toward the limit`."""
+        """Return a phrase on the convergence, such as `order 1.00 toward the limit`."""
         if self.blow_up is not None:
             return f"no order: the limit grows without bound at t = {self.blow_up:.3g} s"
         if self.order is not None:
@@ -85,10 +86,10 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Return the convergence of an original program to its limit, without stop test.
+    """Return the convergence of an original program to its limit; the stop test is not made.
 
-    Under a varying torque only the Runge-Kutta program has a limit, which is integrated. Raise
-    InputError above the work limit.
+    Under a varying torque only the Runge-Kutta program has a limit. Raise InputError above the work
+    limit.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -118,10 +119,9 @@ def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) ->
 def limit_solution(
     program: str, scene: Scene, times: Sequence[float], truth: Reference, effort: float = 1.0
 ) -> tuple[Array, str, float | None]:
-    """Return the limit of an original program's omega (rad/s), shape (times, 3), or NaN.
+    """Return the limit of an original program's omega (rad/s), shape (times, 3); NaN without limit.
 
-    Also return what the program tends to, and the time (s) at which the limit is unbounded, or
-    None.
+    Also return a description of the limit, and the time (s) at which it is unbounded, or None.
     """
     scale = float(np.abs([scene.omega, *truth.omega]).max()) or 1.0
     start = list(scene.omega)
@@ -162,9 +162,9 @@ def _extrapolated(scene: Scene) -> Rate:
 def _slow_slopes(scene: Scene) -> Rate:
     """Return the right-hand side of the Runge-Kutta program's limit, under varying torque.
 
-    Let p be what U(1) holds, at which the first slopes of a step are evaluated. Each step of size h
-    adds h/2 F(p) to p, and h F(p) to the printed omega, where F is the right-hand side of Euler's
-    equations. The state is p, then the printed omega.
+    Let p be the omega in U(1), at which the program evaluates the first slopes of a step. Each step
+    of size h adds (h/2) F(p) to p, and h F(p) to the printed omega, where F is the right-hand side
+    of Euler's equations. The state of the limit's equations is p, then the printed omega.
     """
     right_hand_side = scene.right_hand_side()
 
@@ -178,7 +178,7 @@ def _slow_slopes(scene: Scene) -> Rate:
 def _solved(
     rate: Rate, start: list[float], times: Sequence[float], scale: float, effort: float
 ) -> tuple[Array, float | None]:
-    """Return the solution at `times` (s), NaN after a blow-up, and the blow-up time (s) or None.
+    """Return the solution at `times` (s), NaN after a blow-up, and the blow-up's time (s) or None.
 
     At the blow-up a component reaches a million times `scale` (rad/s).
     """
@@ -216,7 +216,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects whose correction alone changes omega by rounding at most."""
+    """Return, by program, the defects whose sole correction changes omega at most by rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

@@ -1,4 +1,4 @@
-"""Comparison of a page from any machine with our pages, to find its arithmetic from the digits."""
+"""Comparison of a page printed by any machine with our pages, to find the machine's arithmetic."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -20,7 +20,7 @@ _LARGEST = 1 << 24  # bytes of a page's file
 
 
 def read_page(path: str) -> list[list[str]]:
-    """Return a page's lines of numbers; raise InputError if no line has at least six."""
+    """Return a page's lines of numbers; raise InputError if no line has at least six numbers."""
     where = f"--listing-output '{path}'"
     content = read_input(path, where, _LARGEST, "what a program printed to TAPE6")
     found = printed_numbers(content.decode("ascii", "replace"))
@@ -39,9 +39,9 @@ def fits(
 ) -> list[Fit]:
     """Return the comparisons of a page with our pages of the same form, nearest first.
 
-    The form is the moments and torques in the heading and the number of columns. Our runs have as
-    many steps as in the text of the thesis or, for a longer page, on the cards. Raise InputError if
-    no page has the form.
+    The form of a page is given by the moments and torques in its heading and the number of columns.
+    Our runs have as many steps as in the text of the thesis or, if the page is longer, as on the
+    cards. Raise InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}
@@ -70,7 +70,7 @@ def fits(
 
 
 def listings_of(program: str) -> dict[str, Listing]:
-    """Return a program's listings: original, corrected, and original with each other reading."""
+    """Return a program's listings: original, corrected, original with each alternative reading."""
     readings = names_of("reading", program)
     return {
         "original": Listing.original(program),

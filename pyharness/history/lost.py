@@ -1,12 +1,12 @@
-"""The lost experiments of section IV.2 of the thesis: mistakes that may explain their failure.
+"""The lost programs of section IV.2 of the thesis, and mistakes that may explain their failure.
 
 The thesis does not print its programs for the subdomain, Galerkin and least-squares methods.
 According to IV.2 they gave no meaningful results in Cases 1 and 2, where the solution is known.
 Each entry of `data/lost.toml` is a conjecture: a mistake that such a program may have had.
 
 The method is that of IV.2: a trial function of two terms, the products written out as polynomials,
-one solution for a constant right-hand side, and one correction. It fails if its error exceeds a
-tenth of the largest omega.
+one solution for a constant right-hand side, and one correction. A method fails if its error exceeds
+a tenth of the largest omega.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ TERMS = 2
 class Attempt:
     """The result of one method with one mistake on Cases 1 and 2.
 
-    `shares` is the error divided by the largest omega, by case; `failed` has the failing cases.
+    `shares` has, by case, the error divided by the largest omega; `failed` lists the failed cases.
     """
 
     mistake: str
@@ -92,7 +92,7 @@ def _share(scene: Scene, weighting: str, mistake: str, word: str = BINARY64) -> 
 def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
     """Return omega (rad/s) by a method with one mistake, under constant torque, shape (steps, 3).
 
-    It is NaN from an overflow on. The type of the scene's numbers determines the arithmetic.
+    The result is NaN after an overflow. The type of the scene's numbers determines the arithmetic.
     """
     h = scene.step_size
     coefficients = scene.euler_coefficients
@@ -124,7 +124,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2, polynomials in t by column."""
+    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as columns, polynomials in t."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)
@@ -134,7 +134,7 @@ def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
 
 
 def _matrix(weighting: str, length: float) -> Array:
-    """Return the weighted integrals over (0, length) (s) of 1 and 2 t, one row per weight."""
+    """Return the weighted integrals of 1 and 2 t over (0, length) (s), a row for each weight."""
     columns = [_weighted(weighting, length, (i + 1) * np.eye(i + 1)[i]) for i in range(TERMS)]
     return np.array(columns).T
 
@@ -148,8 +148,8 @@ def _solved(matrix: Array, right: Array, mistake: str, second: bool) -> Array:
         matrix = matrix.T
     (a, b), (c, d) = matrix.tolist()
     if mistake == "matrix-used-up" and second:
-        # LEQT1F overwrites its matrix with Crout's L and U factors, which the second call takes for
-        # the matrix.
+        # LEQT1F overwrites its matrix with Crout's L and U factors, which the second call then uses
+        # as its matrix.
         matrix = np.array([[a, b], [c / a, d - c / a * b]])
     if mistake == "unscaled-solver":
         x, y = right.T

@@ -16,10 +16,10 @@ from pyharness.thesis.collation import names_a_card, rows
 class Disagreement(NamedTuple):
     """A disagreement of the decks with each other or with the thesis, and its supposed origin.
 
-    `steps` are from `data/cards/collation.toml`, `equations` are formulas of the thesis. `where` is
-    a place in the thesis, and `says` its words. `cards` are texts by program and number. `known` is
-    from the sources; `suggests` and `origin` are our inferences. `unnoticed` tells why the test
-    cases do not show the fault.
+    `steps` are operations in `data/cards/collation.toml`, `equations` formulas of the thesis.
+    `where` is a place in the thesis, and `says` quotes it. `cards` has texts of cards by program
+    and number. `known` follows from the sources; `suggests` and `origin` are our inferences.
+    `unnoticed` tells why the test cases do not show the fault.
     """
 
     id: str
@@ -57,12 +57,12 @@ def origins() -> dict[str, str]:
 
 
 def unexplained_defects() -> dict[str, str]:
-    """Return, by identifier, the reasons why no disagreement explains some defects."""
+    """Return, for each defect that no disagreement explains, the reason."""
     return dict(facts("disagreements")["unexplained"])
 
 
 def mistakes() -> list[str]:
-    """Return a sentence for each mistake in the table."""
+    """Return a sentence for each mistake in the table `data/disagreements.toml`."""
     found = disagreements()
     return [*_of_each(found), *_of_defects(found), *_of_steps(found)]
 

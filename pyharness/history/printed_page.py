@@ -1,8 +1,8 @@
 """Compare a page that a machine printed with the pages that our programs print.
 
 The module, which needs only Python's standard library, is also the script `machine/judge.py` in the
-data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0 if a page is
-equal, 1 if all differ, and 2 if FILE has no page of this form.
+data package: ``python judge.py FILE`` compares the page in FILE. The exit status is 0 if one of our
+pages is equal, 1 if all differ, and 2 if FILE has no page of this form.
 """
 
 import csv
@@ -16,16 +16,16 @@ from pathlib import Path
 PAGES = "pages.csv"
 """The table of the pages, in the script's folder."""
 
-# A number as FORMAT writes it: asterisks if too long, R or I (CDC) if not finite.
+# A number as FORTRAN prints it: asterisks if too long; on the CDC, R or I if not finite.
 _FIELD = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)|\*+|[-+]?[RI]")
-_LEAST = 6  # least count of numbers in a row of results; no line of the heading has so many
+_LEAST = 6  # least count of numbers in a row of results; lines of the heading have fewer
 SHOWN = 5
 """The number of differences shown if no page is equal."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A number that differs between two pages; row and place are from 1."""
+    """A number that differs between two pages; row and place in the row are counted from 1."""
 
     row: int
     place: int
@@ -79,7 +79,7 @@ def split_page(lines: Sequence[list[str]]) -> tuple[list[list[str]], list[list[s
 def rows_of_form(
     lines: Sequence[Sequence[str]], head: Sequence[Sequence[str]], width: int
 ) -> list[Sequence[str]]:
-    """Return the rows with `width` numbers; empty if the page lacks the heading `head`."""
+    """Return the lines with `width` numbers; none if the page lacks the heading `head`."""
     wanted, size = [list(line) for line in head], len(head)
     starts = range(len(lines))
     if not any([list(line) for line in lines[at : at + size]] == wanted for at in starts):
@@ -88,14 +88,14 @@ def rows_of_form(
 
 
 def compared_steps(rows: int, steps: int, card_steps: int) -> int:
-    """Return the steps for our run: those of the text or, for a longer page, of the cards."""
+    """Return the number of steps for our run: that of the text or, for a longer page, the cards."""
     return card_steps if rows > steps else steps
 
 
 def compare_rows(
     theirs: Sequence[Sequence[str]], ours: Sequence[Sequence[str]]
 ) -> tuple[int, tuple[Difference, ...]]:
-    """Return the count of compared numbers, and the differences; a missing number is a dash."""
+    """Return the count of compared numbers, and the differences; "-" replaces a missing number."""
     none: Sequence[str] = ()
     places = [
         (row, place, x, y)
@@ -121,14 +121,14 @@ def stored_fits(lines: Sequence[Sequence[str]], folder: Path) -> list[Fit]:
 
 
 def verdict(path: str, found: Sequence[Fit]) -> list[str]:
-    """Return lines that name our pages equal to the page in file `path`, or the nearest."""
+    """Return lines that name our pages equal to the page in file `path`, or the nearest one."""
     whole = [each for each in found if each.is_whole]
     said = "printed so by" if whole else "by none; the nearest is"
     return [f"{path}: {said} {each.name}" for each in whole or found[:1]]
 
 
 def main(arguments: Sequence[str], folder: Path) -> int:
-    """Compare the page in a file with those in `folder`, print the result, return the status."""
+    """Compare the page in a file with those in `folder`; print the result and return the status."""
     if len(arguments) != 1:
         print("usage: python judge.py FILE, a page as a program printed it", file=sys.stderr)
         return 2

@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards. The second is a random sample that was read
-again (`data/cards/second-reading.toml`). The numbers of misreadings that one reading or both
-correct give an estimate of the others.
+again (`data/cards/second-reading.toml`). The numbers of misreadings (errors of the scan) that one
+reading, or both, correct give an estimate of the uncorrected ones.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ _COLUMNS = (
 
 
 class ReadCard(NamedTuple):
-    """A card of the sample, with texts without blanks; `first` is ours, with the scan's names."""
+    """A card of the sample; texts have no blanks. `first` is our text with the names as printed."""
 
     card: Card
     scan: str
@@ -33,16 +33,16 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate, which corrects Lincoln and Petersen's for small samples."""
+    """Return Chapman's estimate of a population: Lincoln and Petersen's, for small samples."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
-    For independent samples, the number in both is hypergeometric. At a size in the interval,
-    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, which gives no
-    upper limit.
+    For independent samples, the number of members in both has the hypergeometric distribution. For
+    a size in the interval, neither tail of the distribution from `both` on is below 0.025. Raise
+    ValueError if `both` is 0, because there is no upper limit then.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -77,7 +77,7 @@ def read_cards() -> Iterator[ReadCard]:
 
 
 def misread_places(scan: str, reading: str) -> dict[int, str]:
-    """Return the text of a reading at each differing place of a scan's line, by index.
+    """Return, by index, the text of a reading at each place where it differs from the scan's line.
 
     Inserted characters belong to the previous place, or to -1.
     """
@@ -94,9 +94,10 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 
 
 def recaptures() -> Table:
-    """Return the estimates with characters and with whole cards as units.
+    """Return the table of estimates, with characters and with whole cards as units.
 
-    A machine repeats its misreading of a letter, so characters are dependent, but not cards.
+    A machine repeats its misreading of a letter, so that characters are not independent units, but
+    cards are.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

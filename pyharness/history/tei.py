@@ -7,8 +7,8 @@ The elements are:
 - `fw`: a heading added by an editor;
 - `surplus`: text that belongs to no card.
 
-Cards are in order. To restore the scan, take the pages in the order of `n`, each `rdg` instead of
-its `lem`, and the lines of cards, `fw` and `surplus`.
+Cards are in the order of their numbers. The text of the scan is restored from the pages in the
+order of `n`, with their lines of cards, `fw` and `surplus`, and each `rdg` in place of its `lem`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -124,7 +124,7 @@ def _class_of(taxonomy: str, name: str) -> str:
 
 
 def _changed(revision: Revision) -> Iterator[str]:
-    """Yield pointers to a revision's added or changed elements that still exist."""
+    """Yield pointers to the elements that a revision added or changed and that still exist."""
     present = {entry["id"] for entry in facts("apparatus")["entry"]}
     yield from (f"#{id}" for id in (*revision.added, *revision.changed) if id in present)
     for program, cards in revision.cards.items():
@@ -162,7 +162,7 @@ def _deck(body: xml.Element, program: str) -> Iterator[tuple[xml.Element, Card]]
 
 
 def first_card(lines: Iterable[Any]) -> int:
-    """Return the lowest card of a page in the scan."""
+    """Return the lowest card number on a page of the scan."""
     return min(n for each in lines if isinstance(each, str) for n in numbers(each))
 
 
@@ -211,7 +211,7 @@ def _write_apparatus(div: xml.Element) -> None:
         classes += [_class_of("ground", siglum) for siglum in entry["grounds"]]
         ana = " ".join(f"#{each}" for each in classes)
         note = _add(div, "note", id=entry["id"], type="entry", ana=ana, resp=_RESPONSIBLE)
-        # The appendix is a source unless the entry names no card.
+        # The appendix of the thesis is a source unless the entry names no card.
         parts = ["appendix"] if entry["cards"] else []
         if not parts or {"T", "R"} & set(entry["grounds"]):
             parts.append("text")

@@ -1,6 +1,6 @@
 """The dates of the thesis, with their sources, and the history of the edition's text.
 
-They are in `data/timeline.toml` and `data/revisions.toml`.
+The data are in `data/timeline.toml` and `data/revisions.toml`.
 """
 
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ CHANGES = {"added": "new entries", "changed": "altered entries", "removed": "rem
 class Event(NamedTuple):
     """An event in the history of the thesis, with its date and source.
 
-    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains an uncertain date.
-    The date is ``certain`` if the source names it, ``probable`` if it follows from another entry,
-    and ``unknown`` if no source dates the event.
+    `first` and `last` are months, as in ``1979-01``, or empty; `why` explains a date that is not
+    certain. The date is ``certain`` if the source names it, ``probable`` if it follows from another
+    entry, and ``unknown`` if no source dates the event.
     """
 
     id: str
@@ -60,8 +60,8 @@ def _in_words(month: str) -> str:
 class Revision(NamedTuple):
     """A change of the edition's text: the cards and the apparatus.
 
-    `digest` identifies the text after the change; it is empty for cards that were not yet data.
-    `cards` has numbers by program, as in ``750-770, 800``.
+    `digest` identifies the text after the change; it is empty if the cards were not yet data.
+    `cards` has the numbers of changed cards by program, as in ``750-770, 800``.
     """
 
     date: str

@@ -1,7 +1,7 @@
 """The effect of word length: runs in emulated arithmetics of p bits, against binary64.
 
-An arithmetic is a number p of significand bits and a rounding rule. A run's printed page is
-compared with the page in binary64, and its omega with the reference solution.
+An arithmetic is defined by its number p of significand bits and its rounding rule. A run's printed
+page is compared with the page in binary64, and its omega with the reference solution.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 LENGTHS = (16, 20, 24, 28, 32, 36, 40, 44, 48, 53, 56, 60, 64, 80, 96, 113)
 # With 113 bits rounding is negligible, and the error is the method's truncation error.
 DOUBLE, WIDEST = Word(53), Word(113)
-# Above this multiple of the error with 113 bits, an error counts as rounding.
+# An error above this multiple of the error with 113 bits counts as rounding error.
 ROUNDS = 2.0
 _VISIBLE = 1e-9  # least error (rad/s) compared between arithmetics
 _SMALL = 0.01  # largest relative change of an error that leaves a result as it is
@@ -59,10 +59,10 @@ _STYLES: dict[str, dict[str, Any]] = {
 class WordRun(NamedTuple):
     """A run in one arithmetic, compared with binary64.
 
-    `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` and ``RX``, the unrounded and the
+    `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` or ``RX``, the unrounded or the
     rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
-    25``. The longer page has `fields` numbers, of which `different` differ. `error` is the largest
-    error of omega (rad/s); `singular` counts rows with IER = 129.
+    25``. The longer one of the two printed pages has `fields` numbers, of which `different` differ.
+    `error` is the largest error of omega (rad/s); `singular` counts rows with IER = 129.
     """
 
     case: int
@@ -121,7 +121,7 @@ def machine_cells(
 def _runs(
     cases: Sequence[int], listings: Sequence[Listing], words: Sequence[Word], progress: Progress
 ) -> Iterator[list[WordRun]]:
-    """Yield the run in binary64 and those in `words`, of each listing on each case."""
+    """Yield, for each case and listing, the run in binary64 followed by the runs in `words`."""
     every, done = len(cases) * len(listings) * len(words), 0
     truths = {case: reference(case_scene(case), case_scene(case).times()) for case in cases}
     for case, listing in product(cases, listings):
@@ -129,7 +129,8 @@ def _runs(
         pages: list[list[str]] = []
         found: list[WordRun] = []
         for word in (DOUBLE, *words):
-            # The compiled program has the bits of its Python version in 53 bits.
+            # The compiled program has the same results, bit for bit, as its Python port with 53
+            # bits.
             run = in_word.run(scene, listing, word) if found else run_program(scene, listing)
             lines = page(scene, listing.program, run).splitlines()
             pages.append(" ".join(lines[len(lines) - run.steps :]).split())
@@ -278,7 +279,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell], data: Table) -> Picture:
-    """Return a picture of the largest error of omega (rad/s) against p; dashed: with 113 bits."""
+    """Return a picture of the largest error of omega (rad/s) against p; dashed lines: p = 113."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

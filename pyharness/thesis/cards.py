@@ -320,7 +320,7 @@ def switch_at(place: Place) -> tuple[str, bool] | None:
 
 
 def twin_line(file: str, text: str) -> Place:
-    """Return the line of a Python port with this text; raise ValueError unless there is one."""
+    """Return the only line of a Python port with this text; raise ValueError if there is none."""
     where = [n for n, line in enumerate(_lines(_TWINS / file), 1) if line.strip() == text]
     if len(where) != 1:
         raise ValueError(f"{text!r} occurs {len(where)} times in {file}")

@@ -16,7 +16,7 @@ Vector = Sequence[float]
 
 
 def omega_rate(coefficients: Vector, m: Vector, u: Vector) -> list[float]:
-    """Return F, G, H (rad/s2) of eqs. 16-18 of the thesis, the right-hand sides for omega."""
+    """Return F, G, H of eqs. 16-18 from A, B, C, torque over moment (rad/s2) and omega (rad/s)."""
     a, b, c = coefficients
     return [m[0] + a * u[1] * u[2], m[1] + b * u[0] * u[2], m[2] + c * u[0] * u[1]]
 
@@ -40,7 +40,7 @@ def accelerations(scene: Scene, listing: Listing) -> list[float]:
 
 
 def initial_torque(scene: Scene) -> Vector | None:
-    """Return torque over moments (1/s2) for the conjecture `initial-torque`, or None."""
+    """Return torque over moments (rad/s2) for the conjecture `initial-torque`, or None."""
     given = card_torque(scene)
     if given is None or scene.moments is None:
         return None
@@ -67,14 +67,14 @@ class Record:
     """The results of a Python port's run, a row for each step."""
 
     def __init__(self, scene: Scene, evaluations_per_step: int) -> None:
-        """Create a record; `evaluations_per_step` counts evaluations of the right-hand sides."""
+        """Create an empty record; a step has `evaluations_per_step` of the right-hand sides."""
         self._step_size = scene.step_size
         self._per_step = evaluations_per_step
         self._rows: list[list[float]] = []
         self._ier: list[int] = []
 
     def add(self, recorded_time: float, omega: Vector, velocity: Vector, ier: int = 0) -> None:
-        """Add a step: TIME (s) as computed, omega (rad/s), velocity (m/s), the solver's code."""
+        """Add a step: TIME (s) as computed, omega (rad/s), velocity (m/s), the solver's IER."""
         true_time = (len(self._rows) + 1) * self._step_size
         self._rows.append([true_time, recorded_time, *omega, *velocity])
         self._ier.append(ier)

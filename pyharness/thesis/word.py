@@ -180,7 +180,7 @@ def _quotient(x: float, y: float) -> float:
 def _operator(
     rule: str, of_floats: Callable[[float, float], float], negates: bool = False
 ) -> Callable[["Number", Any], "Number"]:
-    """Return the operator of a rounding rule, which may negate the operand first."""
+    """Return the operator of `rule`, a field of Rules; if `negates`, it negates the operand."""
 
     def operate(self: "Number", other: Any) -> "Number":
         own = self.__class__

@@ -45,7 +45,7 @@ OPTIONS = {
     "installed ones).",
     "--compiled": "With --terms, have the C compiler translate Python functions first, as "
     "prepare(..., compiled=True) does.",
-    "--plan": "Measure instead how much time is saved by each computation that `pyharness plan` "
+    "--plan": "Measure instead run times with and without each computation that `pyharness plan` "
     "can omit.",
     "--growth": "Measure instead how the error of the Taylor method grows with the integration "
     "time, up to 1e5 s, in Cases 3 and 4.",

@@ -1,7 +1,7 @@
 """The atlas of claims: which claims of the thesis hold from which initial omega (start).
 
-The starts cover the sphere of directions at several magnitudes. A claim scores 1 point if it is
-reproduced, 1/2 if in part. The codes of verdicts are those of `over_starts`.
+The starts cover the sphere of directions at several magnitudes of omega. A claim scores 1 point if
+it is reproduced, 1/2 if it is reproduced in part. The codes of verdicts are those of `over_starts`.
 """
 
 import math
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 WHERE = ("omega.magnitude", "height", "longitude")
 CHOSEN = ("reading", "steps")
 _CODES = (FAILS, HOLDS, IN_PART)
-# Indexed by code.
+# The points of a verdict, indexed by its code.
 _POINTS = np.zeros(len(_CODES) + 1)
 _POINTS[[HOLDS, IN_PART]] = POINTS[REPRODUCED], POINTS[PARTLY]
 Codes = NDArray[np.int8]
@@ -58,11 +58,11 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the total points of each initial omega; `reading` and `steps` are indices."""
+        """Return the sum of points of each initial omega; `reading` and `steps` are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
-        """Return for each initial omega whether no claim fails."""
+        """Return for each initial omega whether no claim fails; the arguments are indices."""
         held = [codes[reading, steps] != FAILS for codes in self.codes.values()]
         return np.asarray(np.all(held, axis=0))
 
@@ -90,12 +90,12 @@ def atlas_of(codes: Mapping[str, Codes], axes: Mapping[str, Array]) -> Atlas:
 
 
 def sum_of_points(codes: Sequence[Codes]) -> Array:
-    """Return the total points of several claims, for each initial omega."""
+    """Return, for each initial omega, the sum of the points of the verdicts on several claims."""
     return np.asarray(sum(_POINTS[each] for each in codes))
 
 
 def shares(codes: Codes) -> tuple[float, float, float]:
-    """Return the fractions of codes "reproduced", "in part" and "not reproduced"."""
+    """Return the fractions of verdicts "reproduced", "in part" and "not reproduced" in `codes`."""
     whole, part, not_at_all = (float((codes == each).mean()) for each in (HOLDS, IN_PART, FAILS))
     return whole, part, not_at_all
 
@@ -108,7 +108,7 @@ def bits(codes: Codes) -> float:
 
 
 def about(names: Sequence[str]) -> dict[int, list[str]]:
-    """Return the claims in `names` that concern a single case, by case."""
+    """Return, by case, the claims in `names` that concern this case alone."""
     found: dict[int, list[str]] = {}
     for name in names:
         case = claim(name)["parameters"].get("case")
@@ -118,7 +118,7 @@ def about(names: Sequence[str]) -> dict[int, list[str]]:
 
 
 def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
-    """Return verdict codes of the original programs by claim, for each of the thesis's starts."""
+    """Return, for each start in the thesis, the verdict codes of the original programs by claim."""
     given = starts()
     bench = Starts(Laboratory(True, Assumptions()), np.array(given))
     found = {name: judged(claim(name), bench, len(given)) for name in names}
@@ -126,7 +126,7 @@ def shown_starts(names: Sequence[str]) -> dict[Triple, dict[str, int]]:
 
 
 def atlas_report(atlas: Atlas) -> Report:
-    """Return the report of `claims --atlas`, mostly for the first reading and number of steps."""
+    """Return the report of `claims --atlas`, mainly for the first reading and number of steps."""
     claims = _claims(atlas)
     score = atlas.score()
     first = f"reading {atlas.readings[0]}, {atlas.steps[0]} steps"
@@ -252,7 +252,7 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return a picture: points over the sphere of directions, and mean points of each claim."""
+    """Return a picture: sums of points over the sphere of directions, and means for each claim."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")

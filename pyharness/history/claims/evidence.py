@@ -1,9 +1,9 @@
 """Evidence on the choices that the thesis leaves open: a score for every combination.
 
 A combination fixes omega(0), the readings, the conjectures and the number of steps. Its omega(0) is
-one value for all cases in which the thesis gives none, or for each case the value that we adopt.
-The score, without weights, is the number of testable claims about the original programs that are
-reproduced; a claim reproduced in part counts one half.
+one value for all cases in which the thesis gives none, or the value that we adopt for each case.
+The score is the number of testable claims about the original programs that are reproduced; a claim
+reproduced in part counts one half, and no claim has more weight than another.
 """
 
 from collections import Counter
@@ -58,16 +58,16 @@ class Combination:
 
     @property
     def score(self) -> float:
-        """Return the sum of the verdicts' points."""
+        """Return the score, the sum of the points of all verdicts."""
         return sum(POINTS.get(each, 0.0) for each in self.verdicts.values())
 
     @property
     def holding(self) -> int:
-        """Return the number of claims reproduced, at least in part."""
+        """Return the number of claims that are reproduced at least in part."""
         return sum(each in POINTS for each in self.verdicts.values())
 
     def choices(self) -> dict[str, str]:
-        """Return the value of each choice as text, by name."""
+        """Return the value of each choice as text, by the name of the choice."""
         given = self.assumptions
         active = given.readings | (given.conjectures or frozenset())
         found = {"omega(0)": ",".join(f"{x:g}" for x in given.start or ()) or "adopted"}
@@ -77,12 +77,12 @@ class Combination:
         return found | {"steps": str(given.steps)}
 
     def verdict_on(self, name: str) -> str:
-        """Return the verdict on a claim."""
+        """Return the verdict on the claim `name`; "not testable" if it was not tested."""
         return self.verdicts.get(name, NOT_TESTABLE)
 
 
 def evidence() -> Iterator[Combination]:
-    """Yield every combination with its verdicts."""
+    """Yield every combination with its verdicts on the testable claims."""
     scored = {entry["id"]: entry for entry in claims() if entry["kind"] in KINDS}
     for chosen in combinations():
         found = {name: _verdict(name, _relevant(entry, chosen)) for name, entry in scored.items()}
@@ -91,7 +91,7 @@ def evidence() -> Iterator[Combination]:
 
 
 def combinations() -> list[Assumptions]:
-    """Return every combination; the start None stands for each case's adopted omega(0)."""
+    """Return every combination; start None stands for the omega(0) adopted for each case."""
     # The last name varies fastest.
     readings, conjectures = (
         list(subsets(names_of(kind)[::-1])) for kind in ("reading", "conjecture")
@@ -116,7 +116,7 @@ def undecided(found: list[Combination]) -> dict[str, list[str]]:
 def _relevant(entry: dict[str, Any], chosen: Assumptions) -> Assumptions:
     """Return `chosen` with the defaults for assumptions on which the claim does not depend.
 
-    Combinations that then agree share one test of the claim.
+    Combinations that agree after this change share one test of the claim.
     """
     hangs_on = entry["assumptions"]
     readings = frozenset(name for name in chosen.readings if f"reading {name}" in hangs_on)

@@ -1,4 +1,4 @@
-"""The laboratory, which runs the programs under assumptions to test claims; runs are cached."""
+"""The laboratory, which runs the programs under assumptions to test claims, and caches the runs."""
 
 import math
 from collections.abc import Sequence
@@ -25,8 +25,9 @@ from pyharness.truth.reference import Reference, reference
 class Assumptions:
     """One value for each choice that the thesis leaves open.
 
-    `start` is omega(0) (rad/s) where the thesis gives none; None selects the value in `cases.toml`.
-    `readings` are alternatives to this edition's readings. `word` is the arithmetic.
+    `start` is omega(0) (rad/s) in the cases for which the thesis gives none; None selects the
+    values in `cases.toml`. `readings` are alternatives to this edition's readings. `conjectures`
+    None selects those of the original listing. `word` is the floating-point arithmetic.
     """
 
     start: Triple | None = None
@@ -40,12 +41,13 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
-    `parts` divides the step size of a run; `runs` and `error` use the steps of the case. `may_stop`
-    switches the stop test of the Runge-Kutta program. Errors are against the reference solution.
+    `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
+    steps. `may_stop` switches the stop test of the Runge-Kutta program. `fixed` has the defects
+    that are corrected in the original programs. Errors are against the reference solution.
 
-    The points of the collocation model are at k/(n+1) of the interval length DT, k = 1 ... n. In
-    the original programs DT grows by the step size in every step, so that the points move out of
-    the step, and the torque must be constant.
+    The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
+    original programs DT grows by the step size in every step, so that the points move out of the
+    step; the torque must then be constant.
     """
 
     is_original: bool
@@ -53,7 +55,7 @@ class Laboratory:
     fixed: frozenset[str] = frozenset()
 
     def listing(self, program: str) -> Listing:
-        """Return the listing of a program; assumptions affect only an original one."""
+        """Return the listing of a program; the assumptions affect only an original listing."""
         if not self.is_original:
             return Listing.corrected(program)
         readings = self.assumptions.readings & set(names_of("reading", program))
@@ -84,7 +86,7 @@ class Laboratory:
         return _truth(self.scene(case))
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
-        """Return the run of a program on a case at the steps of the case."""
+        """Return the run of a program on a case, with results at the undivided steps."""
         run = self.run(program, case, may_stop, parts)
         reached = run.omega[parts - 1 :: parts]
         omega = np.full((self.assumptions.steps, 3), np.nan)
@@ -101,12 +103,12 @@ class Laboratory:
         return float(largest_error(self, program, case, may_stop, parts))
 
     def models(self, case: int, terms: int) -> Array:
-        """Return omega (rad/s) of the model with n = `terms` terms, shape (steps, 3)."""
+        """Return omega (rad/s) of the collocation model with `terms` terms, shape (steps, 3)."""
         accumulates = self.is_original and "dt-accumulates" not in self.fixed
         return _model(self.scene(case), terms, accumulates, self.assumptions.word)
 
     def required_constant(self, case: int) -> float:
-        """Return the least Lipschitz constant (1/s) that stops no step; it may be infinite."""
+        """Return the least Lipschitz constant (1/s) with which no run is stopped, or infinity."""
         scene, listing = self.scene(case), self.listing("runge-kutta")
         constant = 0.0
         for _ in range(6 * scene.steps):
@@ -120,7 +122,7 @@ class Laboratory:
 
 
 def starts() -> list[Triple]:
-    """Return all initial omegas (rad/s) in the thesis, and one that we add."""
+    """Return all initial omegas (rad/s) that occur in the thesis, and one that we add."""
     given = (each["omega"] for each in facts("claims")["start"])
     return [(float(a), float(b), float(c)) for a, b, c in given]
 
@@ -131,7 +133,7 @@ def start_text(start: Triple) -> str:
 
 
 def distance(first: Array, second: Array) -> float:
-    """Return the largest difference (rad/s) of any omega component, over the common rows."""
+    """Return the largest difference (rad/s) of any omega component over the rows that both have."""
     n = min(len(first), len(second))
     with np.errstate(all="ignore"):
         return float(np.abs(first[:n] - second[:n]).max(initial=0.0))
@@ -190,10 +192,10 @@ def by_literals(
 ) -> Array:
     """Return omega of an original collocation program with changed step literals.
 
-    The step sizes at the places `changed`, elements of `LITERALS`, are divided by `parts`. An
-    equivalent model, with other rounding errors, integrates all scenes at once under constant
-    torque. The result (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3),
-    NaN from an overflow on.
+    The step size is divided by `parts` at the places `changed`, elements of `LITERALS`. A model
+    that is equivalent except for rounding integrates all scenes at once under constant torque. The
+    result (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after
+    an overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)
@@ -212,9 +214,9 @@ def integrate_models(
     """Return omega (rad/s) of the collocation model for n bodies at once, shape (n, steps, 3).
 
     `omega` (rad/s) has the shape (n, 3); the last axis of `coefficients` is A, B and C. The
-    constant `torque` is divided by the moments (rad/s2). The points divide (0, dt) evenly, where dt
-    (s) grows by `growth` (s) in every step of length `end` (s). The results are those of the
-    programs except for rounding, and NaN from an overflow on.
+    constant `torque` is already divided by the moments (rad/s2). The points divide the interval (0,
+    dt) evenly; `dt` (s) grows by `growth` (s) in every step of length `end` (s). The results equal
+    those of the programs except for rounding, and are NaN after an overflow.
     """
     a, b, c = coefficients.T
 

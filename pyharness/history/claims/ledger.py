@@ -22,7 +22,7 @@ from pyharness.thesis.programs import BINARY64
 
 @dataclass(frozen=True)
 class Survival:
-    """The verdicts with one assumption changed; `survives` if they are as without the change."""
+    """The verdicts with one assumption changed; `survives` if they equal the adopted verdicts."""
 
     assumption: str
     original: str
@@ -32,7 +32,7 @@ class Survival:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdicts on a claim, as adopted and with each assumption changed, one at a time."""
+    """The verdicts on a claim, with the adopted assumptions and with each one changed alone."""
 
     claim: dict[str, Any]
     original: Judged
@@ -42,7 +42,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Assignment:
-    """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts.
+    """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts by claim.
 
     It `holds` if the original programs reproduce, at least in part, all claims about this case.
     Claims that fail with every start do not count.
@@ -69,7 +69,7 @@ def claim(identity: str) -> dict[str, Any]:
 
 @cache
 def judgement(identity: str, word: str = BINARY64) -> Judgement:
-    """Return the verdicts on one claim, as adopted and with each assumption changed."""
+    """Return the verdicts on a claim, with the adopted assumptions and with each one changed."""
     entry = claim(identity)
 
     def outcomes(entry: dict[str, Any], assumptions: Assumptions) -> list[Judged]:
@@ -95,7 +95,7 @@ def judgements() -> list[Judgement]:
 
 
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
-    """Return the verdict of a claim's test."""
+    """Return the verdict of the test of a claim, the entry `entry` of `data/claims.toml`."""
     name, parameters = entry["test"], entry.get("parameters", {})
     for room in (verdicts, methods, theory):
         if name in vars(room):
@@ -113,7 +113,7 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
         elif name == "steps":
             yield "300 steps", Assumptions(steps=300)
         elif name.startswith("conjecture "):
-            # Removed if the original listing has it, else added.
+            # The choice is removed if the original listing has it, else added.
             conjecture = name.removeprefix("conjecture ")
             own = Listing.original(PROGRAMS[0]).conjectures
             told = "without" if conjecture in own else "with"
@@ -125,8 +125,8 @@ def _alternatives(entry: dict[str, Any]) -> Iterator[tuple[str, Assumptions]]:
 def assignments() -> list[Assignment]:
     """Return one assignment for each start and each case in which the thesis gives no omega(0).
 
-    Claims about a case do not depend on another case's start, so all hold at once if each case has
-    a start with which its claims hold.
+    Claims about a case do not depend on the start of another case. If each case has a start with
+    which its claims hold, all claims can therefore hold at once.
     """
     found = []
     for case in open_starts():
@@ -142,7 +142,7 @@ def assignments() -> list[Assignment]:
     return found
 
 
-# As written in the table of all claims, and in its legend.
+# Each verdict as written in the table of all claims, and in the legend of the table.
 _VERDICTS = {
     "reproduced": ("yes", "reproduced (yes)"),
     "reproduced in part": ("in part", "in part"),
@@ -195,7 +195,7 @@ def claims_report(judgements: Sequence[Judgement]) -> Report:
 
 
 def kinds_table(judgements: Sequence[Judgement]) -> Table:
-    """Return a table of the numbers of claims by kind and verdict, original / corrected."""
+    """Return a table of the numbers of claims by kind and verdict, as "original / corrected"."""
     columns = [*words("kind"), Column("claims"), *map(Column, _VERDICTS)]
     rows = []
     for kind in KINDS:

@@ -28,9 +28,10 @@ _OTHERS = WEIGHTINGS[1:]
 
 
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
-    """Judge the claim that collocation is superior to Runge-Kutta at the steps that all ran.
+    """Judge the claim that collocation is superior to Runge-Kutta.
 
-    The cases in `shown` do not affect the verdict.
+    Errors are compared over the steps that all programs ran. The cases in `shown` add numbers, but
+    do not affect the verdict.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -50,8 +51,8 @@ def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
 
     The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the differential
     equations. A quotient is the change of a derivative between two stages, divided by the change of
-    its variable. The bound of a Lipschitz quotient is the largest norm of the Jacobian along the
-    reference and the run.
+    its variable. A Lipschitz quotient is at most the largest norm of the Jacobian, here along the
+    reference solution and the run.
     """
     numbers: dict[str, float] = {}
     for case in cases:
@@ -79,7 +80,7 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
         truth = lab.truth(case).omega
         four, *more = (float(np.abs(lab.models(case, n) - truth).max()) for n in (4, *terms))
         for n, error in zip(terms, more, strict=True):
-            # An overflow counts as no gain.
+            # After an overflow, the gain counts as 0.
             gain = four / error if math.isfinite(error) else 0.0
             numbers[f"case {case}: error of four terms over that of {n}"] = gain
     most = max(numbers.values())
@@ -87,16 +88,16 @@ def higher_powers(lab: Laboratory, cases: Sequence[int], terms: Sequence[int]) -
 
 
 def larger_constant(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Judge the claim that some case needs a Lipschitz constant above the one on the cards."""
+    """Judge the claim that some case needs a larger Lipschitz constant than that on the cards."""
     numbers = {f"case {n}: constant needed (1/s)": lab.required_constant(n) for n in cases}
     return graded(numbers, max(numbers.values()) > facts("cases")["deck"]["lipschitz"])
 
 
 def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
-    """Judge the claim that the stop test ends the unbounded runs, and no others.
+    """Judge the claim that the stop test ends all unbounded runs, and no other runs.
 
-    A run is unbounded if, without the test, it overflows or exceeds `bounded` times the largest
-    reference omega.
+    A run is unbounded if, without the stop test, it overflows or exceeds `bounded` times the
+    largest reference omega.
     """
     alarms = unbounded = caught = 0
     for case in cases:
@@ -125,8 +126,8 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The cards repeat the step size as a literal. For the original programs, the numbers include
-    cases that improve when only some of these literals change.
+    The cards repeat the step size as a literal. For the original programs, the numbers also count
+    the cases that improve when only some of these literals are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:
@@ -136,7 +137,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return the numbers of cases whose error halves if some `LITERALS` are divided by ten."""
+    """Return how many cases' errors at least halve if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -177,8 +178,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step on the cards and in our LEQT1F are weighted by `unit_times`, and
-    counted as written and with repeated terms once.
+    The operations of a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
+    counted in two ways: as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -199,7 +200,7 @@ def execution_time(
 
 
 def seconds(lab: Laboratory) -> Judged:
-    """Return "not testable" for run times, with each program's operations in 100 steps.
+    """Return "not testable" for claims on run times, with each program's operations in 100 steps.
 
     Present run times are no evidence on the original machine.
     """
@@ -211,8 +212,8 @@ def seconds(lab: Laboratory) -> Judged:
 def complexity(lab: Laboratory, factors: Sequence[float]) -> Judged:
     """Judge the claim that the three programs have about the same number of cards.
 
-    The verdict is undecided if it depends on the threshold, one of `factors`, or on whether the
-    cards of our LEQT1F count.
+    The verdict is "undecided" if it depends on which of `factors` is the threshold, or on whether
+    the cards of our LEQT1F count.
     """
     cards = {each: deck_text(lab.listing(each)).count("\n") for each in PROGRAMS}
     numbers = {f"{program}: cards": float(n) for program, n in cards.items()}
@@ -253,9 +254,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in two ways: as the error, with decreasing steps, in Case 1,
-    which every method solves exactly but for rounding; and as the difference between runs as in
-    section IV.2 in binary64 and in `words`.
+    Rounding error (rad/s) is measured in two ways: as the error in Case 1, with decreasing steps,
+    because every method solves this case exactly except for rounding; and as the difference between
+    runs in binary64 and in `words`, by the methods of section IV.2.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})
@@ -310,7 +311,7 @@ def all_succeed(
 
 
 def predict_correct(lab: Laboratory, cases: Sequence[int]) -> Judged:
-    """Compare the corrected programs with collocation that makes one correction per step.
+    """Compare the corrected programs with collocation that makes one correction in each step.
 
     A correction uses the right-hand sides along the previous estimate. The verdict is "not
     testable", because the thesis only recommends this method.

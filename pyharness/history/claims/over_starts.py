@@ -27,14 +27,14 @@ from pyharness.model.trajectory import Array
 from pyharness.thesis.many import run_many
 
 FAILS, HOLDS, SILENT, IN_PART = 0, 1, 2, 3
-# Arrays of a batch that would replace values of the cases in Table 1.
+# Arrays of a batch that replace values of the cases in Table 1, so that no claim applies.
 _OF_CASES = {"moments", "coefficients", "torque_constant", "torque_rate"}
 _TOLERANCE = 1e-12
-_EFFORT = 1e9  # in effect none, because a sweep reports its expected time beforehand
+_EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected time beforehand
 
 
 class Starts:
-    """Runs for `rules` from n initial omegas, which serve in cases whose omega(0) the thesis omits.
+    """Runs for `rules` from n initial omegas, used in the cases whose omega(0) the thesis omits.
 
     The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
@@ -52,7 +52,7 @@ class Starts:
 
     def runs(self, program: str, case: int, may_stop: bool = True, parts: int = 1) -> Runs:
         """Return the runs of a program on a case from every start."""
-        # Other runs serve once, for their error, which is cached.
+        # Only undivided runs are cached: the others are needed once, for their error.
         return (self._kept if parts == 1 else self._run)(program, case, may_stop, parts)
 
     def _starts(self, case: int) -> Array:
@@ -98,7 +98,7 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return the codes of the verdict on a claim for the scenes of a batch, shape (n,).
 
-    All are SILENT if the claims do not apply to the sweep.
+    All codes are SILENT (not applicable) if the claims do not apply to the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))
@@ -123,15 +123,16 @@ def judged(entry: dict[str, Any], bench: Starts, n: int) -> NDArray[np.int8]:
 
 @lru_cache(maxsize=2)
 def _bench(one: Laboratory, batch: Batch) -> Starts:
-    # One with the requested number of steps, and one with 100 for claims independent of it.
+    # One bench has the requested number of steps, the other 100 for claims that do not depend on
+    # it.
     return Starts(one, batch.omega0)
 
 
 def _laboratory(batch: Batch, assumptions: Assumptions) -> Laboratory | None:
     """Return the laboratory of a sweep, or None if the claims do not apply.
 
-    They apply to an original or corrected program, a case of the thesis with its body and torque,
-    and the stop test of the cards.
+    They apply to original or corrected programs, to the cases of the thesis with their bodies and
+    torques, and with the stop test of the cards.
     """
     if batch.listing is None or batch.arrays.keys() & _OF_CASES:
         return None

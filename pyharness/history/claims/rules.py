@@ -1,12 +1,12 @@
 """Rules of the claims that depend on the initial omega (the start), for one start or many.
 
-A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n. `parts` divides
-the step size; rows are at the steps of the case. Arrays have the shape (steps, 3) or (n, steps, 3),
-the values of a `Grade` () or (n,). The `rule` of the claim in `data/claims.toml` describes the
-grades.
+A bench supplies runs and solutions: a `Laboratory` for one start, `Starts` for n starts. `parts`
+divides the step size; rows are at the undivided steps. Arrays of omega have the shape (steps, 3) or
+(n, steps, 3); values of a `Grade` are scalars or have the shape (n,). The `rule` of the claim in
+`data/claims.toml` describes when a claim holds, and when in part.
 
-An error is the largest of any component of omega over the steps that the program ran, against the
-reference solution. The range of a component is its largest minus its smallest value.
+An error is the largest deviation of any omega component from the reference solution, over the steps
+that the program ran. The range of a component is its largest minus its smallest value.
 """
 
 import functools
@@ -53,7 +53,7 @@ def omega3_varies(bench: Bench, case: int, limit: float) -> Grade:
 
 
 def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
-    """Grade the claim of no error above `limit` (rad/s), half a unit of the last printed digit."""
+    """Grade the claim that no error reaches `limit` (rad/s), half a unit of the last digit."""
     numbers = {f"{name}: largest error (rad/s)": bench.error(name, case) for name in PROGRAMS}
     return Grade(numbers, _most(numbers) < limit)
 
@@ -61,8 +61,8 @@ def no_deviation(bench: Bench, case: int, limit: float) -> Grade:
 def concur(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the two-term and the four-term program agree in a case.
 
-    The difference must be at most `share` of the largest omega and, in each component, a tenth of
-    the range; if only the first is true, the claim holds in part.
+    Their difference must be at most `share` times the largest omega and, in each component, at most
+    a tenth of the range. If only the first condition is true, the claim holds in part.
     """
     truth = bench.solution(case)
     two, four = (bench.runs(program, case) for program in COLLOCATION)
@@ -84,7 +84,7 @@ def concur(bench: Bench, case: int, share: float) -> Grade:
 def fails(bench: Bench, case: int, share: float) -> Grade:
     """Grade the claim that the Runge-Kutta program ends early and is wrong in a case.
 
-    It holds in part if only one of the two is true.
+    The claim holds in part if only one of the two is true.
     """
     runs = bench.runs("runge-kutta", case)
     error = share_of_range(runs.omega, bench.solution(case))
@@ -115,7 +115,7 @@ def models_concur(bench: Bench, case: int, share: float, terms: Sequence[int]) -
 
 
 def dynamic(bench: Bench, case: int, factor: float) -> Grade:
-    """Grade the claim that a case has, by `factor`, the largest angular acceleration of all."""
+    """Grade the claim that a case has at least `factor` times the acceleration of any other."""
     rates = {}
     for each in range(1, 8):
         omega = bench.runs("four-term", each).omega
@@ -131,8 +131,8 @@ def dynamic(bench: Bench, case: int, factor: float) -> Grade:
 def small_step(bench: Bench, cases: Sequence[int], exception: int) -> Grade:
     """Grade the claim that a tenth of the step size improves collocation, with one exception.
 
-    Without the exception, errors must be finite and at least halve for four fifths of the pairs of
-    program and case; for half of them the claim holds in part.
+    Without the exception, errors must be finite and at least halve in four fifths of the pairs of
+    program and case. If they do in half of the pairs, the claim holds in part.
     """
     numbers, improved, excepted = {}, [], np.False_
     for program in COLLOCATION:
@@ -185,7 +185,7 @@ def share_of_range(omega: Array, truth: Array) -> Array:
 
 
 def spread_of(omega: Array) -> Array:
-    """Return the range of each omega component over the steps (rad/s), shape (..., 3)."""
+    """Return the range (rad/s) of each omega component over the steps, shape (..., 3)."""
     return np.moveaxis(np.ptp(_by_component(omega), axis=-1), 0, -1)
 
 

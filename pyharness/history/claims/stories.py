@@ -1,6 +1,6 @@
-"""The sentences of the thesis with their claims, and each claim as a story of three sentences.
+"""Sentences of the thesis with their claims, and each claim retold as a story of three sentences.
 
-`data/claims.toml` has the stories, with fields for the numbers of our verdict.
+`data/claims.toml` has the stories, with placeholders for the numbers of our verdict.
 """
 
 import re
@@ -29,7 +29,7 @@ class Story(NamedTuple):
 
 
 def story(judgement: Judgement) -> Story:
-    """Return the story of a claim; raise ValueError if a field matches no number."""
+    """Return the story of a claim; raise ValueError if a placeholder matches no number."""
     outcomes = {"original": judgement.original, "corrected": judgement.corrected}
 
     def number(field: re.Match[str]) -> str:
@@ -63,9 +63,10 @@ def power_of_ten(exponent: int) -> str:
 class Sentence(NamedTuple):
     """A sentence of the thesis with its claims.
 
-    `text` is our reading, with formulas in LaTeX, and `quote` a few words of it. `why` tells why a
-    sentence has no claims. `laboratory` is the run that shows it best, as in
-    ``case=2&program=two-term``. `command` shows more than `claims --explain`.
+    `text` is the whole sentence, with formulas in LaTeX, and `quote` a few words of it. `why` gives
+    the reason if a sentence has no claims. `laboratory` names the run that shows the sentence best,
+    as in ``case=2&program=two-term``. `command` is a command that shows more than `claims
+    --explain`.
     """
 
     where: str

@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about history, theory and orders, mostly in sections I to IV.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
-decision. An error is the largest of any omega component against the reference solution; `limit`
-bounds it as a fraction of the largest omega.
+decision. An error is the largest deviation of any omega component from the reference solution.
+`limit` is its allowed ratio to the largest omega.
 """
 
 import math
@@ -41,7 +41,7 @@ def known_in_closed_form(lab: Laboratory, cases: list[int], limit: float) -> Jud
 
 
 def by_sources(lab: Laboratory, holds: bool) -> Judged:
-    """Return the verdict on a statement of history; `holds` is whether the sources support it."""
+    """Return the verdict on a historical statement; `holds` says whether the sources support it."""
     return Judged(REPRODUCED if holds else FALSE, {})
 
 
@@ -78,13 +78,13 @@ def _angle_rates_to_omega(angles: Sequence[float] | Array) -> Array:
 
 
 def _omega(moments: Triple, state: Array) -> Array:
-    """Return omega (rad/s) from a state: 3-1-3 angles (rad), then their conjugate momenta."""
+    """Return omega (rad/s) from a state: 3-1-3 Euler angles (rad), then their conjugate momenta."""
     momentum = np.linalg.solve(_angle_rates_to_omega(state[:3]).T, np.asarray(state[3:]))
     return np.asarray(momentum / np.array(moments))
 
 
 def _hamilton(moments: Triple, state: Array) -> Array:
-    """Return dH/dp and -dH/dq for 3-1-3 angles q (rad) and momenta p; H = sum I omega**2 / 2."""
+    """Return dH/dp and -dH/dq of H = sum I omega**2 / 2; q are 3-1-3 angles (rad), p momenta."""
     theta, psi = float(state[1]), float(state[2])
     sin_theta, cos_theta = math.sin(theta), math.cos(theta)
     sin_psi, cos_psi = math.sin(psi), math.cos(psi)
@@ -102,7 +102,8 @@ def _hamilton(moments: Triple, state: Array) -> Array:
 def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judged:
     """Judge the claim that a bounded function satisfies a Lipschitz condition.
 
-    The counterexample is the square root, between x and 2 x for x from .01 down to 10**-decades.
+    The counterexample is the square root; its quotients between x and 2 x are computed for x from
+    .01 down to 10**-decades.
     """
     points = 10.0 ** -np.arange(2.0, decades + 1.0, 2.0)
     quotients = (np.sqrt(2.0 * points) - np.sqrt(points)) / points
@@ -123,7 +124,7 @@ def local_error(
 def same_as_taylor(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that Runge-Kutta and the Taylor series up to h**4 are the same method.
 
-    It is reproduced in part if the results of one step differ by O(h**5).
+    The claim is reproduced in part if the results of one step differ by O(h**5).
     """
     numbers, same, near = {}, True, True
     for case in cases:
@@ -173,7 +174,7 @@ def _taylor_step(scene: Scene, order: int) -> Array:
 
 
 def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
-    """Judge the claim that four weightings are better than the Taylor series in Crandall's example.
+    """Judge the claim that four weightings beat the Taylor series in Crandall's example.
 
     The example is dx/dt = `rate` x, x(0) = 1 on (0, 1), with the trial function 1 + c1 t + c2 t**2.
     """
@@ -208,7 +209,7 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
     A row has the weighted integrals over (0, 1) of the two `factors` in the residual, and of
-    `rate`, by quadrature on each half.
+    `rate`, each by quadrature on both halves of the interval.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []
@@ -224,8 +225,8 @@ def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weight
 def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judged:
     """Judge the claim that the rates Q of eq. 32 of the thesis determine stability.
 
-    A perturbation of a steady rotation by 1e-8 should change as exp(Q t): grow at the rate Re Q
-    (1/s) if that is above 0, else stay within ten times its size for ten periods.
+    A relative perturbation of a steady rotation by 1e-8 should change as exp(Q t): grow at the rate
+    Re Q (1/s) if Re Q is above 0, else remain below ten times its initial size for ten periods.
     """
     numbers, told = {}, True
     for case in cases:
@@ -234,7 +235,7 @@ def rates_tell_growth(lab: Laboratory, cases: list[int], within: float) -> Judge
             disturbance = 1e-8 * math.hypot(*each.omega) * np.array([0.6, 0.5, 0.4])
             start = tuple((each.omega + disturbance).tolist())
             rate = each.rates[0].real
-            # By then the decaying part has vanished, and the growing part is still small.
+            # At this time the decaying part has vanished, and the growing part is still small.
             steady = np.linspace(0.1, 10.0, 100) * (each.period or 1.0)
             times = np.array([8.0, 10.0]) / rate if rate else steady
             found = solve(replace(scene, omega=start), times, tolerance=1e-14).omega - each.omega

@@ -5,9 +5,9 @@ Each function is the `test` of one or more claims in `data/claims.toml`; further
 the keyword arguments. `lab` runs the programs under the chosen assumptions; `case` is a number of
 Table 1.
 
-An error is the largest of any component of omega against the reference solution, over the steps
+An error is the largest deviation of any omega component from the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
-reference omega. A claim that fails is "not reproduced" or, in some tests, "false".
+component of the reference omega. A claim that fails is "not reproduced" or, in some tests, "false".
 """
 
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ def judged(grade: rules.Grade, otherwise: str = NOT_REPRODUCED) -> Judged:
 
 
 def constant_solution(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that the solution of a case is constant, to 1e-12 rad/s."""
+    """Judge the claim that the solution of a case is constant; it may vary by 1e-12 rad/s."""
     moved = float(rules.spread_of(lab.truth(case).omega).max())
     return graded({"change over the run (rad/s)": moved}, moved <= 1e-12, otherwise=FALSE)
 
@@ -67,14 +67,15 @@ def known_solution(lab: Laboratory, case: int) -> Judged:
 
 
 def omega3_varies(lab: Laboratory, case: int, limit: float) -> Judged:
-    """Judge the claim that omega3 varies in a case; if not, it is "false"."""
+    """Judge the claim that omega3 varies in a case; if it is constant, the claim is "false"."""
     return judged(rules.omega3_varies(lab, case, limit), FALSE)
 
 
 def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
     """Judge the claim that all three programs coincide with the known solution of a case.
 
-    The numbers include the steps of Runge-Kutta from each initial omega in `starts`.
+    The numbers include the count of steps that Runge-Kutta runs from each initial omega in
+    `starts`.
     """
     found = judged(rules.no_deviation(lab, case, limit))
     for start in starts():
@@ -85,7 +86,7 @@ def no_deviation(lab: Laboratory, case: int, limit: float) -> Judged:
 
 
 def coincident(lab: Laboratory, case: int, share: float) -> Judged:
-    """Judge the claim that collocation coincides with the known solution on the thesis's graph."""
+    """Judge the claim that collocation coincides with the known solution on the printed graph."""
     numbers = {}
     for program in COLLOCATION:
         runs, truth = lab.runs(program, case), lab.solution(case)
@@ -129,7 +130,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers name the subsets of defects with which the run stops at that step.
+    The numbers describe all subsets of defects with which the run stops at that step.
     """
     stop = lab.run("runge-kutta", case).stop
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings
@@ -149,7 +150,7 @@ def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
 
 
 def growing(lab: Laboratory, case: int) -> Judged:
-    """Judge the claim that omega1 of the Runge-Kutta program becomes larger than the sine."""
+    """Judge the claim that omega1 of Runge-Kutta becomes larger than the true sine function."""
     run = lab.run("runge-kutta", case)
     value, solution = float(run.omega[-1, 0]), float(lab.truth(case).omega[run.steps - 1, 0])
     numbers = {"omega1 at the end (rad/s)": value, "solution there (rad/s)": solution}
@@ -157,9 +158,9 @@ def growing(lab: Laboratory, case: int) -> Judged:
 
 
 def search(lab: Laboratory, case: int) -> Judged:
-    """Return "not testable" for the claim of a search for an error in the Runge-Kutta program.
+    """Return "not testable" for the claim that Runge-Kutta was searched for an error.
 
-    The number is the original program's error over the corrected program's.
+    The number is the original program's error divided by the corrected program's error.
     """
     run = lab.run("runge-kutta", case)
     best = Laboratory(False, lab.assumptions).run("runge-kutta", case)

@@ -2,5 +2,5 @@
 
 A contender is a solver that is measured; its setting is a tolerance or a number of steps. A maker
 turns an end time (s) and a setting into an integration that is ready to be timed. A workload is a
-scene with an end time; a load is a set of bodies.
+scene with an end time; a load is a set of bodies that are solved at once.
 """

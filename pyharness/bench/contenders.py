@@ -1,4 +1,4 @@
-"""Contenders of `bench`: their interface, our methods, and the programs."""
+"""Contenders of `bench`: their interface, our methods, and the programs of the thesis."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ Maker = Callable[[float, float], Ready]
 
 @dataclass(frozen=True)
 class Contender:
-    """A solver in a benchmark; a closed form has no setting."""
+    """A solver in a benchmark, with its kind of setting."""
 
     name: str
     setting: str  # "tolerance", "steps" or "none"
@@ -66,14 +66,14 @@ def list_own_contenders() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError below 100 eps, which SciPy would replace by 100 eps, and LSODA refuse."""
+    """Raise InputError below 100 eps: SciPy replaces such tolerances by 100 eps, LSODA refuses."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")
 
 
 def prepared_maker(name: str, scene: Scene, compiled: bool = False) -> Maker:
-    """Return the maker of a prepared solver; `compiled` is as in `prepare`."""
+    """Return the maker of the prepared solver `name`; `compiled` is as in `prepare`."""
 
     def make(horizon: float, setting: float) -> Ready:
         attitude = scene.attitude is not None

@@ -1,4 +1,4 @@
-"""The problem of `bench --ensemble`, and our contenders."""
+"""The problem of `bench --ensemble`, many bodies with equal moments, and our contenders."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -63,7 +63,7 @@ class EnsembleLoad:
         return replace(self, **own)
 
     def ends(self) -> Array:
-        """Return omega at the end (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
+        """Return omega at the end time (rad/s), shape (n, 3), by `solve` with tolerance 1e-15.
 
         If attitudes are requested, return the quaternions instead, shape (n, 4).
         """
@@ -82,9 +82,9 @@ class EnsembleLoad:
             yield Scene(self.name, start, MOMENTS, torque=law, attitude=attitude)
 
 
-# Takes the bodies, the setting (tolerance or number of steps) and the number of threads. Returns a
-# function that integrates to `HORIZON` and returns omega, shape (n, 3), or the attitudes, shape (n,
-# 4), of a load that requests them.
+# A function of the bodies, the setting (tolerance or number of steps) and the number of threads. It
+# returns a function that integrates to `HORIZON` and returns omega, shape (n, 3), or the attitudes,
+# shape (n, 4), if the load requests them.
 EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 
@@ -96,7 +96,7 @@ class EnsembleContender(Contender):
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
     torque_free: bool = False  # solves only bodies without torque
     attitude: bool = False
-    # Several ways to prepare the solver, by a note. All are timed; the fastest counts.
+    # Several ways to prepare the solver, by a describing note. All are timed; the fastest counts.
     variants: Mapping[str, EnsembleMaker] = field(default_factory=dict, kw_only=True)
 
     @property
@@ -134,7 +134,7 @@ def own_ensembles() -> list[EnsembleContender]:
 
 def _make_own(method: str) -> EnsembleMaker:
     def prepare(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-        # Each call writes its results into the arrays of the previous call.
+        # Each call of the solver writes its results into the arrays of the previous call.
         tolerance = setting if method == "taylor" else None
         step = load.horizon / setting if method == "rk4" else None
         kept = None

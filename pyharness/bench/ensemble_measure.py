@@ -37,9 +37,9 @@ from pyharness.model.trajectory import Array
 TARGETS = (1e-6, 1e-12)
 STEPS = 300  # number of RK4 steps, where the rate is in steps per second
 ROUNDS = 9
-# Durations of a call (s). The number of bodies is increased after a call shorter than the first,
-# and after a call shorter than the second if the last increase raised the bodies per second by more
-# than half.
+# Durations of a call (s). The number of bodies is increased after a call shorter than `_CALL`. It
+# is also increased after a call shorter than `_LONG_CALL` if the last increase raised the bodies
+# per second by more than half.
 _CALL, _LONG_CALL = 0.03, 0.5
 SLOW = 0.3  # s; calls slower than this are timed in fewer rounds
 _BATCH = 0.02  # s; duration of the calls in a round
@@ -121,7 +121,7 @@ class _Task:
         return float(np.where(np.isfinite(errors), errors, np.inf).max())
 
     def setting(self, each: EnsembleContender) -> float | None:
-        """Return the coarsest setting that reaches the target or None; `STEPS` without target."""
+        """Return the coarsest setting that reaches the target, or None; without target, `STEPS`."""
         if self.target is None:
             return float(STEPS)
         for setting in _ladder(each, self.target):
@@ -143,8 +143,8 @@ def measure_ensembles(
 ) -> Rates:
     """Measure the speed of all contenders on all loads, at all target errors.
 
-    On the last load, RK4 contenders also run `STEPS` steps. `seed` is only recorded. A call solves
-    at least `least` bodies, or all if the load has fewer.
+    On the last load, RK4 contenders also run `STEPS` steps. `seed`, with which the loads were
+    drawn, is only recorded. A call solves at least `least` bodies, or all if the load has fewer.
     """
     found = Rates(seed, loads[0].n)
     tasks: list[_Task] = []
@@ -202,7 +202,7 @@ def _ladder(each: EnsembleContender, target: float) -> Iterator[float]:
 def _enough(
     prepare: EnsembleMaker, load: EnsembleLoad, setting: float, threads: int, least: int
 ) -> tuple[EnsembleLoad, Callable[[], Array]]:
-    """Return a load of at least `least` or all bodies, long enough to time, and its solver."""
+    """Return a part of the load that takes long enough to be timed, and its solver."""
     n, before = min(load.n, least), 0.0
     while True:
         part = load.part(slice(0, n))
@@ -221,7 +221,7 @@ def clock_of(threads: int) -> Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """The run times per body (s), by method, on one core, in a call for `bodies` bodies."""
+    """The run times per body (s), by method, on one core, in one call for `bodies` bodies."""
 
     bodies: int
     seconds: dict[str, float]
@@ -245,7 +245,8 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    All methods have a torque except the closed form, measured both by `solve_many` and prepared.
+    All methods solve bodies with a torque, except the closed form. This is measured by `solve_many`
+    and, as "prepared", by a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []
@@ -286,7 +287,7 @@ def memory(bodies: int) -> list[Memory]:
 
 
 def needed(method: str, bodies: int) -> None:
-    """Print the bytes of a call's arrays, and the increase of peak memory in bytes."""
+    """Print the size (bytes) of a call's arrays, and the increase of peak memory (bytes)."""
     own = next(each for each in own_ensembles() if each.name == method)
     load = draw("memory", 512)[0 if own.torque_free else 1]
     own.prepare(load, SETTINGS[method], 1)()
@@ -303,7 +304,7 @@ def needed(method: str, bodies: int) -> None:
 
 
 def _resident(name: str) -> int:
-    """Return Linux's ``VmRSS`` (present) or ``VmHWM`` (peak) in bytes; 0 elsewhere."""
+    """Return this process's ``VmRSS`` (memory now) or ``VmHWM`` (peak), bytes; 0 without Linux."""
     with suppress(OSError), open("/proc/self/status", encoding="ascii") as file:
         for line in file:
             if line.startswith(name + ":"):

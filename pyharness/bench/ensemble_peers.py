@@ -1,6 +1,6 @@
 """Third-party solvers for `bench --ensemble`.
 
-Each returns a function that computes omega (rad/s) at the end time, shape (n, 3).
+Each solver returns a function that computes omega (rad/s) at the end time, shape (n, 3).
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.trajectory import Array
 
-# Bodies in a batch. heyoka recommends 4, even if a register has 8 numbers.
+# Numbers of bodies in a batch. heyoka recommends 4, even if a register holds 8 numbers.
 BATCHES = (4, 8, 16)
 LANES = 64  # bodies in a block
 _BLOCK = 4096  # bodies whose arrays fit into the cache
@@ -112,7 +112,7 @@ def _integrator(
     with_torque: bool, tolerance: float, size: int, scene: Scene | None = None,
     with_attitude: bool = False,
 ) -> Any:  # fmt: skip
-    """Return a compiled integrator of `size` bodies, of `scene` or of the benchmark."""
+    """Return a compiled integrator of `size` bodies for `scene`, by default the benchmark's."""
     import heyoka
 
     attitude = IDENTITY if with_attitude else None
@@ -132,7 +132,7 @@ def _batches(rows: Array, size: int) -> Array:
 
 
 def _numpy_rk4(load: EnsembleLoad, setting: float, threads: int) -> Callable[[], Array]:
-    """Return an integration by RK4 on NumPy arrays: a row per component, a column per body."""
+    """Return an integration by RK4 on NumPy arrays, with a column for each body."""
     a, b, c = coefficients()
     starts, torques = load.omega0.T.copy(), load.acceleration.T.copy()
     found = np.empty_like(load.omega0)
@@ -215,8 +215,8 @@ def numba_rk4(
 ) -> Callable[[], Array]:
     """Return an integration by RK4, compiled by numba.
 
-    If `in_blocks`, each step is a loop over the bodies of a block; else each body is integrated to
-    the end before the next.
+    If `in_blocks`, each step is a loop over the bodies of a block; otherwise each body is
+    integrated to the end before the next body.
     """
     blocks, bodies = _numba_kernels()
     kernel = blocks if in_blocks else bodies
@@ -258,7 +258,8 @@ def _numba_kernels() -> tuple[Any, Any]:
             z + sixth * (z1 + 2.0 * (z2 + z3) + z4),
         )
 
-    # As in our kernels, the compiler may contract a product and a sum, and change nothing else.
+    # As in our kernels, the compiler may contract a product and a sum into one operation, but
+    # change nothing else.
     step = numba.njit(inline="always", fastmath={"contract"})(step)
 
     def blocks(

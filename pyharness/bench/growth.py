@@ -1,7 +1,7 @@
 """Growth of errors with time: the Taylor method against the closed form, up to 1e5 s.
 
-Errors are compared with 2**-53 t |omega'|, the change of the solution that rounding the time t (s)
-causes in any method.
+Errors are compared with 2**-53 t |omega'|, the change of the solution that the rounding of the time
+t (s) causes in any method.
 """
 
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ class Growth:
     """The Taylor method's error at one time, and the effect of rounding that time."""
 
     time: float  # s
-    # Both relative to the largest angular velocity: the largest difference from the closed form,
-    # over `_STARTS` initial states of the same motion, and the change by one rounding of the time.
+    # Relative to the largest angular velocity: the largest difference from the closed form among
+    # `_STARTS` initial states of the same motion, and the change by one rounding of the time.
     error: float
     conditioning: float
     steps: int  # of one integration

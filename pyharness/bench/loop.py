@@ -42,7 +42,7 @@ def timed(
 ) -> Iterator[_Row]:
     """Yield the rows of the calls that `calls` prepares for each task.
 
-    The last four parameters are those of `checks.compare.timing.seconds`.
+    `length`, `rounds`, `statistic` and `slow` are as in `checks.compare.timing.seconds`.
     """
     for number, task in enumerate(tasks):
 

@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
-Every contender has settings from coarse to fine. Each call is made once and compared with the
-reference. Batches of all calls are then timed in interleaved rounds, so that other load affects all
-alike; the median counts.
+Every contender has settings from coarse to fine. A call with each setting is made once and compared
+with the reference. Batches of all calls are then timed in interleaved rounds, so that other load
+affects all alike; the median time counts.
 """
 
 import math
@@ -30,18 +30,19 @@ from pyharness.truth.reference import Reference, reference
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 HORIZON, LONG_HORIZON = 3.0, 100.0  # end times T, s
 _CASES, _LONG_CASES = (2, 3, 4, 5, 6, 7), (3, 4)
-# With attitude. To the long end time, Case 6 would need too many steps of the reference.
+# Cases with attitude. Until the long end time, the reference would need too many steps in Case 6.
 _TURNING_CASES, _LONG_TURNING_CASES = (1, *_CASES), (1, 2, 3, 4, 5, 7)
 
 _LONGEST_CALL = 1.0  # s; settings whose calls take longer are left out
 # Longest time (s) to prepare and try a setting: at a coarse tolerance a solver may leave the true
-# solution, and then take steps that never end.
+# solution, and then never end.
 _LONGEST_FIRST = 30.0
 # Time (s) for all first calls of a contender on one workload.
 _BUDGET = {"tolerance": 1.0, "steps": 0.15, "none": 1.0}
 _LARGEST_STEPS = 1 << 22  # largest number of steps of a call
 _FAILURES = 12  # after so many successive settings without result, finer ones are left out
-# Factor on the work limit; even so, the proof is short beside the measurement.
+# Factor on the work limit of the proved error bound; the proof is still short beside the
+# measurement.
 _PROOF_EFFORT = 10.0
 _ROUNDS = 9
 _BATCH = 1e-3  # s; calls faster than this are batched
@@ -51,12 +52,12 @@ _BATCH = 1e-3  # s; calls faster than this are batched
 class Workload:
     """A scene, and the time to which its motion is integrated."""
 
-    # The number of a case or of a random scene, or the name of a torque term. For a case, `L`
-    # follows if T = 100 s (`3L`), or any other T that is not 3 s.
+    # The number of a case or of a random scene, or the name of a torque term. A case number is
+    # followed by `L` if T = 100 s (`3L`), or by any other T that is not 3 s.
     label: str
     scene: Scene
     horizon: float  # T, s
-    # Only for other scenes than cases: kinds, solution, error amplification, and revolutions.
+    # Only for scenes that are not cases: kinds, solution, error amplification, and revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None
     growth: float = 0.0
@@ -74,7 +75,8 @@ class Workload:
     def group(self) -> str:
         """Return the name of the workload's group; ratios are averaged over groups.
 
-        Groups differ in end time and, at 3 s or with attitudes, in whether there is a torque.
+        Groups differ in the end time; for 3 s, and with attitudes, also in whether there is a
+        torque.
         """
         if self.horizon != HORIZON and self.scene.attitude is None:
             return f"T = {self.horizon:g}"
@@ -155,7 +157,7 @@ def measure(
     progress: Progress = no_progress,
     clock: Clock | None = None,
 ) -> Finding:
-    """Return times and errors of all contenders on all workloads; `clock` is in s."""
+    """Return times and errors of all contenders on all workloads, timed by `clock` (s)."""
     clock = clock or perf_counter
     found = Finding(list(loads), [], [], {}, {})
     makers: dict[tuple[int | str, str], Maker] = {}
@@ -202,7 +204,7 @@ def measure(
 def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
     """Return the larger of the errors of omega (relative) and of the attitude (rad).
 
-    Return None if the result is not finite or a required attitude is missing.
+    Return None if the result is not finite, or if the attitude is required but missing.
     """
     error = relative_error(end.omega, truth, scale)
     if error is None or truth.attitude is None:
@@ -220,7 +222,7 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
     """Return the error of omega divided by the largest component of `truth`.
 
     The divisor is `scale` (rad/s) if that is larger. The result is None if the error is not finite,
-    or if the reference ends before.
+    or if the reference does not reach the end time.
     """
     if len(truth.omega) == 0:
         return None
@@ -237,14 +239,15 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
     """Yield a contender's settings, from coarse to fine.
 
-    Numbers of steps grow by factors of 3/2 and 4/3 in turn, or of 2 for orders of 2 or less.
+    Numbers of steps grow by the factors 3/2 and 4/3 in turn or, for orders up to 2, by the factor
+    2.
     """
     if contender.settings:
         yield from contender.settings
         return
-    # By step, the body rotates by at most 16 rad about an axis, at the initial omega; no method
-    # works with larger steps. The frequencies of the torque do not count: a fast torque may be too
-    # weak to require small steps.
+    # In the largest step, the body rotates by at most 16 rad about an axis at the initial omega; no
+    # method works with larger steps. The frequencies of the torque are not considered, because a
+    # fast torque may be too weak to require small steps.
     phase = max(map(abs, scene.omega)) * horizon / 16.0
     steps = 1 << max(1, math.ceil(math.log2(max(1.0, phase))))
     while steps <= _LARGEST_STEPS:
@@ -267,7 +270,8 @@ def _first_calls(
     spent = preparing = last = before = 0.0
     for setting in ladder(contender, load.scene, load.horizon):
         named = None if contender.setting == "none" else setting
-        # Extrapolated from the last two calls. The bounds allow for an interruption of one of them.
+        # The time is extrapolated from the last two calls. The bounds allow for an interruption of
+        # one of them.
         expected = last * min(4.0, max(1.0, last / before)) if before else last
         hopeless = ""
         if expected > _LONGEST_CALL or spent + expected > _BUDGET[contender.setting]:
@@ -313,6 +317,6 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether rounding limits the errors of finer settings."""
+    """Return whether `errors` no longer decrease, because of rounding."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -1,6 +1,6 @@
 """Third-party integrators for `bench`, set up for speed as their documentation recommends.
 
-For the Runge-Kutta methods that numba compiles, the source of each right-hand side contains the
+In the source of the Runge-Kutta methods that numba compiles, the right-hand sides contain the
 scene's numbers, and loops over stages are unrolled.
 """
 
@@ -27,7 +27,7 @@ from pyharness.truth.reference import exact_coefficients
 Formula = Callable[..., Sequence[Any]]
 MOST_STEPS = 10_000_000
 Tableau = tuple[Sequence[Sequence[float]], Sequence[float], Sequence[float]]
-# Coefficients below the diagonal, weights and nodes of the stages.
+# The tableau: coefficients below the diagonal, weights and nodes of the stages.
 RK4 = [[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0.0, 0.5, 0.5, 1.0]
 _SOLVE_IVP = ("DOP853", "RK45", "LSODA", "Radau")
 
@@ -62,7 +62,7 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a maker of heyoka integrations, with one integrator for each tolerance.
+    """Return a maker of heyoka integrations, which has one integrator for each tolerance.
 
     Each run first resets time and state. `formula` is as in `heyoka_equations`.
     """
@@ -105,7 +105,7 @@ def heyoka_maker(
 def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
     """Return right-hand side, start, and the ratio of absolute to relative tolerance.
 
-    The ratio is a number, or an array with one for each unknown.
+    The ratio is a number, or an array with a number for each unknown.
     """
     is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
@@ -150,8 +150,8 @@ def _odeint(scene: Scene) -> Maker:
         )  # fmt: skip
 
         def read(rows: Any) -> End:
-            # Repeated, because evaluations are counted only with an option that the timed call
-            # omits.
+            # The call is repeated, because evaluations are counted only with an option that the
+            # timed call omits.
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ODEintWarning)
                 _, told = run(full_output=True)
@@ -165,10 +165,10 @@ def _odeint(scene: Scene) -> Maker:
 
 
 def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple[Any, Any]]:
-    """Return pairs of an unknown and its derivative, for omega and any attitude of the scene.
+    """Return pairs (unknown, derivative) for omega and, if the scene has one, the attitude.
 
-    A torque that depends on the state comes from `formula`, or else from the tape of recorded
-    operations. Raise InputError for an opaque torque or a table.
+    A torque that depends on the state is computed by `formula`, or else from its tape (the recorded
+    operations). Raise InputError for a torque that is opaque or has a table.
     """
     import heyoka
 
@@ -197,7 +197,7 @@ def heyoka_equations(scene: Scene, formula: Formula | None = None) -> list[tuple
 
 
 def heyoka_functions() -> Functions[Any]:
-    """Return the functions of a tape in heyoka's arithmetic."""
+    """Return the functions that evaluate a tape in heyoka's arithmetic."""
     import heyoka
 
     def table(_: Table, time: Any) -> Any:
@@ -257,7 +257,7 @@ def compiled_function(source: str) -> Any:
 def rates(
     scene: Scene, time: str, state: Sequence[str], coefficients: Sequence[float] = ()
 ) -> list[str]:
-    """Return the right-hand side of each component of omega as Python source.
+    """Return the right-hand sides of omega's components as Python source.
 
     `time` and `state` are names in the source. `coefficients` are A, B, C, by default the scene's.
     """
@@ -284,7 +284,7 @@ def rates(
 
 
 def end_of(state: Array, evaluations: int | None = None) -> End:
-    """Return the state at the end time as an `End`."""
+    """Return `state`, omega and perhaps attitude at the end time, as an `End`."""
     found = copied_result(state)
     attitude = found[3:] if len(found) > 3 else None
     return End(found[:3], evaluations=evaluations, attitude=attitude)

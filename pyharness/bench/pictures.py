@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from pyharness.bench.growth import Growth
 
 _FLOOR = 2.0**-53  # relative error of one rounding in double precision
-# Distinct without colours: dashes and line width show the group of solvers, markers the solver.
+# Styles are distinct without colours: dashes and line width show the group of a solver, markers the
+# solver.
 _FAMILIES: dict[str, dict[str, Any]] = {
     "ours": {"linestyle": "-", "linewidth": 1.5, "color": "#1040a0"},
     "gauss": {"linestyle": (0, (6, 1.5)), "linewidth": 0.9, "color": "#3a86c8"},
@@ -27,7 +28,7 @@ _SLOPES = (2, 4, 8)
 
 
 def bench_picture(finding: Finding, data: Table) -> Picture:
-    """Draw error against run time and right-hand sides, a row for each workload."""
+    """Draw error against run time and number of right-hand sides, a row for each workload."""
     from matplotlib.figure import Figure
 
     count = len(finding.workloads)
@@ -110,7 +111,7 @@ def draw_slopes(axes: "Axes") -> None:
         end = min(begin * (high / begin) ** 0.7, begin * 10.0 ** (6.0 / order))
         last = 0.5 * (end / begin) ** -order
         axes.plot([begin, end], [0.5, last], color="#909090", linewidth=1.0, zorder=0)
-        # In case a curve crosses the label.
+        # A background makes the label legible if a curve crosses it.
         axes.annotate(
             f"order {order}", (end, last), (0, -2), textcoords="offset points", color="#505050",
             fontsize=8, ha="center", va="top", zorder=5,

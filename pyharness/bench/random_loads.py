@@ -1,8 +1,8 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene. Its motion, by the second reference
-(`integer_series`), decides whether it is accepted.
+bodies alike. A seed and a number determine a scene. It is accepted or drawn again depending on its
+motion, computed by the second reference (`integer_series`).
 """
 
 import math
@@ -33,7 +33,7 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
     "needle-like": lambda x: [low := x.uniform(0.01, 0.1), 1.0, 1.0 + low * x.uniform(0.0, 1.0)],
     "nearly symmetric": lambda x: [1.0, 1.0 + _log(x, 1e-6, 1e-2), x.uniform(0.2, 1.9)],
 }
-MOST_GROWTH = 1e3  # limit of an accepted scene
+MOST_GROWTH = 1e3  # error amplification from which on a scene is not accepted
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
@@ -49,7 +49,8 @@ def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     source = Random(f"bench/{seed}/{number}")
     place = number - 1
     law, place = LAWS[place % len(LAWS)], place // len(LAWS)
-    # Twelve successive draws of a kind of torque contain all pairs of four bodies and three speeds.
+    # Twelve successive draws with the same kind of torque contain all pairs of four bodies and
+    # three speeds.
     body = list(BODIES)[place % len(BODIES)]
     speed = list(SPEEDS)[place % len(SPEEDS)] if law in WAVES else ""
     name = ", ".join(filter(None, (f"{number}: {law}", speed.removesuffix(" waves"), body)))

@@ -42,9 +42,9 @@ def measured_report(
 ) -> Report:
     """Return the report of a benchmark with its page, machine and build.
 
-    `title` is a Markdown heading, `worth` a sentence on the comparability of the numbers. The text
-    of `found` has titled tables, then the notes. The versions of `packages` are listed; `command`
-    repeats the benchmark.
+    `title` is a Markdown heading, `worth` a sentence on how comparable the numbers are. The text of
+    `found` has titled tables followed by the notes. The versions of `packages` are listed;
+    `command` repeats the benchmark.
     """
     here, built = machine(packages), build()
     *parts, notes = found.text
@@ -63,7 +63,7 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return one line per reason, from tuples (contender, reason, task).
+    """Return one line for each reason in `reasons`, tuples of contender, reason and task.
 
     A line lists at most `most` tasks. Contenders with the same reason and tasks share a line.
     """
@@ -99,7 +99,7 @@ def _random(finding: Finding) -> bool:
 
 
 def _spread_data(finding: Finding) -> Table:
-    # The quartiles are a Spread's last field.
+    # The quartiles are the last field of a Spread.
     rows = [[*fields, *quartiles] for *fields, quartiles in map(astuple, spreads(finding, KINDS))]
     names = "method kind target scenes reached mean smallest lower_quartile median upper_quartile"
     return numbers(names, rows)
@@ -266,8 +266,8 @@ def _notes(finding: Finding) -> list[str]:
 
 
 def not_measured(finding: Finding) -> list[str]:
-    """Return a line for each reason of missing results, with the first examples."""
-    # Reasons that differ only in their end, an expected time or a last step, share a line.
+    """Return a line for each reason why results are missing, with the first examples."""
+    # Reasons that differ only in the expected time or last step at their end share a line.
     came: list[tuple[Row | Refusal, str]] = [
         (each, each.reason.split(", a call would take")[0]) for each in finding.refused
     ]

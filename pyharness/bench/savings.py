@@ -1,4 +1,4 @@
-"""Time saved by leaving out the computations that a plan finds unnecessary for a scene."""
+"""Time saved by omitting the computations that a plan finds unnecessary for a scene."""
 
 import subprocess
 import sys
@@ -21,7 +21,7 @@ _SECONDS = 2e-3  # of a batch
 
 @dataclass(frozen=True)
 class Saving:
-    """Run times (s) with and without a part that a plan can leave out; medians."""
+    """Median run times (s) with and without a part of a computation that a plan can omit."""
 
     part: str  # as the plan names it
     where: str  # scene or program
@@ -35,9 +35,9 @@ class Saving:
 
 
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
-    """Return the saving by each part that can be left out.
+    """Return the run times with and without each part that can be omitted.
 
-    The parts are the integration (if there is a closed form), the torque as a function of time,
+    The parts are the integration (replaced by a closed form), the torque as a function of time,
     dense output, the velocity, and the imports of SciPy and of the reference.
     """
     constant = case_scene(5)

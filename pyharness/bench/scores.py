@@ -1,4 +1,4 @@
-"""Scores: times to reach errors, and ratios of the baseline's time to a contender's."""
+"""Scores: times to reach target errors, and ratios of the baseline's time to a contender's."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of a contender's ratios over random scenes of one kind."""
+    """The distribution of a contender's ratios over the random scenes of one kind."""
 
     method: str
     kind: str
@@ -78,7 +78,7 @@ def groups(finding: Finding) -> dict[str, list[Workload]]:
 def means(finding: Finding, loads: Sequence[Workload]) -> dict[str, list[float | None]]:
     """Return each contender's geometric mean ratios over `loads`, one for each target error.
 
-    A mean is None if the contender or the baseline misses the error on a workload.
+    A mean is None if the contender or the baseline does not reach the error on a workload.
     """
     tables = [_ratios(finding, load) for load in loads]
     names = dict.fromkeys(name for table in tables for name in table)

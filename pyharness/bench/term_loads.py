@@ -1,4 +1,4 @@
-"""The problems of `bench --terms`, torques that depend on the state, and its contenders."""
+"""The problems and contenders of `bench --terms`, for torques that depend on the state."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ _OMEGA: Triple = (0.3, 0.2, 0.9)  # rad/s
 _SPREAD = 0.2  # largest deviation of a component of a body's initial omega from _OMEGA, rad/s
 _ATTITUDE = (0.6, 0.0, 0.8, 0.0)
 
-# Occur in the ready terms and again in the formulas.
+# These numbers occur in the ready-made terms and again in the formulas.
 _D = (0.05, 0.1, 0.15)
 _CUBIC = 0.1
 _TARGET = (0.1, 0.2, 0.5)
@@ -55,7 +55,7 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene of the `kind` READY (torque of the library) or EXPRESSION (traced Python function).
+    """A scene of the `kind` READY (ready-made torque) or EXPRESSION (recorded Python function).
 
     `formula` is an independent implementation of a ready torque; None for an expression.
     """
@@ -83,7 +83,7 @@ class TermBodies(EnsembleLoad):
 
 
 def term_scenes() -> list[TermScene]:
-    """Return nine scenes with ready terms, then those with expressions."""
+    """Return nine scenes with ready-made torques, then scenes with expressions."""
     turning = TorqueLaw(_FIELD, sines=[(_SWING, _FREQUENCY)], frame="space")
     ready: dict[str, tuple[Any, Formula]] = {
         "damping": (terms.damping(_D), _damping),
@@ -229,7 +229,7 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
     """Return heyoka, also with variational equations, and DOP853, installed or not.
 
-    heyoka computes a ready term's torque by its formula, and an expression's from its tape.
+    heyoka computes a ready-made torque by its formula, and an expression from its tape.
     """
     formulas = {each.scene.name: each.formula for each in scenes}
 

@@ -1,10 +1,10 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
 A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings. Our
-arithmetic of machine words reproduces a machine's mantissa length and rounding, such as 48 bits for
-the CDC.
+arithmetic of machine words reproduces a machine's mantissa length and rounding, such as the 48 bits
+of the CDC.
 
-The decks, compiled from the author's cards, depend on neither the Fortran port nor the twins.
+The decks, compiled from the author's cards, share no code with the Fortran port and the twins.
 TAPE5, the file of all steps, is compared with the Fortran port bit for bit, the printed page as
 text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
 """
@@ -36,8 +36,8 @@ from pyharness.thesis.programs import BINARY64, PROGRAM_REGISTRY, run_program
 from pyharness.thesis.vectors import answers
 from pyharness.thesis.word import WORDS
 
-# Right-hand sides per step: at the start and each collocation point, or at four stages. The step of
-# an overflow counts.
+# Evaluations of the right-hand sides in a step: at the start and each collocation point, or at four
+# stages. The step that overflows counts too.
 _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
@@ -75,7 +75,7 @@ def _agreement(
 ) -> Check:
     """Return the check that Fortran and Python agree or, for a listed difference, still differ.
 
-    `options` are the stop test's constant (1/s) and whether the test may end the run.
+    `options` are the constant of the stop test (1/s), and whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
@@ -103,10 +103,10 @@ _VECTORS = Basis(
 def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
-    Test vectors are CDC instructions with expected results. In each cell, our 53 bits must agree
-    with floats, and the program compiled for each word with its Python version. If `chosen.only` is
-    empty, the listings for floats have at most one change; for words they are original and
-    corrected.
+    Test vectors are CDC instructions with expected results. In each cell, our arithmetic with 53
+    bits must agree with floats, and the program compiled for each other word with its Python
+    version. If `chosen.only` is empty, only some listings are checked: those with at most one
+    change against floats, the original and the corrected one in other words.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -128,7 +128,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of the Python version in an arithmetic against Fortran or floats."""
+    """Return the check of the Python version in `word` against Fortran; None: against floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:
@@ -144,7 +144,7 @@ _THIN = ("two-term/case-3/original", "four-term/case-7/corrected", "runge-kutta/
 
 
 def listings(program: str) -> list[Listing]:
-    """Return the original and the corrected listing, and each with every single change."""
+    """Return the original and the corrected listing, and both with each single defect changed."""
     names = frozenset(switches(program))
     found = [Listing.original(program), Listing.corrected(program)]
     found += [Listing(program, frozenset([name])) for name in switches(program)]
@@ -183,7 +183,7 @@ def _compared(folder: Path, asked: tuple[Name, Listing, int]) -> Check:
     overflowed = port.ended == "overflow"
     if not (deck.page.startswith(whole) if overflowed else deck.page == whole):
         faults.append("the page differs")
-    # Records of the deck after the port's last row.
+    # The records that the deck writes after the port's last row.
     rest = deck.tape5[port.steps :]
     if not overflowed:
         faults += [f"{len(rest)} records more"] if len(rest) else []

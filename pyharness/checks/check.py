@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 DRAWS = 1000
 RECORD = Path(__file__).parent.parent.parent / "tests" / "golden"
-# Begins the note if a method could not solve the problem or reached its work limit.
+# Beginning of the note if a method could not solve the problem or reached its work limit.
 REFUSED = "refused: "
-# In their ids the problem precedes the method.
+# Kinds of checks in whose ids the problem precedes the method.
 _CIRCUMSTANCE_FIRST = ("random", "external")
 
 BITS = Basis(
@@ -37,9 +37,9 @@ BITS = Basis(
 class Name:
     """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
-    `suite` is a kind of checks of `verify` or a trial of `stress`. `subject` is a program or
-    method, `circumstance` a problem, `setting` a tolerance, step size or listing, `quantity` the
-    compared number. The command that repeats the check ends with `options`.
+    `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
+    method, `circumstance` a problem, `setting` a tolerance, step size or listing, and `quantity`
+    the compared number. `options` end the command that repeats the check.
     """
 
     suite: str
@@ -96,7 +96,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Check:
-    """The result of one check: a value, its limit, and whether the check passed."""
+    """The result of one check: a value, its limit, and whether it passed."""
 
     name: Name
     passed: bool
@@ -137,7 +137,7 @@ class Check:
         return self.again or self.name.replay
 
     def record(self) -> dict[str, Any]:
-        """Return the check as a dictionary for JSON, with the fields of a subclass."""
+        """Return the check as a dictionary for JSON, including the fields of a subclass."""
         head = {"id": self.id, "passed": self.passed, "value": self.value, "limit": self.limit}
         more = {each.name: getattr(self, each.name) for each in fields(self)[_OF_ANY:]}
         bound = None if self.reference_bound is None else self.reference_bound()
@@ -151,7 +151,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with three quantities by which reports group it."""
+    """A check in a random scene, with the three quantities by which reports group such checks."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -175,7 +175,7 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield finished checks, and those deferred ones that `only` requests.
+    """Yield the checks in `attempts`: finished ones, and deferred ones if `only` requests them.
 
     An exception becomes a failed check, unless its type is in `raised`.
     """
@@ -236,7 +236,7 @@ def severity(check: Check) -> tuple[bool, float]:
 
 
 def selected(id: str, only: Sequence[str]) -> bool:
-    """Return whether the id or its first parts are in `only`, or `only` is empty."""
+    """Return whether `only` is empty, or contains the id or the first parts of the id."""
     return not only or any(id == each or id.startswith(each + "/") for each in only)
 
 

@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
-The amplification of a step, measured by running it, is derived exactly in `theory.amplification`,
-so limits allow for rounding only. Step sizes of divergence follow from linear stability. J is the
-Jacobian of Euler's equations (13-15 of the thesis).
+The amplification of a step is measured by running the step, and derived exactly in
+`theory.amplification`; limits therefore allow for rounding only. Step sizes of divergence follow
+from linear stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -33,12 +33,13 @@ from pyharness.thesis import collocation
 from pyharness.thesis.equations import omega_rate
 from pyharness.thesis.programs import PROGRAM_REGISTRY
 
-# Degree of a step as a polynomial of omega; each product of stages doubles it.
+# Degree of a step's result as a polynomial of omega; each stage that depends on a previous one
+# doubles the degree.
 _DEGREE = {"two-term": 4, "four-term": 4, "runge-kutta": 16}
 # Roundings along the longest chain of operations in a step, without linear systems: four stages of
 # a rate and a sum, with seven each, and the result.
 _LONGEST = 40.0
-# Largest distance, over omega, of the neighbours from which a derivative is computed.
+# Largest distance, divided by omega, of the neighbours from which a derivative is computed.
 _REACH = 2.0**-2
 _GROWTH_STEPS = 64
 # Bounds of the sum of absolute weights for any collocation points. The weights are largest, 2, -1
@@ -91,7 +92,7 @@ def eigenvalues(scene: Scene) -> Array:
 
 
 def first_step(scene: Scene, listing: Listing) -> Probe:
-    """Return the 3 x 3 derivative of a first step at a steady rotation, measured and derived.
+    """Return the 3 x 3 derivative of the first step at a steady rotation, measured and derived.
 
     A step is a polynomial of known degree, so its derivative from differences over enough
     neighbours is exact except for rounding.
@@ -109,7 +110,7 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 
 
 def later_steps(scene: Scene, listing: Listing) -> Probe:
-    """Return a top's perturbation after all steps of a scene, measured and derived.
+    """Return the perturbation of a spinning top after all steps of a scene, measured and derived.
 
     omega3 is the spin; omega1 and omega2 are the perturbation. C and the torque are zero, so that
     the equations are linear and the perturbation may have any size.
@@ -241,7 +242,8 @@ def _differentiated(
 def _units(scene: Scene, program: str, sizes: Array, moved: float = 1.0) -> Array:
     """Return a bound on the rounding error of omega in a step, in units of 2**-53 rad/s.
 
-    It is proportional to the sum of the absolute terms of the step; `sizes` bounds abs(omega).
+    The bound is proportional to the sum of the magnitudes of the step's terms; `sizes` bounds
+    abs(omega).
     """
     on = Numbers(scene, scene.step_size, sizes=True)
     if program == "runge-kutta":
@@ -280,8 +282,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return two step sizes (s) of divergence, and a bound on their relative difference.
 
-    The body spins about stable axis 3 for `time` (s). The first step is from `smallest_divergent`;
-    with the second, by linear theory, the wobble about axis 3 doubles.
+    The body spins about axis 3, which is stable, for `time` (s). The first step size is from
+    `smallest_divergent`; with the second, the wobble about axis 3 doubles by linear theory.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients
@@ -304,9 +306,10 @@ def divergence(
 
 
 def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: float) -> float:
-    """Return the smallest step size (s) with which a run exceeds twice the largest true omega.
+    """Return the smallest step size (s) with which a run diverges.
 
-    An overflow counts too. Return 0 if it is at most `smallest` (s), and infinity if no run does.
+    In such a run a component of omega exceeds twice its largest true value, or the run ends early.
+    Return 0 if the step size is at most `smallest` (s), and infinity if there is none.
     """
     bounds = 2.0 * np.array(_bounds(scene, time))
 
@@ -328,9 +331,10 @@ def smallest_divergent(scene: Scene, time: float, runner: Runner, smallest: floa
 def _doubling(
     matrix: Amplification, rate: float, time: float, smallest: float, missed: float = 0.0
 ) -> float:
-    """Return the smallest step (s) for which, by theory, a wobble grows 2 exp(`missed`)-fold.
+    """Return the smallest step (s) with which, by theory, a wobble grows by 2 exp(`missed`).
 
-    `missed` allows for a peak between two steps; `rate` is an angular frequency (1/s).
+    `missed` allows for a peak between two steps; `rate` is the angular frequency (1/s) of the
+    wobble.
     """
     wanted, low, high = math.log(2.0) + missed, smallest, time
     for _ in range(200):

@@ -42,7 +42,7 @@ _SOLVED = (
 )  # fmt: skip
 _FEWEST_STEPS, _MOST_STEPS = 4, 2**16
 _HALF_ULP = 2.0**-53
-# A number is rounded when it is read, and again when a method uses it.
+# Two roundings: a number is rounded when it is read, and again when a method uses it.
 _ROUNDING = 2.0 * _HALF_ULP
 _STEP_ASIDE = 2.0**-30
 # `auto` chooses a suitable method, and `closed-form` evaluates a formula.
@@ -88,10 +88,10 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value and limit, in the problem's unit, are for the component with the largest ratio.
+    Value and limit, in the problem's unit, are those of the component with the largest ratio.
     """
     for problem in problems:
-        # Solved together, so that repeating one check gives the same bits.
+        # Values are always solved together, so that repeating one check gives the same bits.
         for side in (1.0, -1.0):
             values = [value for value in problem.values if float(value.time) * side > 0.0]
             values.sort(key=lambda value: abs(float(value.time)))
@@ -120,7 +120,7 @@ def _names(
 
 
 def _without(problem: Problem, name: Name, refusal: str, value: Value) -> Check:
-    """Return the check of a method without result; it may refuse only a user's problem."""
+    """Return the check of a method without result; only a user's problem may be refused."""
     given = problem.path is not None and name.subject not in _MAY_NOT_REFUSE
     if refusal:
         return name.judged(given, f"{REFUSED}{refusal}")
@@ -154,9 +154,9 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the changes of attitude from rounding the scene's numbers, at each time (rad).
+    """Return the changes of attitude (rad), at each time, by rounding the scene's numbers.
 
-    The magnitudes of first-order changes are added. Without a solution, only the rounding of
+    The magnitudes of first-order changes are added. If there is no solution, only the rounding of
     quaternions counts.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
@@ -238,8 +238,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
     The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below rounding: half a unit in the last place per step. The estimate is twice the last change,
-    divided by 2**order - 1. Return None if even the longest step is singular.
+    below rounding error, half a unit in the last place for each step. The estimate is twice the
+    last change, divided by 2**order - 1. Return None if the matrix is singular even for the longest
+    step.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -274,7 +275,7 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
     factor, (omega, error), judged = UNITS[unit], result, []
     for axis, figure in enumerate(value.omega):
         if figure is not None:
-            # The print may have more digits than binary64.
+            # The published number may have more digits than binary64.
             distance = abs(float(Decimal(float(omega[axis]) / factor) - figure.value))
             limit = figure.accuracy + float(error + rounding[axis]) / factor
             judged.append((distance, limit, f"w{axis + 1}, {unit}"))
@@ -289,7 +290,7 @@ def _scale(scene: Scene, omega: Array) -> float:
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return the change of omega from rounding a scene's numbers (rad/s), by printed time.
+    """Return the change of omega (rad/s) by rounding a scene's numbers, by printed time.
 
     It is zero at times without a solution; each method's check reports why.
     """
@@ -308,7 +309,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the change of omega from rounding the scene's numbers (rad/s), to first order."""
+    """Return the change of omega (rad/s) by rounding the scene's numbers, to first order."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

@@ -1,6 +1,6 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file has a scene, its source, and the printed digits, from which the accuracy follows.
+A file has a scene, its source, and the printed digits, which determine the accuracy.
 """
 
 import math

@@ -1,7 +1,8 @@
 """The golden record: the trajectories of this version, as exact text.
 
-Each program or method has a file. An entry describes one trajectory: the command that prints it,
-how the run ended, a digest of all rows, and the first, tenth and last row as hexadecimal floats.
+Each program or method has a file. An entry of the file describes one trajectory: the command that
+prints it, how the run ended, a digest of all rows, and the first, tenth and last row as hexadecimal
+floats.
 """
 
 import hashlib
@@ -91,7 +92,7 @@ def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
     Methods with a tolerance must agree within twice the tolerance, because processors and compilers
-    round differently. All others must agree bit for bit or, if another mathematical library
+    round differently. All other methods must agree bit for bit or, if another mathematical library
     computes the torque's waves, within the amplified rounding errors.
     """
     if not chosen.record.is_dir():

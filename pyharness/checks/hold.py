@@ -2,7 +2,7 @@
 
 Errors of the programs of the thesis are reported without a bound. The `flow` of a scene is its
 error amplification and rounding. Methods without a tolerance, `auto` and `quick` run as prepared
-solvers, whose refusals are returned; other methods raise InputError.
+solvers, which return that they refuse a scene; other methods raise InputError.
 """
 
 import math
@@ -55,7 +55,7 @@ STEPS = Basis(
 """Basis of limits from the promised errors of the steps."""
 
 
-# Run at two tolerances: a middling one, and one near the finest, where rounding shows.
+# Methods that run at two tolerances: a middling one, and one near the finest, where rounding shows.
 OURS = ("closed-form", "taylor", "gauss-2", "gauss-4", "gauss-8")
 ALL = ("closed-form", "auto", "taylor", "quick", *GAUSS, *SCIPY_METHODS, *FIXED_STEP)
 _SERIES = ("taylor", "auto", "prepared-auto")
@@ -125,7 +125,7 @@ def check_methods(
     and the error of the true solution. For a fixed step without torque, a bound from the order
     replaces the tolerance. There is no limit if neither is known, or if the sum leaves fewer than
     two digits of omega. Without torque, energy and momentum always have a limit, because the flow
-    does not amplify their errors. Refusing a scene that it must solve is a method's failure.
+    does not amplify their errors. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -155,8 +155,8 @@ def _steps(scene: Scene, time: float) -> int:
 def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse a scene.
 
-    `closed-form` may without a closed form, `quick` always, and series if the phase of a torque's
-    wave exceeds 1e8 rad.
+    `closed-form` may refuse a scene without a closed form, `quick` any scene, and a series method a
+    scene in which the phase of a torque's wave exceeds 1e8 rad.
     """
     method, scene = tried.method, tried.scene
     if method == "closed-form":
@@ -169,7 +169,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error, relative to the largest omega.
 
-    It is None without a bound on the errors of steps, and infinite if it leaves fewer than two
+    It is None if there is no bound on the errors of steps, and infinite if it leaves fewer than two
     digits of omega.
     """
     made = promised_sum(tried, truth)
@@ -207,7 +207,7 @@ def _judged(truth: Truth, tolerance: float | None, name: Name) -> Iterator[Check
         made = promised_sum(tried, truth)
         lost = truth.flow.unamplified + _roundings(tried, truth) * ROUNDING
         if made is None:
-            # Each step rounds omega, its sums, and the last iteration.
+            # Each step rounds omega, the sums in the step, and the last iteration.
             lost += 4.0 * ROUNDING * _steps(scene, truth.end)
         total = (made or 0.0) + lost
         # `conserved` returns at most the error of omega.

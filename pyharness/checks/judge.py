@@ -1,6 +1,7 @@
 """Comparison of a method's result with the true solution, and limits of the error.
 
-Errors and limits are relative to the largest omega, or angles (rad).
+Errors and limits of omega are relative to its largest component; those of the attitude are angles
+(rad).
 """
 
 import math
@@ -24,7 +25,8 @@ from pyharness.truth.reference import Reference, reference
 
 # Relative error above which the linearised flow does not predict the error.
 LINEAR = 0.01
-# Largest difference of two vectors, over the largest omega; a larger limit is no restriction.
+# Largest possible difference of two vectors, divided by the largest omega; a larger limit restricts
+# nothing.
 MOST = 2.0
 
 
@@ -108,7 +110,8 @@ class Truth:
     data : float
         Change of omega by the rounding of A, B and C, divided by the largest abs(omega).
     exact : bool
-        Whether it is a torque-free closed form: `data` is known, energy and momentum are conserved.
+        Whether the solution is a torque-free closed form: `data` is known, and energy and momentum
+        are conserved.
     scene, reference, effort : Scene, Reference and float, or None
         The scene, its reference solution and the factor on the work limit, if a reference was used.
     """
@@ -171,10 +174,11 @@ def reference_truth(
 ) -> Truth:
     """Return the reference solution of a scene at all `times` (s).
 
-    Raise InputError if it does not reach them.
+    Raise InputError if it does not reach all of them.
     """
     flow = flow or conditioning_at(scene, times)
-    # The steps' errors of 1e-22 are too large for an amplification above 1e3.
+    # The usual reference has errors of 1e-22 in its steps, too large for an amplification above
+    # 1e3.
     known = reference(scene, times, precise=flow.amplification > 1e3, effort=effort)
     if len(known.time) < len(times):
         raise InputError("the solution grows without bound")
@@ -206,7 +210,7 @@ def lively(growth: float) -> float:
 
 
 def linear(limit: float) -> float:
-    """Return the limit, or infinity above `LINEAR`, where the linearised equations fail."""
+    """Return `limit`, or infinity if it is above `LINEAR`, where the linearised equations fail."""
     return limit if limit <= LINEAR else math.inf
 
 
@@ -242,10 +246,10 @@ AMPLIFIED = Policy(_granting(lambda growth: growth), FLOW)
 
 
 def judge(name: Name, tried: MethodRun, truth: Truth, policy: Policy) -> Check:
-    """Return the check that a method's error is within its limit, or its refusal permitted.
+    """Return the check that a method's error is within its limit, or that its refusal is permitted.
 
-    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene
-    without one.
+    Without a limit, a finite error is only reported. `closed-form` fails if it solves a scene that
+    has no closed form.
     """
     answer = tried.answer
     if why := answer.refusal:

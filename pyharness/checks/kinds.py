@@ -53,7 +53,7 @@ KINDS: dict[str, Callable[[Selection], Attempts]] = {
     # Against trajectories of an earlier run.
     "golden": golden,
 }
-# They read files that the user may specify.
+# These kinds read files that the user may specify.
 _OF_THE_USER = ("external", "golden")
 
 

@@ -47,7 +47,7 @@ from pyharness.thesis.programs import PROGRAM_REGISTRY
 from pyharness.truth.reference import Reference, reference
 
 START: Quaternion = (0.5, -0.1, 0.7, 0.5)
-# Times (s): one long after the end of the cases, and those for prepared solvers.
+# Times (s): one that is long after the end of the cases, and those for prepared solvers.
 _LATER = 3.0
 _ENDS = (1.0, 3.0, -1.0)
 # Methods with a tolerance, and those that propagate the attitude. The torques of the cases are not
@@ -69,7 +69,7 @@ def methods(chosen: Selection) -> Iterator[Attempt]:
 def prepared(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of prepared solvers, at positive and negative times.
 
-    With the scene's step size, they must agree bit for bit with the unprepared method.
+    With the scene's step size, prepared solvers must agree bit for bit with the unprepared method.
     """
     for case in cases(chosen):
         scene = case_scene(case)
@@ -124,7 +124,7 @@ def _prepared(
 def run_of_solve(method: str, tolerance: float, scene: Scene, times: Sequence[float]) -> MethodRun:
     """Return a deferred run by `solve` at all `times` (s), with a tolerance that SciPy can meet."""
     if method in SCIPY_METHODS and scene.attitude:
-        # SciPy's methods can't meet a smaller one over a long time.
+        # SciPy's methods can't meet a smaller tolerance over a long time.
         tolerance = max(tolerance, 1.01 * finest(method, scene, times[-1]))
     return by_rows(method, tolerance, scene, times)
 
@@ -152,9 +152,10 @@ def _same_steps(scene: Scene, name: Name) -> Check:
     return name.bounded(ulps(found, np.ascontiguousarray(wanted)), 0.0, BITS)
 
 
-# A method of solve_ivp serves as true solution, at its finest tolerance.
+# The method of solve_ivp that serves as true solution, at its finest tolerance.
 _IVP = "dop853"
-# Successive halvings that must show the order, and the accepted deficit in the last; .006 occurs.
+# Number of successive halvings that must show the order, and the accepted deficit of the last
+# order; .006 occurs.
 _PAIRS = 4
 _ORDER_SLACK = 0.2
 _SLACK = Basis(
@@ -191,7 +192,7 @@ def _of_velocity(scene: Scene, truth: Callable[..., Reference], name: Name) -> C
 
     def velocity(scene: Scene) -> Array:
         found = run(scene).velocity
-        # Without velocity the order is undecided, as without rows.
+        # If the reference has no velocity, the order is undecided, as if there were no rows.
         return np.empty((0, 3)) if found is None else found
 
     due, known = PROGRAM_REGISTRY[name.subject].order, truth(velocity=True)

@@ -40,8 +40,8 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run to request from a port.
 
-    `of` is the name of its check; with `options`, ``verify --port`` requests this run alone.
-    `lipschitz` is the constant of the stop test (1/s).
+    `of` is the name of the check of this run. With `options`, ``verify --port`` requests this run
+    alone. `lipschitz` is the constant of the stop test (1/s).
     """
 
     name: str
@@ -67,8 +67,8 @@ class Cell:
 class PortCheck(Check):
     """The comparison of a port with the Python version in one run.
 
-    `difference` has the first step that differs, with the value of each variable; `seconds` is the
-    time until the port's answer.
+    `difference` describes the first step that differs, with the value of each variable. `seconds`
+    is the time (s) until the port's answer.
     """
 
     seconds: float | None = None
@@ -90,7 +90,8 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has leading parts of names, and is empty for all; its numbers may exceed `draws`.
+    `cells` has leading parts of the names to return, and is empty for all. Its numbers may exceed
+    `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -108,8 +109,8 @@ def random_cells(
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
     """Yield checks that a port, started by `command`, returns the Python version's bits.
 
-    An invalid answer fails and ends the comparison. `patience` is the longest wait (s) for an
-    answer. Raise InputError if `command` is empty.
+    An invalid answer is a failed check and ends the comparison. `patience` is the longest wait (s)
+    for an answer. Raise InputError if `command` is empty.
     """
     name, again = Name("port", "start"), replay_command(command)
     try:
@@ -170,7 +171,7 @@ def differences(twin: Trajectory, answer: Answer) -> list[str]:
 
 
 def _difference(wanted: Array, given: Array) -> dict[str, Any] | None:
-    """Return the values in the first step that differs, in hexadecimal: JSON has no inf and nan."""
+    """Return the values in the first step that differs, in hexadecimal; JSON has no inf and nan."""
     for step, (due, row) in enumerate(zip(wanted, given, strict=False), 1):
         if ulps(due, row):
             values = []

@@ -1,6 +1,7 @@
 """The process of a port or an integrator, which answers requests line by line.
 
-It must answer within a time limit. It is ended together with all processes that it started.
+The process must answer within a time limit. It is ended together with all processes that it
+started.
 """
 
 import contextlib
@@ -56,8 +57,8 @@ def _processes_with(mark: str) -> list[int]:
     """Return the live processes with `mark` in their environment; none without /proc."""
     found = []
     for folder in Path("/proc").glob("[1-9]*"):
-        # The process may have ended, or belong to another user. An ended process that waits for its
-        # parent has no environment.
+        # The process found may have ended, or belong to another user. An ended process that waits
+        # for its parent has no environment.
         with contextlib.suppress(OSError):
             if mark.encode() in (folder / "environ").read_bytes().split(b"\0"):
                 found.append(int(folder.name))
@@ -65,7 +66,7 @@ def _processes_with(mark: str) -> list[int]:
 
 
 class PortProcess:
-    """The process of a port; as a context manager, it raises PortError if it can't start."""
+    """The process of a port, as a context manager; entering raises PortError if it can't start."""
 
     def __init__(self, command: str, patience: float = PATIENCE, option: str = "--port") -> None:
         """Store the command, the longest wait (s), and the option that named the command."""
@@ -119,7 +120,7 @@ class PortProcess:
     def ask(self, line: bytes) -> bytes:
         """Send the request `line` and return the answer, both without a line feed.
 
-        Raise PortError if the answer is late, too long, or more than a line.
+        Raise PortError if the answer is late, too long, or longer than one line.
         """
         end = time.monotonic() + self._patience
         rest = line + b"\n"

@@ -1,9 +1,9 @@
 """Checks of methods in scenes drawn from a seed, against an independent true solution.
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
-`solve` or a prepared solver, with one method. Its tolerance limits the error of omega, relative to
+`solve` or a prepared solver, with one method. The tolerance limits the error of omega, relative to
 the largest omega until the last time, or the attitude error (rad). With the error amplification K,
-rounding alone causes errors of 2e-15 K.
+rounding alone causes relative errors of 2e-15 K.
 
 Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
 reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
@@ -47,13 +47,14 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import WITH_ALL_ROWS
 from pyharness.truth.integer_series import integer_series
 
-# A pair of draws is a plain scene and one of a kind in `NASTY`. Because the true solution takes
-# longer, methods run in one of 4 pairs; those in Python or decimal arithmetic in one of 60.
-# Attitudes are in one of 20 draws; one of 20 has a torque that depends on the state, one of 80 also
-# runs the methods in Python.
+# A pair of draws has a plain scene and a scene of a kind in `NASTY`. Because the true solution
+# takes long, methods run in only one of 4 pairs, methods in Python or decimal arithmetic in one of
+# 60. Attitudes are checked in one of 20 draws. One of 20 draws has a torque that depends on the
+# state; one of 80 draws also runs the methods in Python under such a torque.
 _EVERY, _EVERY_SLOW, _EVERY_ATTITUDE = 4, 60, 20
 _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
-# Factors on the work limit of the reference, for an attitude and for such a torque.
+# Factors on the work limit of the reference: for an attitude, and for a torque that depends on the
+# state.
 _EFFORT, _EFFORT_TORQUE = 0.05, 0.2
 ROUNDING = 2e-15  # relative, for an error amplification of 1
 CAMPAIGN = Basis(
@@ -63,7 +64,7 @@ CAMPAIGN = Basis(
 )
 """Basis of the limits in random scenes."""
 _CALM = 10.0  # error amplification below which a series has no reason to refuse
-# These scenes may diverge, or be too fast for any true solution and any series.
+# Scenes of these kinds may diverge, or be too fast for any true solution and any series.
 _MAY_REFUSE = ("extreme", "coefficients", "violent torque")
 # Below this tolerance, methods in Python or decimal arithmetic take too long.
 _FINE = 1e-9
@@ -90,9 +91,9 @@ def truth_of(drawn: Draw) -> Truth:
 def may_refuse(tried: MethodRun, truth: Truth, why: str) -> bool:
     """Return whether a method may refuse its run `tried` with the message `why`.
 
-    `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64. The
-    others may for the kinds in `_MAY_REFUSE` and if the amplification exceeds `_CALM`; SciPy's also
-    for too fine a tolerance.
+    `auto` may never refuse, `quick` always, and a closed form only near the limits of binary64.
+    Other methods may refuse the kinds of scenes in `_MAY_REFUSE`, and scenes whose error
+    amplification exceeds `_CALM`; SciPy's methods also too fine a tolerance.
     """
     method, kind = tried.method, tried.scene.name
     if method == "auto":
@@ -178,7 +179,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return the true solution, or None for a motion that diverges, or is too fast or long."""
+    """Return the true solution, or None for a motion that diverges, or is too fast or too long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:
@@ -210,7 +211,7 @@ def _prepared(name: str, drawn: Draw) -> MethodRun:
 
     def ask() -> Answer:
         end = prepared_candidate(name, tolerance, primed=True).end(drawn.scene, drawn.time)
-        # An end before the last time counts as a refusal.
+        # An integration that ends before the last time counts as a refusal.
         return of_end(name, end) if end.has_result else Answer(refusal=f"{name}: {end.ended}")
 
     return MethodRun(name, tolerance, drawn.scene, ask)

@@ -14,7 +14,7 @@ from pyharness.truth.bounded import ESTIMATED, PROVED, joined
 
 _MOST_FAILURES = 50
 _MOST_ON_PAGE = 10
-_FEW = 10  # up to so many, passed checks are shown too
+_FEW = 10  # if there are at most so many checks, passed ones are shown too
 _GROUPS = (
     *words("checks"), Column("made"), Column("failed"), Column("worst/limit", short),
     *words("basis"),
@@ -115,11 +115,11 @@ def _groups(checks: Sequence[Check], depth: int) -> Table:
 
 
 def listed_singly(checks: Sequence[Check]) -> list[str]:
-    """Return lines on failed checks, with the commands that repeat them; on all checks if few."""
+    """Return lines on failed checks, or on all if few, with the commands that repeat them."""
     failed = [check for check in checks if not check.passed]
     lines = []
     for check in failed[:_MOST_FAILURES]:
-        # Not shortened, so that the command can be copied.
+        # The command is not shortened, so that it can be copied.
         lines += [f"FAILED {check.id}{_format_outcome(check, ' > ')}", Line(f"  {check.replay}")]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"... and {len(failed) - _MOST_FAILURES} more; --format json tells all")

@@ -1,6 +1,7 @@
 """Stress trials of a user's scene, with any torque that can be recorded.
 
-They compare errors with the reference, and apply transformations that must not change the motion.
+The trials compare results with the reference, and apply transformations that must not change the
+motion.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,7 +38,7 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import reference
 
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
-# Run also at their finest tolerance, which takes methods in Python too long.
+# Methods that run also at their finest tolerance; methods in Python would take too long.
 _FINE = ("auto", "taylor", "closed-form")
 _PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
@@ -49,7 +50,7 @@ State = tuple[Array, Array | None]
 
 
 def scene_trials(scene: Scene, options: str) -> dict[str, Trial]:
-    """Return the trials of a scene by name; the command that repeats them has the `options`.
+    """Return the trials of a scene by name; `options` end the command that repeats them.
 
     Raise InputError if the torque is opaque, or needs an attitude that the scene does not have.
     """
@@ -203,7 +204,7 @@ def _back(scene: Scene, method: str, tolerance: float) -> tuple[State, State, fl
     start = _from(scene, there, time)
     again = _end(start, -time, method, tolerance)
     back = conditioning_at(start, [-time])
-    # The forward run's error is an initial error of the backward run.
+    # The error of the forward run is an initial error of the backward run.
     limit = conditioning_at(scene, [time]).limit(tolerance) * back.amplification
     limit += back.limit(tolerance)
     attitude = None if scene.attitude is None else np.array(scene.attitude)

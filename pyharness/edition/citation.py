@@ -168,7 +168,7 @@ class Part(NamedTuple):
 
 
 def described(name: str, content: bytes = b"", /, **values: Any) -> Part:
-    """Return the file that the table `name` of `package.toml` describes, with `values` in it."""
+    """Return the file that table `name` of `package.toml` describes; `values` complete the text."""
     texts = (text.format(**values) for text in _descriptions()[name].values())
     path, title, description, media_type = texts
     return Part(path, title, description, media_type, content)

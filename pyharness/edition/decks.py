@@ -120,7 +120,7 @@ def sheets(program: str) -> list[Sheet]:
 
 
 def notes(program: str) -> list[Note]:
-    """Return a program's apparatus entries: defects by what they change, then by kind and card."""
+    """Return a program's apparatus entries: defects by size of effect, then by kind and card."""
     having = [each for each in entries() if each["cards"].get(program)]
 
     def place(entry: dict[str, Any]) -> tuple[float, ...]:
@@ -133,7 +133,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return the largest changes of the errors of omega and velocity if an entry is corrected."""
+    """Return by how much errors of omega and velocity change at most if an entry is corrected."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]

@@ -104,7 +104,7 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return the HTML texts of ``data/account.toml`` and the effects of single defects, by id."""
+    """Return texts in HTML by id: those of ``data/account.toml`` and of single defects' effects."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}

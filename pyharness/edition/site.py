@@ -50,7 +50,7 @@ MENU = tomllib.loads(Path(__file__).with_name("menu.toml").read_text(encoding="u
 
 
 class Found(NamedTuple):
-    """A place in a page that the search finds; `kind` is as in ``claim``."""
+    """A place in a page that the search finds, of a `kind` such as ``claim`` or ``card``."""
 
     href: str
     title: str

@@ -138,7 +138,7 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return the run of a Python port, corrected or as printed without the defects in `without`."""
+    """Return the run of a Python port, corrected or as printed but without defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
@@ -212,7 +212,7 @@ def _fractions(program: str) -> list[float]:
 
 
 def _points_chart(step_size: float) -> Chart:
-    """Return the chart of the two-term program's points after the beginning of each step."""
+    """Return the chart of the two-term program's points: their times after the step begins."""
     axes = ("step", "time after the beginning of the step, s")
     found = _chart("points", axes, (0, 100), (-3, 0), is_log=True)
     steps = range(1, 101)

@@ -35,9 +35,9 @@ class Accuracy:
 
 
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
-    """Return the errors of a trajectory against `truth`, up to the end of the shorter one.
+    """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
 
-    Errors are infinite without rows.
+    Errors are taken up to the end of the shorter one, and infinite if there are no rows.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -118,7 +118,7 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 def ulps(x: Array | float, y: Array | float) -> float:
     """Return the largest distance, in floats, between corresponding elements of `x` and `y`.
 
-    Two NaNs are at distance 0, a NaN and a number at infinite distance.
+    The distance of two NaNs is 0, that of a NaN and a number infinite.
     """
     both_nan = np.isnan(x) & np.isnan(y)
     one_nan = np.isnan(x) ^ np.isnan(y)
@@ -129,6 +129,6 @@ def ulps(x: Array | float, y: Array | float) -> float:
 
 
 def _ordinal(x: Array | float) -> NDArray[np.uint64]:
-    """Return the rank of each float among all floats; -0 is just below +0."""
+    """Return the rank of each float in the order of all floats; -0 is just below +0."""
     bits = np.ascontiguousarray(x).view(np.uint64)
     return np.where(bits >> 63, ~bits, bits | np.uint64(1 << 63))

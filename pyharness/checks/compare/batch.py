@@ -1,4 +1,4 @@
-"""Batches of scenes; arrays hold the quantities in which they differ."""
+"""Batches of scenes; arrays hold the quantities in which the scenes differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,16 +26,17 @@ from pyharness.thesis.many import ProgramEnsemble, run_many
 
 # Arrays for a program, but not for a method.
 OF_PROGRAMS = ("step_size", "lipschitz")
-_EFFORT = 1e9  # in effect none: the caller has requested the whole batch
+_EFFORT = 1e9  # so large that there is no limit: the caller has requested the whole batch
 
 
 @dataclass(frozen=True)
 class Solver:
-    """The method, or the program of the thesis, that solves a batch; the other is None.
+    """The solver of a batch: a method or a program of the thesis; the other field is None.
 
-    `t_end` (s) is by default the step size times the number of steps. The rest is for programs:
-    `listing` selects the active defects, `reading` the interpretation of doubtful cards.
-    `lipschitz` is the limit (1/s) of the stop test, and `may_stop` whether it may end a run.
+    `t_end` (s) is by default the step size times the number of steps. The fields after it are for
+    programs: `listing` selects the active defects, `reading` the interpretation of doubtful cards.
+    `lipschitz` is the limit (1/s) of the stop test; `may_stop` tells whether the test may end a
+    run.
     """
 
     method: str | None = "auto"
@@ -55,9 +56,10 @@ class Batch:
     Functions that check a claim of the thesis may read `omega0`, `omega`, `status`, `n_rows` and
     `stop_variable`, and call `rows` and `by_method`.
 
-    `scene` has the quantities that all scenes share. `arrays` has the others, with a row per scene;
-    its keys are arguments of `solve_many` and `run_many`, always with `omega`. `listing` is None
-    for a method, `t_end` (s) has shape (n,), and `attitude` is for methods only.
+    `scene` has the quantities that all scenes share. `arrays` has the other quantities, with a row
+    for each scene; its keys are arguments of `solve_many` and `run_many`, and include `omega`.
+    `listing` is None for a method. `t_end` (s) has shape (n,). `attitude`, for methods only, tells
+    whether attitudes are computed.
     """
 
     scene: Scene
@@ -66,7 +68,7 @@ class Batch:
     t_end: Array
     arrays: Mapping[str, Array]
     attitude: bool = False
-    # By number of samples.
+    # Results by number of samples.
     _rows: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
     _found: dict[int, list[Ensemble]] = field(default_factory=dict, init=False, repr=False)
 
@@ -107,7 +109,7 @@ class Batch:
 
     @property
     def stop_variable(self) -> NDArray[np.int8]:
-        """Return the number in STOP_VARIABLES, from 1, of each run's stopping variable, or 0."""
+        """Return the variable that stopped each run, by its number in STOP_VARIABLES, or 0."""
         return self._program.stop_variable
 
     def sample_steps(self, samples: int) -> list[int]:
@@ -116,10 +118,10 @@ class Batch:
         return [max(1, round(steps * (i + 1) / samples)) for i in range(samples)]
 
     def rows(self, samples: int) -> Array:
-        """Return omega at the ends of `samples` equal parts, shape (n, samples, 3), rad/s.
+        """Return omega (rad/s) at the ends of `samples` equal parts, shape (n, samples, 3).
 
-        A method starts from time 0 for each of them, so that errors do not accumulate. A program's
-        ends are `sample_steps`.
+        A method starts from time 0 for each part, so that errors do not accumulate. For a program,
+        the ends are the steps of `sample_steps`.
         """
         if not self.is_program:
             return np.stack([each.omega for each in self._samples(samples)], axis=1)
@@ -130,7 +132,7 @@ class Batch:
     def attitudes(self, samples: int) -> Array:
         """Return the attitudes at the ends of `samples` equal parts, shape (n, samples, 4).
 
-        They are quaternions, scalar first, from the body's axes to its axes at time 0.
+        They are quaternions, scalar first, from the body's axes to the body's axes at time 0.
         """
         ends = [each.attitude for each in self._samples(samples) if each.attitude is not None]
         found = np.stack(ends, axis=1)
@@ -150,14 +152,14 @@ class Batch:
         return self._solve(method, tolerance, self.t_end * part).omega
 
     def from_start(self, omega0: Array) -> "Batch":
-        """Return this batch with the initial `omega0` (rad/s), without results."""
+        """Return this batch, without results, with another initial omega (rad/s)."""
         return replace(self, arrays={**self.arrays, "omega": omega0})
 
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        Scenes run one by one, without the codes IER, if they differ in `torque_rate` or the program
-        refuses one. Only refused ones have the status REFUSED.
+        Scenes run one by one, without the codes IER, if they differ in `torque_rate`, or if the
+        program refuses one of them. Only refused scenes have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -198,7 +200,8 @@ class Batch:
         method = self.solver.method
         assert method is not None
         tolerance = requested_tolerance(method, self.solver.tolerance)
-        # One serves all scenes, because `attitudes` multiplies the result by `first_attitudes`.
+        # One initial attitude serves all scenes, because `attitudes` multiplies the result by
+        # `first_attitudes`.
         has_one = self.attitude and not self.scene.torque.needs_attitude
         more = {"attitude": IDENTITY} if has_one else {}
         return self._solve(method, tolerance, t_end, **more)

@@ -60,8 +60,8 @@ class Candidate:
     """A method with its tolerance, a prepared solver, or a program."""
 
     name: str
-    # Raises InputError if the candidate can't solve the scene, or has no result at the time (s),
-    # like a program whose steps end at other times.
+    # Returns an integration of the scene to the time (s). Raises InputError if the candidate can't
+    # solve the scene, or has no result at the time, as a program whose steps end at other times.
     ready: Callable[[Scene, float], Ready]
     # Returns the trajectory at the times of the scene's steps or, for a method, at those in an
     # optional second argument. A prepared solver has no rows and raises InputError.
@@ -96,8 +96,8 @@ def prepared_candidate(
 ) -> Candidate:
     """Return a candidate that calls a solver made by `prepare` for the method `name`.
 
-    If `primed`, the solver is first called with another omega, which must have no effect. Methods
-    with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
+    If `primed`, the solver is first called with another omega, which must not affect the result.
+    Methods with a fixed step, and Gauss collocation without a tolerance, use the scene's step.
     """
     make: Any = partial(prepare, attitude=attitude, compiled=compiled)
     read = _turned if attitude else _answered
@@ -159,7 +159,7 @@ def copied_result(values: Iterable[float]) -> Array:
 
 
 def not_finite(why: str = "overflow") -> End:
-    """Return an `End` with omega NaN."""
+    """Return an `End` without result: omega is NaN, `why` the ending."""
     return End(np.full(3, math.nan), why)
 
 

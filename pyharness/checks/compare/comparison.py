@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
-Differences between Fortran and Python are in units in the last place. Errors (rad/s) have no
-meaning below the error of the reference.
+Differences between Fortran and Python are in units in the last place. Errors (rad/s) below the
+error of the reference have no meaning.
 """
 
 import itertools
@@ -65,7 +65,7 @@ def compare_programs(
     scene : Scene
         The body, the initial condition, the torque and the steps.
     listings : sequence of Listing, optional
-        The versions of programs to run; by default all three, original and corrected.
+        The versions of programs to run; by default all three programs, original and corrected.
     lipschitz : float
         The constant of the Runge-Kutta program's stop test (1/s).
     may_stop : bool
@@ -76,18 +76,19 @@ def compare_programs(
     effort : float
         Factor on the work limits of the programs, the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too. The initial attitude is the scene's, by default the
-        identity. A program's attitude is integrated from its rows of omega by a method of order 4.
+        Whether attitudes are compared too. The initial attitude is that of the scene, by default
+        the identity. A program's attitude is integrated from its omega by a method of order 4.
     word : str
-        The arithmetic of the programs, one of `pyharness.thesis.programs.WORD_NAMES`. Without
-        compiled programs for it, only the Python ports run. Orders are measured in binary64 only.
+        The floating-point arithmetic of the programs, one of
+        `pyharness.thesis.programs.WORD_NAMES`. If there are no compiled programs for it, only the
+        Python ports run. Orders are measured in binary64 only.
     methods : bool
-        Whether SciPy's methods run; `unexpected` and `is_sensitive` are the same without.
+        Whether SciPy's methods run; `unexpected` and `is_sensitive` do not depend on it.
 
     Returns
     -------
     Comparison
-        All results; its property `unexpected` is empty if they are as expected.
+        All results; its property `unexpected` is empty if all results are as expected.
 
     Raises
     ------
@@ -146,8 +147,9 @@ def listings_for(
 ) -> list[Listing]:
     """Return the listings to compare: original, selected and corrected, for each program.
 
-    The selection applies `fix` and `keep` to `base`. If `base` alone is specified, it is the only
-    listing. Raise InputError for a name that none of `programs` has.
+    The selected listing is `base`, changed by `fix`, `keep`, `readings` and `conjectures`. If
+    `base` alone is specified, it is the only listing. Raise InputError for a name that none of
+    `programs` has.
     """
     chosen = list(programs)
     assumed = [name for name in conjectures or () if name != "none"]
@@ -187,8 +189,8 @@ def compare_methods(
     Parameters
     ----------
     scene : Scene
-        The scene; times are the ends of its steps. A torque may depend on omega or attitude if it
-        can be recorded.
+        The scene; methods are compared at the ends of its steps. A torque may depend on omega or
+        attitude if it can be recorded.
     methods : sequence of str
         Names in `pyharness.engine.registry.METHODS`; by default `auto` and SciPy's methods.
     tolerance : float, optional
@@ -197,7 +199,7 @@ def compare_methods(
     effort : float
         Factor on the work limits of the methods and the reference.
     attitude : bool
-        Whether attitudes are compared too; always if the torque depends on the attitude.
+        Whether attitudes are compared too. They always are if the torque depends on the attitude.
 
     Returns
     -------

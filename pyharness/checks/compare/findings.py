@@ -17,7 +17,7 @@ from pyharness.thesis.programs import BINARY64
 from pyharness.truth.bounded import ErrorBound
 from pyharness.truth.reference import Reference
 
-# Relative error that rounding causes in any method, divided by the error amplification.
+# Relative error that rounding causes in any method for an error amplification of 1.
 _ROUNDING = 4e-15
 
 

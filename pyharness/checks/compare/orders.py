@@ -21,22 +21,22 @@ from pyharness.truth.reference import Reference
 
 # Accepted deficit of a measured order.
 ORDER_SLACK = 0.5
-# Conditions for a measurement. Halving the step changes the result by less than `_SMALL_CHANGE`,
-# relative to the largest value. In a step the phases of the body's motion and of the torque change
-# by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of the torque also seem to
-# converge.
+# Conditions for a measurement. Halving the step must change the result by less than
+# `_SMALL_CHANGE`, relative to the largest value. In a step the phases of the body's motion and of
+# the torque may change by at most `_SMALL_ANGLE` (rad), because steps that skip whole periods of
+# the torque also seem to converge.
 _SMALL_CHANGE = 1e-3
 _SMALL_ANGLE = 0.5
-# The step is halved until so many steps are taken, and at least eight times.
+# The step is halved at least eight times, and until a run takes so many steps.
 _MOST_STEPS = 2**18
 _HALVINGS = 8
-# A program that does not converge is incorrect if a textbook method of its order does, with fewer
-# steps by this factor.
+# A program that does not converge is incorrect if a textbook method of the same order converges,
+# even with fewer steps by this factor.
 _MARGIN = 4
 _TEXTBOOK = {2: "improved-euler", 4: "rk4"}
 # Assumed number of rounding errors of omega in a step.
 _ROUNDINGS = 8.0
-# With a larger condition number, LEQT1F may report a matrix as singular.
+# LEQT1F may report a matrix with a larger condition number as singular.
 _CONDITION = 1e15
 
 State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensitive", "unbounded"]
@@ -85,7 +85,7 @@ def measured_order(
     """Measure the order with which omega of a compiled program converges to `truth`.
 
     The state is `sensitive` if the error may be amplified rounding. A program that does not
-    converge has the state `misses` if a textbook method of the same order does.
+    converge has the state `misses` if a textbook method of the same order converges.
     """
 
     def omega(finer: Scene) -> Array:
@@ -120,9 +120,9 @@ def order_of(
     """Measure the order of a numerical solution by halving the step size.
 
     `solution` returns `quantity` after each step, shape (n, 3), with fewer rows after an overflow.
-    The measurement ends when `pairs` consecutive halvings all have an order of at least `due` - 0.5
-    or all a smaller one, or when the error is only rounding. A run has at most `most_steps` steps,
-    by default 2**18 or, if more, those of eight halvings.
+    The measurement ends when the orders from `pairs` consecutive halvings are all at least `due` -
+    0.5 or all smaller, or when the error is only rounding. A run has at most `most_steps` steps, by
+    default 2**18, or more if eight halvings require it.
     """
     n = len(truth.time)
     if n < scene.steps:

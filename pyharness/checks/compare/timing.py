@@ -27,9 +27,9 @@ def seconds(
 ) -> list[float]:
     """Return the time of one call of each function in `runs` (s), measured in several rounds.
 
-    In each round a function is called for about `length` seconds. The first call only limits the
-    rounds: to three from `slow` seconds on, to one from five times `slow`. `statistic` combines the
-    rounds.
+    In each round a function is called for about `length` seconds. The first call is not counted; if
+    it takes at least `slow` seconds, there are only three rounds, with five times `slow` only one.
+    `statistic` combines the rounds.
     """
     clocks = [perf_counter] * len(runs) if clocks is None else clocks
     timed = list(zip(runs, clocks, strict=True))
@@ -66,7 +66,7 @@ def batch_seconds(run: Run, calls: int = 1, clock: Clock = perf_counter) -> floa
 def ended_after(limit: float) -> Iterator[None]:
     """Raise RuntimeError if a ``with`` block takes longer than `limit` (s).
 
-    It interrupts Python code in the main thread, where signals arrive.
+    This interrupts Python code in the main thread, where signals arrive.
     """
 
     def end(*_: object) -> None:

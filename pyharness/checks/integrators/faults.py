@@ -1,7 +1,7 @@
 """Known faults of integrators, each with the motion that a faulty integrator computes.
 
-That motion is our solution of another scene, or in other conventions. An integrator has the fault
-if it converges to this motion.
+This motion is our solution of another scene, or our solution in other conventions. An integrator
+has the fault if it converges to this motion.
 """
 
 import math
@@ -34,9 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    A faulty integrator computes the motion of another `scene` (None if the fault has no effect), at
-    other `times` (s; the second argument is the step size), and changes its states; `state` also
-    takes the right scene. If `of_step`, its states approach the true ones as the step decreases.
+    A faulty integrator computes the motion of another `scene` (None if the fault has no effect) at
+    other `times` (s; the second argument is the step size), and then changes the states by `state`,
+    whose second argument is the right scene. If `of_step`, the faulty states approach the true ones
+    as the step decreases.
     """
 
     name: str
@@ -155,7 +156,7 @@ def _with_fast_torque(scene: Scene) -> Scene:
 
 
 def _of_thesis(half: State, scene: Scene) -> State:
-    """Return 2 y(t/2) - y(0), normalised."""
+    """Return 2 y(t/2) - y(0) for omega and attitude y, from the states `half` at t/2."""
     attitude = 2.0 * half.attitude - np.array(scene.attitude)
     return State(
         2.0 * half.omega - np.array(scene.omega),

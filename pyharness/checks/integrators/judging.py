@@ -95,8 +95,8 @@ def judge_integrator(
     """Return the results of all checks of an integrator, started by `command`.
 
     ``again(name)`` returns the command that repeats the checks in a scene; ``told`` receives the
-    number of finished problems and the name of the next. `due` is the required order. An invalid
-    answer ends the checks. Raise InputError for an empty command.
+    number of finished problems and the name of the next problem. `due` is the required order. An
+    invalid answer ends the checks. Raise InputError for an empty command.
     """
     found = Verdict(command, again)
     where = "start"
@@ -130,7 +130,8 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow of its own motion, and a low order the lack of a higher one.
+    A fault also explains an overflow of the faulty motion; a fault that lowers the order also
+    explains the lack of a higher order.
     """
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}

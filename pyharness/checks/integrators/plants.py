@@ -25,7 +25,7 @@ _STATES = {each.name: each.state for each in FAULTS}
 _STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
 
 
-# A function of a quaternion, omega at both ends of a step, and its size (s).
+# A function of a quaternion, omega at both ends of a step, and the size of the step (s).
 Advance = Callable[[Any, Array, Array, float], Any]
 
 
@@ -37,7 +37,7 @@ class IntegratorPlant:
     request: Callable[[dict[str, Any]], object] | None = None
     state: Callable[[State, Scene], State] | None = None
     advance: Advance | None = None
-    # Conditions for the fault, of `_possible`.
+    # Properties of integrator and scenes, as in `_possible`, without which the fault has no effect.
     needs: tuple[str, ...] = ()
 
 
@@ -178,9 +178,9 @@ def with_plant(ask: Ask, plant: IntegratorPlant, scene: Scene) -> Ask:
 
 
 def self_test(command: str, chosen: Sequence[Problem], due: float = 1.0) -> Iterator[Outcome]:
-    """Yield the outcome without a fault, then with each planted fault.
+    """Yield the outcome of the control, without a fault, then the outcome with each planted fault.
 
-    Without valid answers, only a failed control is yielded.
+    If an answer of the control is invalid, only the failed control is yielded.
     """
 
     def judge(plant: IntegratorPlant | None = None) -> tuple[Verdict, list[str], int]:
@@ -215,7 +215,7 @@ def _note(names: Sequence[str]) -> str:
 
 
 def _possible(right: Verdict) -> set[str]:
-    """Return what the integrator and its scenes have of `IntegratorPlant.needs`."""
+    """Return which elements of `IntegratorPlant.needs` the integrator and its scenes have."""
     kinds = {each.problem.kind for each in right.judged}
     found = {
         "steps": right.control != "tolerance",

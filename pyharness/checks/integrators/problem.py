@@ -1,8 +1,8 @@
 """Random scenes in which an integrator is judged, its errors in them, and its drift.
 
 The drift is that of conserved quantities in a long torque-free motion: relative for energy and |L|,
-an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
-`LEVELS` - 1, determines a step size (s) and a tolerance; both decrease with it.
+an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to `LEVELS` -
+1, determines a step size (s) and a tolerance; both decrease as the level increases.
 """
 
 import math
@@ -36,12 +36,12 @@ _ORDER_ONE = 1.5  # a smaller measured order counts as 1
 _SEVERAL = 4  # steps that must show the order 1
 _LATE = 3  # earlier tolerances that must show the order too
 _LEAST = 1e-300  # in place of an error of 0
-# Above this many roundings, times the square root of the number of steps, an error is due to the
-# method.
+# An error larger than this many roundings, times the square root of the number of steps, is due to
+# the method.
 _ROUNDINGS = 240.0
 _BETWEEN = 8.0  # s from a row to the next
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
-# Levels of the largest step size (1/32 s) and tolerance (1e-6) of the motion.
+# Levels of the largest step size (1/32 s) and tolerance (1e-6) of the long motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
 _MARGIN, _WITHOUT_ATTITUDE = 16.0, 64.0  # the attitude has the larger error
 _TOTAL = 3.0  # largest sum of the limits of all rows: errors of explicit methods may grow
@@ -112,15 +112,15 @@ class Problem:
 
     @property
     def most_steps(self) -> float:
-        """Return the number of steps of the smallest size until the last time."""
+        """Return the number of steps until the last time with the smallest step size."""
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that roundings of the relative size `rounding` may cause."""
+        """Return the largest error that roundings of relative size `rounding` may cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
-        """Return the line of JSON that requests states at a level; by default the problem's."""
+        """Return the line of JSON that requests states at a level, by default of this problem."""
         asked = (self.times if times is None else times).tolist()
         return request(scene or self.scene, asked, self.step_size(level), self.tolerance(level))
 
@@ -149,8 +149,8 @@ def finite_or_infinite(x: float) -> float:
 class Convergence:
     """The errors of a `part`, omega or attitude, in one problem, at decreasing settings.
 
-    They are proportional to the power `order` of the setting, a step size (s) or tolerance; `order`
-    is None if they are rounding.
+    The errors are proportional to the power `order` of the setting, a step size (s) or a tolerance;
+    `order` is None if the errors are only rounding.
     """
 
     part: str
@@ -188,9 +188,9 @@ def convergence(
 ) -> Convergence:
     """Return the measured order of convergence of errors above `floor`.
 
-    It is the order of the last pair. With `overall`, for tolerances, whose errors decrease
-    irregularly, it is the smaller of the orders from the first and from the fourth last setting to
-    the last.
+    It is the order of the last pair of settings. With `overall`, for tolerances, whose errors
+    decrease irregularly, it is the smaller of two orders: from the first setting to the last, and
+    from the fourth last to the last.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -205,7 +205,7 @@ def convergence(
 
 
 def _power(errors: float, settings: float) -> float:
-    """Return the power p with `errors` = `settings`**p; both are ratios."""
+    """Return the power p such that `errors` = `settings`**p; both are ratios."""
     if math.isnan(errors) or errors <= 0.0:  # the error of the smaller step is infinite
         return 0.0
     return math.log(errors) / math.log(settings)
@@ -228,7 +228,8 @@ class Judged:
     def lost(self) -> int:
         """Return the number of rows that should be finite and are not.
 
-        A level may overflow if the order predicts, from the next level, an error of 1 or more.
+        A level may overflow if the error of the next level and the order predict an error of 1 or
+        more.
         """
         rows = self.finest.lost
         for level in range(LEVELS - 2, -1, -1):
@@ -242,7 +243,7 @@ class Judged:
     def error(self, level: int) -> float:
         """Return the larger error of omega (relative) and attitude (rad).
 
-        It is at least the tolerance or, with a step size, the rounding error.
+        The result is at least the tolerance or, with a step size, the rounding error.
         """
         problem, finest = self.problem, self.finest
         by_tolerance = finest.control == "tolerance"
@@ -276,8 +277,8 @@ class Drift:
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
     """Return level and times (s) of the long motion, and the limit of the change between rows.
 
-    The level is the first step size or tolerance whose limits allow enough rows, else the last. The
-    limit is None if the errors are too large.
+    The level is the first one whose limits allow enough rows, or else the last. The limit is None
+    if the errors are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

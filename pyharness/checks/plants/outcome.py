@@ -14,7 +14,7 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """Whether the checks detected a planted fault, and how many failed."""
+    """The outcome of one planted fault: whether the checks detected it, and how many failed."""
 
     name: str
     fault: str
@@ -37,7 +37,7 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test; `again` repeats it, `extra` are further JSON fields."""
+    """Return the report of a self-test; the command `again` repeats it, `extra` are JSON fields."""
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

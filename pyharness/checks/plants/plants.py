@@ -54,12 +54,12 @@ class Plant:
 
 
 def _plus(found: Any, size: float) -> Any:
-    """Return a number plus `size`, or plus its integer part if the number is an integer."""
+    """Return a number plus `size`; if the number is an integer, plus the integer part of `size`."""
     return found + (int(size) if isinstance(found, int) else size)
 
 
 def _off(found: Array, size: float) -> Array:
-    """Return an array, each element enlarged by `size` times the largest."""
+    """Return an array with each element enlarged by `size` times the largest element."""
     return np.asarray(found + size * np.abs(found).max(initial=0.0) * np.sign(found))
 
 

@@ -23,7 +23,7 @@ from pyharness.model.report import counted
 _MOST_CELLS = 24  # cells in which the faults are planted
 
 Row = list[float]
-# Changes a parsed request or answer in place, or nothing where a fault can't occur.
+# A function that changes a parsed request or answer in place, unless the fault can't occur in it.
 Change = Callable[[dict[str, Any]], object]
 
 
@@ -214,7 +214,7 @@ def _planted(process: PortProcess, cells: Sequence[Cell]) -> Iterator[Outcome]:
                 has_changed = faulty != right
                 asked = json.dumps(faulty).encode()
                 faulty = _parsed(process.ask(asked)) if has_changed else answer
-            # As text, because NaN differs from itself, and zeros have a sign.
+            # Answers are compared as text, because NaN differs from itself, and zeros have a sign.
             if json.dumps(faulty, sort_keys=True) == json.dumps(answer, sort_keys=True):
                 continue
             changed += 1

@@ -1,4 +1,4 @@
-"""Extreme scenes with end times, in five named groups, the suites."""
+"""Extreme scenes with end times, in five named groups (suites)."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -55,14 +55,15 @@ def quarter(disturbance: float) -> float:
 def _separatrix() -> Iterator[Circumstance]:
     """Yield perturbed rotations about the axis of the middle moment.
 
-    Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign;
-    end times are before the first flip, and in the first and the fifth. Other scenes start on the
-    separatrix.
+    Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign.
+    End times are before the first flip, during the first, and during the fifth flip. Other scenes
+    start on the separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)
         flip = quarter(d)
-        # Mostly in the middle of a flip, where omega changes fastest and errors are largest.
+        # End times are mostly in the middle of a flip, where omega changes fastest and errors are
+        # largest.
         for name, omega, time in (
             ("early", beside, min(14.0, 0.75 * flip)),
             ("flip", beside, flip),
@@ -100,7 +101,7 @@ _RADIANS = 20.0
 _ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1), (1, 0, 2))
 _NEEDLE, _PLATE = (1.0, 1.0 - 2.0**-41, 1e-12), (5.0, 3.0, 2.0)
 _BODIES: dict[str, Triple] = {
-    # Ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The large moments of the uneven bodies differ by
+    # Ratios 1 : 1 : 1e-12 and 1 : 1e12 : 1e12. The two large moments of an uneven body differ by
     # about half of the largest possible difference.
     "needle": (1.0, 1.0, 1e-12),
     "uneven-needle": _NEEDLE,

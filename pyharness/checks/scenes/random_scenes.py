@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# Drawn last, so that the draws of a seed do not change.
+# These defects are drawn last, so that the draws of a seed did not change when they were added.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")
@@ -53,7 +53,7 @@ def weekly_seed(day: datetime.date | None = None) -> str:
 
 def draw(seed: str, number: int) -> Draw:
     """Return the random inputs of check `number`, the same in all versions of Python."""
-    # For each draw, so that it can be repeated alone.
+    # Each draw has its own generator, so that it can be repeated alone.
     source = Random(f"{seed}/{number}")
     scene = _plain(source)
     if number % 2 == 1:
@@ -90,7 +90,7 @@ def draw_moderate(seed: str, kind: str, number: int) -> Scene:
     """Return scene `number` of a seed, with a torque of `kind`, an element of `MODERATE`.
 
     The moments are possible and differ by at least a tenth. The body rotates by some radians in 12
-    steps, 6 s in all. Torques are some tenths of a moment times 1/s2.
+    steps, 6 s in all. Torques over moments are some tenths of 1 rad/s2.
     """
     source = Random(f"{seed}/moderate/{kind}/{number}")
     size = 10.0 ** source.uniform(-1.0, 1.0)
@@ -184,7 +184,7 @@ def _slow_waves(source: Random) -> Scene:
 
 
 def _many_speeds(source: Random) -> Scene:
-    """Return a random scene with waves of 1e-6 to 630 rad/s, some as both sine and cosine."""
+    """Return a random scene with torque waves of 1e-6 to 630 rad/s, some both sine and cosine."""
     scene = _plain(source)
     some: list[list[tuple[list[float], float]]] = [[], []]
     for _ in range(source.randint(2, 6)):
@@ -203,7 +203,7 @@ def _far_scale(source: Random) -> Scene:
     exponent = source.choice((-1, 1)) * source.randint(20, 450)
     scene = source.choice((_plain, _from_rest, _slow_waves, _many_speeds))(source)
     if abs(exponent) > 300:
-        # A torque's rate scales with the cube, and would overflow or underflow.
+        # The rate of a torque scales with the cube of the factor, and would overflow or underflow.
         scene = replace(_plain(source), torque=TorqueLaw())
     found = scaled(scene, 2.0**exponent)
     mass = 2.0 ** source.randint(-60, 60) if abs(exponent) <= 200 else 1.0
@@ -212,7 +212,7 @@ def _far_scale(source: Random) -> Scene:
 
 
 def _sensitive(source: Random) -> Scene:
-    """Return a random scene near a middle axis, where errors may grow by up to 1e6."""
+    """Return a random scene near a middle axis, where errors may grow by a factor of up to 1e6."""
     low, middle, high = body = _body(source)
     spin = source.choice((-1.0, 1.0)) * 10.0 ** source.uniform(-1.0, 1.0)
     rate = abs(spin) * ((high - middle) * (middle - low) / (high * low)) ** 0.5

@@ -22,12 +22,13 @@ from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
 from pyharness.model.torque_law import TorqueLaw
 
-# A torque over the size of the moments, from t, omega and attitude, as symbols or numbers.
+# A function of t, omega and attitude, symbols or numbers: the torque divided by the size of the
+# moments.
 Term = Callable[[Any, Any, Any], Any]
 Body = tuple[float, list[float], float]
 STEADY = ("damping", "wheel", "drag", "wave", "control", "quotient", "root", "decay", "swing")
 TURNING = ("gradient", "field", "spring", "mixed")
-# These change within a small range of time or omega, and are constant or nearly 0 elsewhere.
+# Terms that change within a small range of time or omega, and are constant or nearly 0 elsewhere.
 SUDDEN = ("switch", "friction", "bell", "peak", "burst", "flash", "sigmoid", "swings")
 
 TIMED = ("table", "pulses")  # depend on time alone
@@ -63,7 +64,7 @@ def draw_ready(source: Random, names: tuple[str, ...] = READY) -> tuple[Scene, f
 
 
 def _body(source: Random) -> Body:
-    """Return the size of random possible moments, the moments (kg m2), and a speed (rad/s)."""
+    """Return the size of random possible moments (kg m2), the moments, and a speed (rad/s)."""
     size = 10.0 ** source.uniform(-2.0, 1.0)
     while True:
         found = sorted(10.0 ** source.uniform(-0.5, 0.3) for _ in range(3))
@@ -159,7 +160,7 @@ def orbit(t: Any, rate: float) -> Any:
 
 
 def gradient(t: Any, q: Any, inertia: Any, rate: float) -> Any:
-    """Return the torque r x I r, like the gravity gradient; r is the direction to the satellite."""
+    """Return r x I r, like a gravity-gradient torque; r is the direction to the satellite."""
     r = to_body(q, orbit(t, rate))
     return np.cross(r, inertia * r)
 

@@ -2,9 +2,9 @@
 
 Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad).
 
-Orders are powers of the step size with which errors decrease. Programs are compared with
-`solve_ivp`. Methods with a fixed step are compared with the reference, and so is the programs'
-translational velocity, which no other method computes.
+An order is the power of the step size with which errors decrease. For orders, omega of the programs
+is compared with `solve_ivp`. Methods with a fixed step are compared with the reference, and so is
+the programs' translational velocity, which no other method computes.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -60,7 +60,7 @@ _PREPARED_TURNED = ("auto", "taylor")
 
 
 def methods(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of omega by every method, at a case's times and a later one."""
+    """Yield deferred checks of omega by every method, at a case's times and a later time."""
     for case in cases(chosen):
         scene = case_scene(case)
         yield from _solved("methods", case, scene, (*scene.times(), _LATER), _SOLVED, chosen.thin)
@@ -210,7 +210,7 @@ def _order_of_method(scene: Scene, method: str, truth: Reference, **limits: Any)
 
 
 def in_few_steps(scene: Scene, time: float) -> Scene:
-    """Return a scene with the coarsest steps for an order, `_FEWEST` until `time` (s)."""
+    """Return the scene with the coarsest steps to measure orders: `_FEWEST` until `time` (s)."""
     return replace(scene, step_size=time / _FEWEST, steps=_FEWEST)
 
 

@@ -1,6 +1,7 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, in right-hand sides, determines which tolerances are affordable; it bounds no error.
+A work limit, a number of right-hand sides, determines which tolerances are affordable; it bounds no
+error.
 """
 
 import math
@@ -22,7 +23,7 @@ FEW_DIGITS = 1e-7
 # A middling tolerance, and those to try if a finer one is not possible.
 MIDDLING = 1e-6
 _LADDER = (1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-7, MIDDLING, 1e-5, 1e-4, 1e-3)
-# They take minutes at their finest tolerances, others seconds.
+# Methods that take minutes at their finest tolerances; other methods take seconds.
 _ONLY_MIDDLING = ("quick", "rk45", "radau")
 # Work limits in right-hand sides, and the factor by which the coarsest tolerance may exceed them.
 _BUDGETS = {**dict.fromkeys(GAUSS, 1_000_000.0), **dict.fromkeys(SCIPY_METHODS, 4_000.0)}
@@ -49,7 +50,7 @@ def finest(name: str, scene: Scene, time: float) -> float:
 
 
 def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
-    """Return a method's finest tolerance, and 1e-6 if coarser; only 1e-6 for slow methods."""
+    """Return a method's finest tolerance, and 1e-6 if that is coarser; slow methods: only 1e-6."""
     if name in _ONLY_MIDDLING:
         return [MIDDLING]
     least = finest(name, scene, time)
@@ -59,8 +60,8 @@ def finest_and_middling(name: str, scene: Scene, time: float) -> list[float]:
 def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list[float | None]:
     """Return the tolerances at which a method is checked until `time` (s) in a scene.
 
-    They are the finest within the work limit, and 1e-6 if affordable. For methods with a fixed step
-    and Gauss collocation, None stands for the scene's step size.
+    These are the finest one within the work limit, and 1e-6 if affordable. For methods with a fixed
+    step and Gauss collocation, None stands for the scene's step size.
     """
     if name in FIXED_STEP:
         return [None]
@@ -84,7 +85,7 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return an estimate of a method's right-hand sides; 0 without a work limit."""
+    """Return the estimated number of a method's right-hand sides; 0 if it has no work limit."""
     if name in GAUSS:
         stages = int(name[-1])
         # Steps of z radians cause an error of amplification times radians times z**order.

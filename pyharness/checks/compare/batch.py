@@ -207,7 +207,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s), scene by scene if the method has no kernel for many."""
+        """Return the states at `t_end` (s), scene by scene without a kernel for many bodies."""
         by_state = isinstance(self.scene.torque, StateTorque)
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

@@ -121,7 +121,7 @@ def _in_order(*order: int) -> Callable[[Scene], Scene]:
 
 
 def in_space(attitude: Array, vectors: Array) -> Array:
-    """Return vectors about the body axes, shape (n, 3), along the axes of space."""
+    """Return n vectors, shape (n, 3), about the axes of space from those about the body axes."""
     q = attitude.T
     turned = product(product(q, (np.zeros(len(vectors)), *vectors.T)), _conjugate(q))
     return np.array(turned[1:]).T

@@ -79,7 +79,7 @@ def _held(asked: dict[str, Any]) -> None:
 
 
 def _turned_start(asked: dict[str, Any]) -> None:
-    """Rotate the initial angular momentum about a body axis by h rad; h is the step size in s."""
+    """Rotate the initial angular momentum about a body axis by h rad, h the step size (s)."""
     moments, h = np.array(asked["moments"]), asked["step_size"]
     vector = moments * np.array(asked["omega"])
     across = np.cross(_STEP_AXIS, vector)

@@ -73,7 +73,7 @@ def change_result(target: str, change: Change) -> Fault:
 
 
 def change_at(path: str, change: Callable[[Any], Any]) -> Callable[[dict[str, Any]], None]:
-    """Return a change in place of the value at `path`, as in ``scene.run``, unless it is empty."""
+    """Return a function that changes the value at `path`, as in ``scene.run``, if not empty."""
     *outer, last = path.split(".")
 
     def changed(record: dict[str, Any]) -> None:

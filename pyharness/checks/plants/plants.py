@@ -292,7 +292,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return numbers of failed checks by kind, and a note with an id, preferably not golden."""
+    """Return numbers of failed checks by kind, and a note with one id, preferably not golden."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

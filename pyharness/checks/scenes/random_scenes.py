@@ -16,7 +16,7 @@ from pyharness.model.scene import Scene, Triple
 from pyharness.model.torque_law import TorqueLaw
 
 COARSEST = 1e-3
-# These defects are drawn last, so that the draws of a seed did not change when they were added.
+# Defects that are drawn after all others, so that a seed keeps its draws.
 _LATER = ("three-masses",)
 _LIPSCHITZ = (500.0, 60.0, 1.0, 1e-3)
 MODERATE = ("free", "constant", "wave")
@@ -175,7 +175,7 @@ def _from_rest(source: Random) -> Scene:
 
 
 def _slow_waves(source: Random) -> Scene:
-    """Return a random scene under waves of 1e-12 to 0.1 rad/s, whose phase may hardly change."""
+    """Return a scene with torque waves of 1e-12 to 0.1 rad/s, whose phase may hardly change."""
     scene = _plain(source)
     size = _largest(scene) * 10.0 ** source.uniform(-2.0, 2.0)
     law = _law(source, size, source.choice((4, 8, 12)), (1e-12, 0.1))

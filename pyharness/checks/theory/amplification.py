@@ -1,16 +1,16 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation, and the velocity in it, obey x' = J x. A step of size h
-multiplies x by a matrix of polynomials in z, which is h times an eigenvalue of J, or hJ itself. The
-coefficients are exact fractions. The matrix has m rows for the m vectors that a program propagates:
-two in the original Runge-Kutta program, the result, and U(1), at which the first stage is
-evaluated.
+A perturbation x of a steady rotation, and the velocity during this rotation, obey x' = J x. A step
+of size h multiplies x by a matrix of polynomials in z, where z is h times an eigenvalue of J, or hJ
+itself. The coefficients are exact fractions. The matrix has m rows, one for each vector that a
+program propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which
+the first stage is evaluated.
 
 A program is linearly stable where the spectral radius is at most 1, a region in the plane of z.
 
 A collocation program evaluates the right-hand side along a straight line, its first estimate, and
-corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F), with its value F
-at s = 0 and its quadratic part Q.
+corrects once. At time s the right-hand side on this line is F + s J F + s**2 Q(F), where F is its
+value at s = 0 and Q its quadratic part.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from pyharness.model.trajectory import Array
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _HIGHEST = 5
-# A stability boundary nearer to z = 0 counts as being there.
+# A stability boundary nearer to z = 0 than this counts as being at 0.
 NEAREST = 2.0**-4
 _NOTHING = 1e-14
 # Samples of z: smallest, largest, and number. The rectangle of _REAL and _IMAGINARY contains all
@@ -67,9 +67,9 @@ class Amplification:
         return np.asarray(np.abs(np.linalg.eigvals(self.evaluate(z))).max(axis=-1))
 
     def moving(self) -> "Amplification":
-        """Return the matrix without row and column of the step's result, if possible.
+        """Return the matrix without the row and column of the step's result, if possible.
 
-        It is possible if only the new result depends on the old, by a factor free of z.
+        This is possible if only the new result depends on the old result, by a factor free of z.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():
@@ -77,7 +77,7 @@ class Amplification:
         return self
 
     def exact_matrix(self, matrix: Exact) -> Fractions:
-        """Return the exact matrix for n equations x' = J x, of order m n, from hJ."""
+        """Return the exact matrix of order m n for n equations x' = J x, from `matrix`, hJ."""
         power = np.eye(len(matrix), dtype=object)
         total = np.kron(self.coefficients[..., 0], power)
         for k in range(1, _HIGHEST):
@@ -94,7 +94,8 @@ class Amplification:
 def amplification(listing: Listing, step: int = 1) -> Amplification:
     """Return the amplification matrix of step `step` (from 1) of a program.
 
-    The step matters only with the defect `dt-accumulates`, which moves the collocation points.
+    The number of the step matters only with the defect `dt-accumulates`, which moves the
+    collocation points.
     """
     if listing.program == "runge-kutta":
         return _runge_kutta(listing)
@@ -105,7 +106,7 @@ def amplification(listing: Listing, step: int = 1) -> Amplification:
 
 
 def weight_of_squares(listing: Listing, step: int) -> Fraction:
-    """Return the weight of h**3 Q(F) in a collocation step; the integral of s**2 gives 1/3."""
+    """Return the weight of h**3 Q(F) in a collocation step; exact integration would give 1/3."""
     points, weights = _quadrature(listing, step)
     return Fraction(weights @ points**2)
 
@@ -156,11 +157,11 @@ def _polynomial_text(coefficients: Fractions) -> str:
 
 
 def boundary(matrix: Amplification, direction: complex) -> tuple[float, float]:
-    """Return the distance of the stability boundary from z = 0, and a slope.
+    """Return the distance of the stability boundary from z = 0, and the slope there.
 
     `direction` is -1 for the negative real axis or 1j for the imaginary axis. The slope is the
     derivative of the spectral radius just beyond the boundary. Return (0, 1) if perturbations grow
-    at a distance of 1/16.
+    already at a distance of 1/16.
     """
 
     def grows(distance: float) -> bool:

@@ -2,7 +2,7 @@
 
 Brouwer 1937, Astronomical Journal 46: with random rounding, errors of energy and momentum grow with
 the power 1/2 of the number of steps, the phase error with the power 3/2. With biased rounding the
-powers are 1 and 2.
+two powers are 1 and 2.
 """
 
 import math
@@ -70,8 +70,8 @@ class Orbit:
         """Return bounds after `steps` steps: "energy", "momentum" (relative), "phase" (rad)."""
         walk = DEVIATIONS * noise.rounding * math.sqrt(steps)
         drift = steps * noise.truncation
-        # The result is rounded once more. The two roundings in each of A, B, C change the conserved
-        # quantities by at most four roundings of the energy.
+        # The result is rounded once more. The two roundings in each of A, B and C change the
+        # conserved quantities by at most four times the rounding error of the energy.
         lost = walk + (0.0 if noise.conserves else drift) + ROUNDING
         conserved = ("energy", "momentum")
         found = {name: lost * self.gains[name] + 4.0 * ROUNDING for name in conserved}
@@ -86,10 +86,10 @@ class Orbit:
 
 
 def orbit(scene: Scene) -> Orbit:
-    """Return samples of omega over two periods, and the factors of error bounds.
+    """Return an Orbit: samples of omega over two periods, and the factors of error bounds.
 
-    The scene has moments and no torque. The factors are from an error of omega to the errors of
-    energy, momentum, frequency (2 pi over the period of omega) and phase.
+    The scene must have moments and no torque. The factors lead from an error of omega to the errors
+    of energy, momentum, frequency (2 pi over the period of omega) and phase.
     """
     a = np.array(scene.euler_coefficients)
     frequency = _frequency(a, np.array(scene.omega))
@@ -119,10 +119,10 @@ def floats(rows: Sequence[Sequence[Decimal]]) -> Array:
 def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: float) -> Noise:
     """Return error bounds of a Taylor step, by a running error analysis.
 
-    `step` is in s, `left_out` the truncation error relative to the largest omega. Term k is a sum
-    of k products of lower terms, with their errors and at most k + 3 roundings each. The remainder
-    of compensated summation adds at most half a unit in the last place. The sum rounds each term
-    three times.
+    `step` is in s; `left_out` is the truncation error relative to the largest omega. Term k is a
+    sum of k products of lower terms; each product has the errors of these terms and at most k + 3
+    roundings. The sum rounds each term three times. The remainder of compensated summation adds at
+    most half a unit in the last place.
     """
     a = np.abs(np.array(scene.euler_coefficients))
     terms, errors = _terms(body, scene, step, order), [np.abs(body.states)]
@@ -141,14 +141,14 @@ def taylor_noise(body: Orbit, scene: Scene, step: float, order: int, left_out: f
 def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     """Return error bounds of a step h (s) of Gauss collocation with s = `stages` stages.
 
-    The sum at each node has s + 3 roundings of the right-hand sides and one of omega. The inverse
-    of 1 - h A J multiplies it, where A is the tableau's matrix and J the Jacobian. Gauss
-    collocation conserves quadratic invariants for any step size.
+    The sum at each node has s + 3 roundings of the right-hand sides and one of omega. Its error is
+    multiplied by the inverse of 1 - h A J, where A is the tableau's matrix and J the Jacobian.
+    Gauss collocation conserves quadratic invariants for any step size.
 
     The truncation error is the integral of the state-transition matrix times the residual. The
-    residual is zero at the nodes, the zeros of an orthogonal polynomial, so that only power s of
-    time in the other factor contributes. By Leibniz's rule its coefficient is a sum over j of
-    multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
+    residual is zero at the nodes, the zeros of an orthogonal polynomial, so that of the other
+    factor's Taylor series in time only the power s contributes. By Leibniz's rule its coefficient
+    is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
     """
     from pyharness.checks.theory.tableau import tableau
 
@@ -189,8 +189,8 @@ def errors(
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, the exact solution uses A, B, C rounded to binary64, as a method
-    does.
+    of the motion. If `rounded`, the exact solution is that for A, B, C rounded to binary64, which
+    methods use.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]

@@ -1,7 +1,7 @@
 """The collocation matrices (eq. 36), and the accuracy of their solution by LEQT1F.
 
 LEQT1F is the linear solver of the collocation programs, "two-term" and "four-term". Exact solutions
-are computed in fractions; every float is one.
+are computed in fractions; every float is a fraction.
 """
 
 import math
@@ -45,10 +45,10 @@ SINGULARITY = Basis(
     "the last pivot of exact elimination, evaluated in binary64 (`theory/collocation_matrices.py`)",
 )
 """Basis of limits that follow from `singular_below`."""
-# Range of nonzero elements in which at most four equations neither underflow nor overflow. A
-# product of two elements is at least 2**-300, and rounded a multiple of 2**-352. In forward
-# substitution every further product costs 202 binary digits, so each unknown is 0 or at least
-# 2**-756; it is at most 2**600.
+# Range of nonzero elements for which the solution of at most four equations neither underflows nor
+# overflows. A product of two elements is at least 2**-300, and after rounding a multiple of
+# 2**-352. In forward substitution every further product costs 202 binary digits, so that each
+# unknown is 0 or at least 2**-756; it is at most 2**600.
 _RANGE = 2.0**-150, 2.0**150
 
 
@@ -96,8 +96,8 @@ class Solved:
     # its largest element.
     condition: float
     scaled_condition: float
-    # Norm of abs(L) abs(U) over the norm of the matrix, both with the columns divided by the
-    # matrix's largest elements.
+    # Norm of abs(L) abs(U) divided by the norm of the matrix, both after division of each column by
+    # the matrix's largest element in it.
     growth: float = math.nan
     order: tuple[int, ...] = ()  # rows in the order of becoming pivots
     # Largest relative shortfall of a pivot from the best candidate: found, and possible by
@@ -194,7 +194,7 @@ def solved(program: str, step: float) -> Solved:
 
 
 def _small_step(program: str) -> tuple[Fraction, Fractions]:
-    """Return the matrix of a step (s) so small that each row's largest element is 1."""
+    """Return a step (s) so small that each row's largest element is 1, and its matrix."""
     step = Fraction(1, 1000)
     return step, collocation_matrix([part * step for part in PARTS[program]])
 
@@ -202,11 +202,11 @@ def _small_step(program: str) -> tuple[Fraction, Fractions]:
 def solver_roundings(program: str) -> tuple[float, float]:
     """Return two bounds on the rounding error that the solver adds to a step's result.
 
-    Both are in units of 2**-53 times step size times rate. The first is for equal rates at all
-    points, where only c1 is not zero. The second, times the relative deviation, is for deviations
-    from equal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for n points (Higham
-    2002, theorem 9.4), with the factors L and U, the solution X and the powers of the step size.
-    They do not depend on the step size as long as each row's largest element is 1.
+    Both bounds are in units of 2**-53 times step size times rate. The first is for equal rates at
+    all points, where only c1 is not zero. The second, multiplied by the relative deviation from
+    equal rates, is for unequal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for
+    n points (Higham 2002, theorem 9.4), with the factors L and U, the solution X and the powers of
+    the step size. They do not depend on the step size as long as each row's largest element is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -224,9 +224,9 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    It reports one if the computed sum N + p equals N, for a scaled pivot p and N rows. Then p is at
-    most half a unit in the last place of N. N is a power of 2 with the unit N 2**(1 - bits); a tie
-    is rounded to even N. The last scaled pivot, proportional to step**(N-1), decides.
+    LEQT1F does so if the computed sum N + p equals N, for a scaled pivot p and N rows. Then p is at
+    most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits), and
+    a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), decides.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -265,8 +265,8 @@ def _share(error: Fraction, bound: Fraction) -> float:
 def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tuple[float, float]:
     """Return the largest relative shortfall of a pivot from the best candidate, and its bound.
 
-    The pivots are from exact elimination in `order`, the solver's choice. The bound is the effect
-    of rounding, from `sizes`, abs(L) abs(U).
+    The pivots are from exact elimination in `order`, the order that the solver chose. The bound is
+    the effect of rounding, computed from `sizes`, abs(L) abs(U).
     """
     shortfall, allowed = Fraction(0), Fraction(0)
     scale = 1 / abs(matrix).max(axis=1)
@@ -284,8 +284,8 @@ def _columns(
 ) -> Iterator[tuple[int, dict[int, Fraction], Fractions]]:
     """Eliminate a matrix exactly; yield pivot row, candidates and rows before each column.
 
-    A candidate is an element's magnitude over the largest in its row of `matrix`. Without `order`,
-    the largest candidate becomes the pivot, as in LEQT1F.
+    A candidate is an element's magnitude divided by the largest in its row of `matrix`. Without
+    `order`, the largest candidate becomes the pivot, as in LEQT1F.
     """
     rows = matrix.copy()
     scale = 1 / abs(matrix).max(axis=1)

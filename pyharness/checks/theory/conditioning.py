@@ -29,14 +29,14 @@ from pyharness.model.tape_arrays import table_values
 from pyharness.model.trajectory import Array
 
 ROUNDING = 2.0**-53
-# Roundings in a right-hand side of Euler's equations, at most: two in each of A, B, C, two in the
-# products, and those of the sums.
+# Largest number of roundings in a right-hand side of Euler's equations: two in each of A, B, C, two
+# in the products, and those of the sums.
 _ROUNDINGS = 8.0
 # Rounding error of an attitude (rad), twice that of a quaternion's component, which has some twenty
 # roundings.
 ATTITUDE = 40.0 * ROUNDING
-# Up to this amplification a method's error must be at most its tolerance; beyond, the tolerance is
-# amplified.
+# Up to this amplification a method's error must be at most its tolerance; above it, the limit is
+# the amplified tolerance.
 LIVELY = 1e3
 FLOW = Basis(
     "derived",
@@ -55,7 +55,7 @@ class Conditioning:
 
     The limits contain `made`, the sum of the errors allowed in the steps (relative, or rad), and
     rounding errors. `limit` amplifies `made`, and is at most 2, because components up to `largest`
-    differ by no more; its `steps` is the number of roundings of omega, 0 with compensated
+    differ by no more. Its argument `steps` is the number of roundings of omega, 0 with compensated
     summation. `angle_limit` assumes that omega has its largest rounding error at all times.
     """
 
@@ -84,8 +84,8 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError if the solution grows without bound before, if it would be needed at too many
-    times, or if the amplification exceeds binary64.
+    Raise InputError if the solution grows without bound before `time`, if it would be needed at too
+    many times, or if the amplification exceeds binary64.
     """
     # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
@@ -107,10 +107,10 @@ def conditioning(scene: Scene, time: float) -> Conditioning:
 
 
 def along(scene: Scene, times: Array, omega: Array) -> Conditioning:
-    """Return the final sensitivity along the solution `omega` (rad/s, (n, 3)) at `times` (s).
+    """Return the final sensitivity along `omega` (rad/s), the solution at n `times` (s).
 
-    Times begin at 0, and omega changes little between them. Raise InputError if the amplification
-    exceeds binary64.
+    `omega` has the shape (n, 3). Times begin at 0, and omega changes little between them. Raise
+    InputError if the amplification exceeds binary64.
     """
     with np.errstate(all="ignore"):
         largest = float(np.abs(omega).max()) or 1.0
@@ -123,9 +123,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results; those at the final times
-    are returned too. Raise InputError if more than `most` intervals are needed; `fewest` are tried
-    first.
+    `sample` returns the largest rate (1/s) at given times, and results, of which the last are
+    returned too. The first attempt has `fewest` intervals. Raise InputError if more than `most`
+    intervals are needed.
     """
     count = fewest
     while True:
@@ -173,7 +173,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
 
 
 def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
-    """Return the sums of magnitudes of the terms of Euler's equations (1/s2), shape (n, 3).
+    """Return the sums of magnitudes of the terms of Euler's equations (rad/s2), shape (n, 3).
 
     A sine or cosine is multiplied by 1 plus its angle, to which the angle's rounding error is
     proportional.
@@ -188,16 +188,16 @@ def magnitudes(scene: Scene, times: Array, omega: Array) -> Array:
     return np.asarray(products + torque / moments)
 
 
-# A quaternion's component is half an angle (rad).
+# An error of a quaternion's component is half the error of the angle (rad).
 _OF_ANGLE = 0.5
 
 
 def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
     """Return the sensitivity of a scene's solution at `times` (s) to earlier errors.
 
-    Under a torque law it is the sensitivity at the last time; else the largest at any of the times,
-    because damping may reduce errors. Raise InputError if the torque is opaque, if the solution
-    grows without bound, or if it would be needed at too many times.
+    Under a torque law it is the sensitivity at the last time; under other torques the largest at
+    any of the times, because damping may reduce errors. Raise InputError if the torque is opaque,
+    if the solution grows without bound, or if it would be needed at too many times.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -241,15 +241,15 @@ def _path(scene: Scene, times: Array) -> Array:
 
 
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
-    """Return bounds on the rounding errors of the equations (1/s), over the unit roundoff.
+    """Return bounds on the rounding errors of the equations (1/s), divided by the unit roundoff.
 
-    By running error analysis each operation adds the error of its result; in a sum the magnitudes
-    of all terms count.
+    In this running error analysis each operation adds the rounding error of its result; in a sum
+    the magnitudes of all terms count.
     """
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):
         found = evaluate(tape, given, _BOUNDS)
-    # A constant output is a number.
+    # An output that is constant is a plain number.
     errors = [_bounded(each).error for each in found]
     return np.stack([np.broadcast_to(each, len(times)) for each in errors], axis=1)
 

@@ -8,18 +8,19 @@ from numpy.typing import ArrayLike
 
 from pyharness.model.trajectory import Array
 
-# Enough iterations of the arithmetic-geometric mean for ratios of 1e-300: each halves the logarithm
-# of the ratio, and doubles the number of digits once the two numbers are close.
+# Enough iterations of the arithmetic-geometric mean for ratios of 1e-300. Each iteration halves the
+# logarithm of the ratio, and doubles the number of equal digits once the two numbers are close.
 _LEVELS = 16
-# Relative difference below which the arithmetic mean is the arithmetic-geometric one in binary64.
+# Relative difference below which, in binary64, the arithmetic mean equals the arithmetic-geometric
+# mean.
 _NEAR = 2.0**-27
 
 
 def flip_times(moments: ArrayLike, omega0: ArrayLike) -> Array:
     """Return the time (s) between flips of each body, shape (n,).
 
-    It is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s). It is
-    infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
+    This time is half the period of omega: pi over the arithmetic-geometric mean of two rates (1/s).
+    It is infinite on the separatrix and for a steady rotation. `moments` (kg m2, in any order) and
     `omega0` (rad/s) have the shape (n, 3) or (3,).
     """
     bodies, omega = np.broadcast_arrays(np.atleast_2d(moments), np.atleast_2d(omega0))

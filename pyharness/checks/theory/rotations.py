@@ -5,8 +5,8 @@ small perturbation proportional to exp(Q t). Let A, B, C be the coefficients of 
 and M = N / I torque over moment. Then (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3.
 The rates Q (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-Below, `share` is the initial perturbation over the rotation. Of a continuous family only some
-members are reported.
+In the functions, `share` is the initial perturbation divided by the rotation. Of a continuous
+family of steady rotations only some members are reported.
 """
 
 import cmath
@@ -28,12 +28,12 @@ _OVERFLOWS = (
     "rotations: a steady rotation or its rates overflow; use a smaller omega or torque, or moments "
     "nearer to each other"
 )
-# Shown points of a hyperbola of steady rotations: a component of omega over its value at the
-# vertex.
+# Shown points of a hyperbola of steady rotations: ratios of a component of omega to its value at
+# the vertex.
 _ALONG = (0.25, 0.5, 1.0, 2.0, 4.0)
 _SHOWN = "shown, of one branch, the vertex and points of 1/4, 1/2, 2 and 4 times its"
-# The linear approximation is invalid at this error: relative to the perturbation, or a phase in
-# rad.
+# Error at which the linear approximation counts as invalid: relative to the perturbation, or a
+# phase (rad).
 OFF = 0.1
 
 
@@ -44,7 +44,7 @@ class SteadyRotation:
     place: str  # an axis, a point of a hyperbola, ...
     omega: Triple  # rad/s
     rates: Rates  # Q of equation 32 (1/s), the fastest growth first
-    # No small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t.
+    # True if no small perturbation grows, neither like exp(Q t) nor, if all Q are 0, like t.
     stable: bool
     # Shortest time (s) between flips of the perturbed motion; None without flips.
     flip_interval: float | None
@@ -160,8 +160,8 @@ def _growing(
 ) -> float | None:
     """Return the time (s) when second-order terms reach a tenth of a growing perturbation.
 
-    Linear theory is valid until then. The time is infinite if these terms are zero, and None if
-    they exceed binary64. `rate` is the fastest Q, `matrix` the Jacobian (1/s).
+    Linear theory is valid until this time. It is infinite if the terms are zero, and None if they
+    exceed binary64. `rate` is the Q (1/s) with the fastest growth, `matrix` the Jacobian (1/s).
     """
     # The eigenvector of `rate`.
     grows = np.linalg.svd(matrix - rate * np.eye(3))[2][-1].conj()
@@ -182,10 +182,10 @@ def _growing(
 def _phase(coefficients: Sequence[float], rate: float, share: float) -> float | None:
     """Return the time (s) when the phase error about a stable axis reaches 0.1 rad.
 
-    `coefficients` are in cyclic order from the axis; `rate` is the linear frequency (rad/s). A tilt
-    by d (rad) towards another axis changes the frequency by the fraction d**2 / 4 times the first
-    coefficient over the coefficient of that axis. The time is infinite if the first coefficient is
-    0, and None if the frequency is 0, when only the spin drifts.
+    `coefficients` are in cyclic order from the axis; `rate` is the frequency (rad/s) by linear
+    theory. A tilt by d (rad) towards another axis changes the frequency by the fraction d**2 / 4
+    times the first coefficient divided by the coefficient of that axis. The time is infinite if the
+    first coefficient is 0, and None if the frequency is 0, when only the spin drifts.
     """
     spun, *others = map(abs, coefficients)
     if spun != 0.0 and rate == 0.0:
@@ -199,9 +199,9 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
     where K is the complete elliptic integral with the complementary modulus k', and lambda is near
-    the growth rate. For a small perturbation it is near (2 / lambda) ln(4 / k'). It is shortest for
-    a perturbation along the other axis with the smaller coefficient. It is None if the signs are
-    impossible for a middle axis.
+    the growth rate. For a small perturbation the time is near (2 / lambda) ln(4 / k'). It is
+    shortest for a perturbation along that other axis which has the smaller coefficient. Return None
+    if the signs of the coefficients are impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:
@@ -224,7 +224,7 @@ def _places(scene: Scene) -> tuple[str, Places]:
         if coefficients[axis] == 0.0:
             told = f"none: {'ABC'[axis]} = 0, so that nothing holds the torque about axis"
             return f"{told} {axis + 1}", []
-    # w2 w3, w3 w1 and w1 w2, which balance the torque.
+    # The products w2 w3, w3 w1 and w1 w2 that balance the torque.
     products = [-m / k if k else 0.0 for m, k in zip(torque, coefficients, strict=True)]
     if len(held) == 3:
         return _points(products)
@@ -255,7 +255,7 @@ def _axes(coefficients: Triple, spin: float) -> tuple[str, Places]:
 
 
 def _hyperbola(coefficients: Triple, product: float, held: int) -> tuple[str, Places]:
-    """Return a text and places for a torque about the axis `held`, from 0.
+    """Return a text and places for a torque about the axis `held` (counted from 0).
 
     `product` is the constant product of the other components (rad2/s2). One branch is shown; the
     other is its opposite.

@@ -115,11 +115,11 @@ def _record(each: SteadyRotation) -> dict[str, Any]:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Direction to the viewer, along the axes of the smallest, middle and largest moment; that of the
-# smallest points upwards.
+# Direction to the viewer, as components along the axes of the smallest, middle and largest moment;
+# the axis of the smallest points upwards.
 _VIEW = np.array([0.36, 0.72, 0.60])
 _GRID = 101
-_HIDDEN = 0.22  # opacity behind the sphere
+_HIDDEN = 0.22  # opacity of curves behind the sphere
 _SEPARATRIX: dict[str, Any] = {"color": "#c02020", "linewidth": 1.8}
 _POLHODE: dict[str, Any] = {"color": "#1040a0", "linewidth": 0.9}
 _MIDDLES = {(0.72, -0.36): 2, (-0.5, 0.5): 2, (0.7, 0.3): 1, (-0.7, -0.3): 1, (0.3, 0.7): 3,
@@ -178,7 +178,7 @@ def _sphere(axes: "Axes", scene: Scene) -> list[list[Any]]:
 
 
 def _project(points: Array, upward: Array, toward: Array) -> tuple[Array, Array, Array]:
-    """Return the points' coordinates to the right, upwards, and towards the viewer (`toward`)."""
+    """Return the points' coordinates to the right, upwards, and along `toward`, to the viewer."""
     right = np.cross(upward, toward)
     right /= np.linalg.norm(right)
     return points @ right, points @ np.cross(toward, right), points @ toward
@@ -259,7 +259,8 @@ def polhodes(moments: Triple) -> Iterator[tuple[str, Array]]:
 def growth_of_bodies(first: Array, third: Array) -> Array:
     """Return the growth rate Re Q about each middle axis, divided by the spin.
 
-    Q is the fastest rate of equation 32. `first` and `third` are K1 = A and K3 = -C, from -1 to 1.
+    Q is the rate of equation 32 with the fastest growth. `first` and `third` are K1 = A and K3 =
+    -C, from -1 to 1.
     """
     a, c = first, -third
     # A body has A + B + C + ABC = 0. At two corners, for bodies without extent, B is arbitrary.

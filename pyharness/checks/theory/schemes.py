@@ -26,7 +26,7 @@ class Numbers:
     """Euler's equations for numbers; omega (rad/s) has the shape (..., 3)."""
 
     def __init__(self, scene: Scene, step: float = 1.0, sizes: bool = False) -> None:
-        """Store the equations and a step (s); with `sizes`, magnitudes replace all terms."""
+        """Store the equations and a step size (s); with `sizes`, magnitudes replace all terms."""
         self._step = step
         size = np.abs if sizes else np.positive
         self._coefficients = size(np.array(scene.euler_coefficients))
@@ -80,7 +80,7 @@ class FixedStep:
     name: str
     order: int  # of the global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
-    # Bound for a step's last additions, in units of 2**-53 of omega.
+    # Bound of the rounding error of a step's last additions, in units of 2**-53 times omega.
     roundings: float = 1.0
 
 
@@ -207,8 +207,8 @@ def local_error(scheme: Scheme, scene: Scene, omega: Array) -> Array:
 def spacing(count: int) -> Sequence[Fraction]:
     """Return the weights of a central difference for the first derivative.
 
-    Weight i, from 1, multiplies the difference of the values at i and -i spacings. The sum over
-    `count` pairs, divided by the spacing, is exact up to degree 2 count.
+    Weight i, counted from 1, multiplies the difference of the values at i and -i spacings. The sum
+    over `count` pairs, divided by the spacing, is exact for polynomials up to degree 2 count.
     """
     middle = math.comb(2 * count, count)
     return [

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
-The state-transition matrix propagates the errors of the steps to the end; truncation errors are
-from `schemes`. The methods are not run.
+The state-transition matrix propagates the errors of the steps to the end. Truncation errors are
+computed by `schemes`; the methods are not run.
 """
 
 import math
@@ -19,8 +19,8 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 _FEWEST_NODES, _MOST_NODES = 200, 20_000
-# Independent rounding errors of steps add up like the square root of their number. The mean one is
-# taken as a third of the largest.
+# Independent rounding errors of steps add up like the square root of their number. The mean
+# rounding error is assumed to be a third of the largest.
 _MEAN_ROUNDING = 1.0 / 3.0
 # Largest accepted ratio of a power series' last term to its sum.
 _CONVERGED = 1e-3
@@ -69,7 +69,7 @@ class Forecast:
 def path(scene: Scene, time: float) -> Path:
     """Return the solution to `time` (s), with its state-transition matrices.
 
-    Raise InputError if the solution grows without bound before, or is too fast.
+    Raise InputError if the solution grows without bound before `time`, or is too fast.
     """
     from pyharness.engine.solve import solve
 
@@ -92,8 +92,8 @@ class Forecaster:
         self._path = along
         self.method = SCHEMES[method]
         self._missed = cache(self._series)
-        # Mean relative final error from one step's rounding. A component that never changes has
-        # none.
+        # Mean relative final error from the rounding of one step. A component that never changes
+        # has none.
         changes = (self._rates() != 0.0).any(axis=0)
         carried = along.propagators * (along.omega * changes)[:, None, :]
         squares = along.over_time(np.square(carried).sum(axis=2)) / float(along.times[-1])
@@ -132,9 +132,9 @@ class Forecaster:
         return Forecast(truncation, 2.0 * worst + rounding, rounding, wandering)
 
     def crossing(self, smallest: float) -> float:
-        """Return the step (s) below which the expected rounding error exceeds the truncation error.
+        """Return the step size (s) below which expected rounding exceeds the truncation error.
 
-        It is at least `smallest` (s), and found by bisection.
+        The result, found by bisection, is at least `smallest` (s).
         """
         time = float(self._path.times[-1])
         high = max(1, math.floor(time / smallest))
@@ -155,6 +155,6 @@ class Forecaster:
         if singular:
             scheme, order = collocation_singular(self.method.name), 1
         missed = local_error(scheme, self._path.scene, self._path.omega)
-        # These terms are zero by the order of the scheme, except for rounding.
+        # By the order of the scheme these terms are zero, except for rounding.
         missed[: order + 1] = 0.0
         return missed

@@ -1,9 +1,9 @@
 """Weighted residual methods as Runge-Kutta tableaux, for any step size.
 
 The methods are collocation, subdomain, Galerkin and least squares, with the trial function omega(0)
-+ c1 t + ... + cn t**n. They make its derivative a projection of the right-hand side f along the
-step on the polynomials of degree n - 1. The projection is computed on the unit interval s = t / h
-in the well-conditioned basis of Legendre polynomials.
++ c1 t + ... + cn t**n. The methods make the derivative of this function a projection of the
+right-hand side f along the step on the polynomials of degree n - 1. The projection is computed on
+the unit interval s = t / h in the well-conditioned basis of Legendre polynomials.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from pyharness.model.trajectory import Array
 class Tableau:
     """One correction of a step on the unit interval, as a Runge-Kutta tableau.
 
-    It evaluates f along the first estimate or the previous correction.
+    The correction evaluates f along the first estimate or the previous correction.
     """
 
     # Shape (m,), in units of the step size h: where f is evaluated, the collocation points or the

@@ -43,7 +43,7 @@ from pyharness.model.trajectory import Array, turned_to_space
 from pyharness.truth.elliptic import torque_free
 from pyharness.truth.free_attitude import free_attitude, period_of
 
-# Limits of closed forms need no conditioning, which would take long.
+# The limits of closed forms need no conditioning, whose computation would take long.
 _unknown = partial(unknown_flow, 1.0)
 _SERIES = ("taylor", "dop853")
 _TOLERANCES = {"taylor": (1e-12, MIDDLING), "dop853": (MIDDLING,)}
@@ -165,11 +165,11 @@ def _judged(known: Callable[[], Truth], tolerance: float, name: Name) -> Iterato
 
 
 def _montgomery(name: Name) -> Check:
-    """Return the check of the rotation in a period against Montgomery's formula.
+    """Return the check of the body's rotation in a period against Montgomery's formula.
 
-    The angle about the angular momentum L is 2 E T/L less a solid angle, with energy E and period
+    The angle about the angular momentum L is 2 E T/L minus a solid angle, with energy E and period
     T. L encloses the solid angle in the body, about the axis along which its component keeps its
-    sign. The angle is not conserved, so no other check detects a wrong rate.
+    sign. Only this check detects a wrong rate of the angle, because the angle is not conserved.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)
@@ -234,7 +234,7 @@ def _back(name: Name) -> Check:
     again = solve(start, [-time], method, tolerance, attitude=True).attitude
     assert again is not None
     forth, back = conditioning(scene, time), conditioning(start, -time)
-    # The forward run's error of omega rotates the backward run.
+    # The error of omega in the forward run rotates the body in the backward run.
     made = forth.limit(tolerance if method == "taylor" else 16.0 * ROUNDING)
     turns = made * back.amplification * math.sqrt(3.0) * back.largest * time
     limit = _allowed(method, tolerance, forth, time) + _allowed(method, tolerance, back, -time)

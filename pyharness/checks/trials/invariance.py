@@ -76,8 +76,9 @@ def _faster(factor: float, *bitwise: str) -> Symmetry:
     return Symmetry(lambda s: scaled(s, factor), factor, lambda omega: omega / factor, bitwise)
 
 
-# Our methods compare only quantities of the same unit. SciPy compares others for its first step,
-# and LEQT1F's implicit row scaling powers of the step.
+# Methods whose mantissas a power of two does not change: ours compare only quantities of the same
+# unit. SciPy compares different units for its first step; LEQT1F's implicit row scaling compares
+# powers of the step size.
 _POWERS_OF_TWO = (*OURS, *_PREPARED, *FIXED_STEP, "runge-kutta")
 SYMMETRIES = {
     # These methods form products of the next two axes in this order; others process the axes in a
@@ -143,7 +144,7 @@ def _back(time: float, tolerance: float, name: Name) -> Check:
     scene, method = scene_of(name), name.subject
     there = run_method(method, scene, time, tolerance).omega
     start = restarted_at(scene, there, time)
-    # Backward, SciPy may meet only a coarser tolerance.
+    # In the backward run, SciPy may meet only a coarser tolerance.
     coarser = tolerance
     if method in SCIPY_METHODS:
         coarser = max(tolerance, 1.1 * finest(method, start, -time))
@@ -170,7 +171,7 @@ def _split(time: float, tolerance: float, name: Name) -> Check:
         omega = run_method(method, start, stop - begin, tolerance).omega
         piece = _flow(scene.name, begin, stop - begin)
         rest = 1.0 if stop == time else _flow(scene.name, stop, time - stop).amplification
-        # The rest amplifies the error of each piece.
+        # The rest of the motion amplifies the error of each piece.
         limit += piece.limit(tolerance) * rest
     whole = run_method(method, scene, time, tolerance).omega
     difference = float(np.abs(omega - whole).max()) / flow.largest

@@ -1,6 +1,6 @@
 """Trial of length: energy, momentum and phase over a million revolutions, by Brouwer's law.
 
-The phase is the position along the closed curve of omega; the law is in `theory.brouwer`.
+The phase is the position along the closed curve of omega; `theory.brouwer` states the law.
 """
 
 import math
@@ -51,8 +51,8 @@ _LOST = 0.1
 
 # Bound on the last two terms of the Taylor series at the finest tolerance, over omega.
 _LEFT_OUT = Series.SLACK * Series.LEAST_LOCAL_TOLERANCE
-# Step by number of stages, in radians of the fastest rate. With 8 stages truncation is far below
-# rounding; with 4 it dominates the phase error, but must not change the energy.
+# Step size by number of stages, in radians of the fastest rate. With 8 stages the truncation error
+# is far below rounding; with 4 stages it dominates the phase error, but must not change the energy.
 _PARTS = {8: 1.0, 4: 0.25}
 _CLOSED_FORM = 16.0 * brouwer.ROUNDING  # error of the closed form at any time
 CLOSED_FORM = Basis(
@@ -70,8 +70,9 @@ class Integrator:
     """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step (s). `revolutions` is the longest run from the first initial condition,
-    `others` from the rest. `preference` is whether errors are biased.
+    errors of a step (s). `revolutions` is the length of the longest run from the first initial
+    condition, `others` of the runs from the other ones. `preference` tells whether rounding errors
+    are biased.
     """
 
     run: Runner
@@ -207,7 +208,7 @@ def measured(
 
 @cache
 def orbit_of(motion: str) -> Orbit:
-    """Return the factors from errors of omega to errors of energy, momentum and phase."""
+    """Return the Orbit of a motion, with the factors from errors of omega to other errors."""
     return brouwer.orbit(MOTIONS[motion])
 
 

@@ -23,7 +23,7 @@ from pyharness.thesis import compiled
 from pyharness.thesis.linear_solver import SINGULAR
 
 STEPS = tuple(10.0 ** (k / 2.0) for k in range(-20, 3))
-# Step sizes (s); at some, the four-term program's matrix is singular.
+# Step sizes (s); with some of them, the four-term program's matrix is singular.
 _RUN_STEPS = (1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -66,7 +66,8 @@ def _threshold(name: Name) -> Check:
     program = name.subject
     wanted = singular_below(program)
     found = declared_singular_below(program)
-    # The last pivot is proportional to a power of the step, by which its rounding error is divided.
+    # The last pivot is proportional to a power of the step, by which the relative rounding error is
+    # divided.
     _, rounding = solved(program, 1.01 * wanted).pivoting
     limit = rounding / (len(PARTS[program]) - 1)
     return name.bounded(abs(found / wanted - 1.0), limit, PIVOTS, f"{found:.6g} s")

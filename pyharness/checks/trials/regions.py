@@ -25,8 +25,8 @@ from pyharness.model.listing import Listing, subset
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.scene_file import case_scene
 
-# A, B, C and a steady omega, with few binary digits; eigenvalues are real, imaginary and complex,
-# in both half-planes.
+# A, B, C and a steady omega (rad/s), with few binary digits. The eigenvalues are real, imaginary
+# and complex, in both half-planes.
 _STEADY: dict[str, tuple[Triple, Triple]] = {
     "spin": ((0.5, -0.5, 0.25), (0.0, 0.0, 1.0)),
     "middle-axis": ((0.5, 0.5, 0.25), (0.0, 0.0, 1.0)),
@@ -77,7 +77,7 @@ def _attempt(listing: Listing, name: Name) -> Iterator[Check | Attempt]:
                 probe = partial(moving_step, scene, listing, count)
                 yield _probed(name, f"step-{count}-case-{case}", probe, scene, note)
     elif listing.defects == {"base-not-restored"}:
-        return  # two of similar size: no single growth rate
+        return  # two eigenvalues of similar size: there is no single growth rate
     for kind, direction in _DIRECTIONS.items():
         yield _probed(name, f"boundary-{kind}", partial(observed_boundary, listing, direction))
     for case in (2, 3, 4):

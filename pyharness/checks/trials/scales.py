@@ -24,7 +24,7 @@ from pyharness.model.torque_law import TorqueLaw
 
 _LAW = TorqueLaw((10.0, -20.0, 15.0), (0.0, 0.0, 1.0), (((3.0, 0.0, 1.0), 4.0),))
 _DRIVEN = replace(ORDINARY, torque=_LAW)
-# Squares and cubes must be in the range of binary64 too.
+# Exponents of powers of two whose squares and cubes are in the range of binary64 too.
 _DRIVEN_TWOS = (-320, -100, 100, 320)
 _OVERFLOW = Basis(
     "derived",
@@ -87,7 +87,7 @@ def _attempts() -> Iterator[Attempt]:
         if method not in (*SCIPY_METHODS, "closed-form"):
             yield from _bit_for_bit(method, "same-driven", driven, _DRIVEN_TWOS)
     law = TorqueLaw((1e10, 2e10, -1e10))
-    # In another body, coupling of the axes would change omega.
+    # The body is a sphere; in another body, the coupling of the axes would change omega.
     scene = Scene("beyond", (0.0, 0.0, 0.0), moments=(2.0, 2.0, 2.0), torque=law, step_size=1e298)
     for method in ALL:
         yield Attempt(named("scales", method, "beyond", scene=scene), _beyond)

@@ -81,11 +81,11 @@ def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attemp
 
 
 def _crossing(method: str, case: int, error: Callable[[int], float], name: Name) -> Check:
-    """Return the check, against theory, of the smallest step at which truncation dominates."""
+    """Return the check, against theory, of the smallest step with which truncation dominates."""
     forecaster = _forecaster(case, method)
     smallest = SMALLEST
     if method in PARTS:
-        # Below, LEQT1F reports a singular matrix.
+        # With smaller steps, LEQT1F reports a singular matrix.
         smallest = max(smallest, math.nextafter(singular_below(method), 1.0))
     counts = [count for count in COUNTS if TIME / count >= smallest]
     ruled = [c for c in counts if 0.5 < error(c) / forecaster.predict(c).truncation < 2.0]

@@ -46,7 +46,7 @@ SCENES = (
     Scene("sphere", (1.0, 1.0, 1.0), moments=(40.0, 40.0, 40.0), torque=_WAVE, steps=20),
     Scene("driven", (0.0, 1.0, 1.0), moments=(40.0, 30.0, 20.0), torque=_WAVES, steps=20),
 )
-# Its error amplification needs many steps.
+# The computation of its error amplification needs many steps.
 _BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
 _LATE = 20.0  # s
 
@@ -72,7 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return the jobs whose bits in threads differ from a call alone, once per difference."""
+    """Return each job, for each call in threads whose bits differ from those of a call alone."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)

@@ -39,7 +39,7 @@ from pyharness.truth.reference import reference
 _PREPARED = {"prepared-auto": "auto", "quick": "quick"}
 _OURS = ("taylor", "gauss-2", "gauss-4", "gauss-8", "auto")
 _ALL = (*_OURS, *_PREPARED, "dop853", "lsoda", "rk45", "radau")
-# They follow a wave for a million radians within seconds.
+# Methods that can follow a wave for a million radians within seconds.
 _LONG = ("taylor", "auto", *_PREPARED)
 
 _BODY = (40.0, 30.0, 20.0)
@@ -61,8 +61,8 @@ class Circumstance:
 def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
-    The phase of a wave has a random rounding error in every evaluation, at least one per period.
-    `conditioning` adds all n; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
+    The phase of a wave has a random rounding error in each of n evaluations, at least one in a
+    period. `conditioning` adds all n errors; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines
@@ -85,7 +85,7 @@ def averaged(scene: Scene, time: float) -> Truth:
 def summed(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a sphere, with a bound on its rounding errors.
 
-    The phase of a wave is in double-double; only the final sum rounds.
+    The phase of a wave is computed in double-double; only the final sum is rounded.
     """
     known = reference(scene, [time])
     largest = float(np.abs([known.omega[-1], scene.omega]).max())

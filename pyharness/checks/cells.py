@@ -73,7 +73,7 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree or, for a listed difference, still differ.
+    """Return the check that Fortran and Python agree or, if `is_listed`, that they still differ.
 
     `options` are the constant of the stop test (1/s), and whether the test may end the run.
     """

@@ -107,7 +107,7 @@ def random_cells(
 
 
 def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Iterator[PortCheck]:
-    """Yield checks that a port, started by `command`, returns the Python version's bits.
+    """Yield checks that a port, started by `command`, agrees bit for bit with the Python version.
 
     An invalid answer is a failed check and ends the comparison. `patience` is the longest wait (s)
     for an answer. Raise InputError if `command` is empty.

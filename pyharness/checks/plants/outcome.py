@@ -14,7 +14,7 @@ CONTROL = "none"
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one planted fault: whether the checks detected it, and how many failed."""
+    """The outcome of one planted fault: whether checks detected it, and how many checks failed."""
 
     name: str
     fault: str

@@ -21,7 +21,7 @@ OPTIONS = {
     "--assignments": "For each case whose initial angular velocity the thesis omits, show with "
     "which assumed values the claims about this case hold.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
+    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
     "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
     "readings of doubtful statements, assumptions about missing ones, and number of steps.",
     "--atlas STORE": "Report from which initial angular velocities the claims hold, according to "

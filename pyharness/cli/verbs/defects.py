@@ -11,7 +11,7 @@ OPTIONS = {
     "name NAME": "Show one entry of the list and its effect in every case; NAME is its name or its "
     "card (numbered line of a program), as in stage-base, 1660 or two-term:1660 (default: list the "
     "defects that change numbers).",
-    "--all": "List all entries, also those that change no number (JSON always does).",
+    "--all": "List all entries, also those that change no number (JSON always has all).",
     "--kind K": "List only entries of this kind, such as defect (fault of the author), reading "
     "(doubtful card) or conjecture (assumption about a missing card).",
     **shared.outputs(FORMATS, plot=""),

@@ -21,10 +21,11 @@ OPTIONS = {
     "of the step, as in 0.3,0.6.",
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
-    "--lost": "Instead, examine three programs that failed in the thesis (IV.2) but are not printed "
-    "there: rank possible mistakes by how many of the three would fail with each.",
+    "--lost": "Instead, examine three programs that failed in the thesis (IV.2) but are not "
+    "printed there: rank possible mistakes by how many of the three would fail with each.",
     "--word W": f"Floating-point arithmetic of the programs of --lost: {', '.join(WORD_NAMES)} "
-    f"(default {WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates.",
+    f"(default {WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded "
+    "rounds.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"

@@ -33,16 +33,16 @@ OPTIONS = {
     "--implementation I": "Language of the program: fortran or python (default fortran, but "
     "python with --word other than binary64).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates. "
+    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds. "
     f"Fortran has only {', '.join(COMPILED_WORDS)}.",
-    "--method M": "Solve the scene by this method instead of a program: auto (default with --scene), "
-    "taylor, closed-form, dop853 or another of docs/reference/methods.md.",
+    "--method M": "Solve the scene by this method instead of a program: auto (default with "
+    "--scene), taylor, closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,
-    "--times T1,T2,...": "Times of the results of --method, s, positive or negative, in increasing or "
-    "decreasing order (default: the ends of the scene's steps).",
+    "--times T1,T2,...": "Times of the results of --method, s, positive or negative, in increasing "
+    "or decreasing order (default: the ends of the scene's steps).",
     "--attitude [FORM]": "Compute the attitude (orientation) of the body too (default: only "
-    f"if the scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}; 3-1-3, "
-    "3-2-1: Euler angles about these axes).",
+    f"if the scene has one), and print it as {', '.join(FORMS)} (default {FORMS[0]}); 3-1-3 "
+    "and 3-2-1 are Euler angles about these axes.",
     "--animate FILE": "Write an animation of the rotating body to this file (.gif or .html); "
     "needs --method and an attitude.",
     "--tolerance E": "Largest allowed error of omega from --method, relative to its largest "

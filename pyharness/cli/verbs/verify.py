@@ -31,8 +31,8 @@ _ABOUT = {
     "golden": "stored trajectories",
 }
 OPTIONS = {
-    "--only ID,...": "Run only checks of these kinds, or only those whose ids begin with this text, "
-    "as in cells/two-term. Kinds: "
+    "--only ID,...": "Run only checks of these kinds, or only those whose ids begin with this "
+    "text, as in cells/two-term. Kinds: "
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",

@@ -16,7 +16,7 @@ from pyharness.model.trajectory import Array
 from pyharness.truth.reference import exact_coefficients
 
 MOMENTS: Triple = (40.0, 30.0, 20.0)  # kg m2
-HORIZON = 3.0  # s
+HORIZON = 3.0  # end time (s)
 SAMPLE = 200  # number of bodies whose error is measured
 _FASTEST = 2.0  # largest component of the initial omega, rad/s
 _HARDEST = 1.0  # largest torque about an axis over the moment about this axis, rad/s2

@@ -58,10 +58,10 @@ class Rate:
     method: str
     threads: int
     setting: float | None  # tolerance or number of steps; None for a closed form
-    bodies: int  # in a call
+    bodies: int  # number of bodies in a call
     seconds: float  # the shortest time of a call
     error: float  # largest relative error of omega in the sample
-    note: str = ""  # the fastest of several variants
+    note: str = ""  # names the fastest of several variants
 
     @property
     def bodies_a_second(self) -> float:

@@ -28,7 +28,7 @@ class Growth:
     # `_STARTS` initial states of the same motion, and the change by one rounding of the time.
     error: float
     conditioning: float
-    steps: int  # of one integration
+    steps: int  # number of steps of one integration
 
 
 def growth(

@@ -56,7 +56,7 @@ class Workload:
     # followed by `L` if T = 100 s (`3L`), or by any other T that is not 3 s.
     label: str
     scene: Scene
-    horizon: float  # T, s
+    horizon: float  # end time T, s
     # Only for scenes that are not cases: kinds, solution, error amplification, and revolutions.
     kinds: tuple[str, ...] = ()
     truth: Reference | None = None

@@ -16,7 +16,7 @@ from pyharness.model.scene_file import case_scene
 from pyharness.thesis import compiled
 
 _BATCHES = 9
-_SECONDS = 2e-3  # of a batch
+_SECONDS = 2e-3  # duration (s) of a batch
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Saving:
     """Median run times (s) with and without a part of a computation that a plan can omit."""
 
     part: str  # as the plan names it
-    where: str  # scene or program
+    where: str  # name of the scene or program
     with_it: float
     without: float
 

@@ -33,7 +33,7 @@ class Spread:
     kind: str
     target: float  # as in `Row.error`
     scenes: int
-    reached: int  # where contender and baseline reach the error
+    reached: int  # number of scenes where contender and baseline reach the error
     mean: float | None  # geometric, over the scenes reached
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]

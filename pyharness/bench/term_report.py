@@ -59,7 +59,7 @@ class Summary:
     """The ratios over all scenes of a kind, at one target error."""
 
     kind: str
-    bodies: int  # in a call
+    bodies: int  # number of bodies in a call
     target: float | None  # None for all target errors together
     scenes: int  # pairs of scene and end time in which both solvers reach the error
     mean: float | None  # geometric mean

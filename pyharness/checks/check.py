@@ -102,7 +102,7 @@ class Check:
     passed: bool
     value: float | None  # None without a single number
     limit: float | None  # None if `value` is not compared
-    basis: Basis | None  # reason for the limit
+    basis: Basis | None  # why the limit has this value
     note: str = ""  # fault or observation, in a few words
     again: str = ""  # command that repeats the check, if not the name's
     # Returns the error bound of the reference, if one was used, in the unit of the value. It is
@@ -250,7 +250,7 @@ class Selection:
     """The checks that one run of `verify` makes."""
 
     only: Sequence[str] = ()  # leading parts of ids, as in ``cells/two-term``; empty: all
-    seed: str = field(default_factory=weekly_seed)  # of random draws
+    seed: str = field(default_factory=weekly_seed)  # seed of the random draws
     draws: int = DRAWS
     record: Path = RECORD  # folder of the golden record
     # None selects the published problems of the package

@@ -59,9 +59,9 @@ class Value:
 class Problem:
     """A published problem: a scene, and its results at several times."""
 
-    name: str  # of its file
-    title: str  # as a sentence
-    unit: str  # of the printed omega, one of `UNITS`
+    name: str  # name of its file
+    title: str  # title as a sentence
+    unit: str  # unit of the printed omega, one of `UNITS`
     scene: Scene  # equations and initial state; the step size is not used
     values: tuple[Value, ...]  # one for each time
     path: str | None = None  # None for a problem of the package

@@ -38,7 +38,7 @@ _ANEW = "verify --update writes it anew"
 _STEPS = (1, 10)
 _RECORDED_METHODS = ("taylor", "closed-form", "gauss-4", "rk4", *SCIPY_METHODS)
 _TOLERANCE = 1e-9
-_LARGEST = 1 << 24  # bytes of a file
+_LARGEST = 1 << 24  # largest size (bytes) of a file
 _RECORD = Basis(
     "measured",
     "no bit of a recorded result may differ",

@@ -23,7 +23,7 @@ _PIECE = 1 << 16
 _TO_END = 1.0  # time (s) to end after closing input or output
 # Rounds of searching for child processes, and of reading the last output.
 _ROUNDS = 100
-_PROBE = 10.0  # s, for one request of the other protocol
+_PROBE = 10.0  # time limit (s) for one request of the other protocol
 _EXAMPLES = {"--port": "node web/port.js", "--integrator": "python3 mine.py"}
 _MARK = "PYHARNESS_PORT"  # environment variable that marks each process of a port
 

@@ -56,7 +56,7 @@ _EVERY_TORQUE, _EVERY_SLOW_TORQUE = 20, 80
 # Factors on the work limit of the reference: for an attitude, and for a torque that depends on the
 # state.
 _EFFORT, _EFFORT_TORQUE = 0.05, 0.2
-ROUNDING = 2e-15  # relative, for an error amplification of 1
+ROUNDING = 2e-15  # relative error by rounding, for an error amplification of 1
 CAMPAIGN = Basis(
     "measured",
     "error in random scenes: tolerance plus 2e-15 K, where K is the error amplification",
@@ -146,7 +146,7 @@ def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
         try:
             truth = truth_of(drawn)
         except InputError as refusal:
-            # Then the motion diverges or is too fast.
+            # The motion diverges, or is too fast for the true solution.
             may = drawn.scene.name in _MAY_REFUSE
             none = chosen.name_draw(number, "no-truth")
             again = chosen.name_draw(number).replay
@@ -237,7 +237,7 @@ def random_torques(chosen: Selection) -> Iterator[Attempt]:
         if not chosen.may_ask(f"random/{number}"):
             continue
         source = Random(f"torque {chosen.seed}/{number}")
-        # Both kinds occur in the draws that run all methods.
+        # Chosen so that both kinds of torque occur in the draws that run all methods.
         kind = (number // _EVERY_TORQUE + number // _EVERY_SLOW_TORQUE) % 2
         scene, time = (state_scenes.draw, state_scenes.draw_ready)[kind](source)
         is_slow = number % _EVERY_SLOW_TORQUE == 0 and not chosen.thin

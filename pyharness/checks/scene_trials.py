@@ -40,7 +40,7 @@ from pyharness.truth.reference import reference
 _METHODS = ("auto", "taylor", "gauss-4", "gauss-8", *SCIPY_METHODS)
 # Methods that run also at their finest tolerance; methods in Python would take too long.
 _FINE = ("auto", "taylor", "closed-form")
-_PARTS = (0.125, 0.25, 0.5, 1.0)  # of the last time
+_PARTS = (0.125, 0.25, 0.5, 1.0)  # fractions of the last time
 _CUT = 0.37  # fraction of the last time at which a motion is divided
 _REPEATS = 4
 

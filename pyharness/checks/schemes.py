@@ -98,10 +98,10 @@ def _scheme(name: str, scene: Scene, run: Trajectory) -> tuple[Array, Array]:
         parts = np.array([float(part) for part in PARTS[name]])
         powers = np.arange(1, len(parts) + 1)
         matrix = np.power.outer(parts, powers - 1)
-        # They integrate the polynomial through the rates at the collocation points.
+        # The programs integrate the polynomial through the rates at the collocation points.
         weights = np.linalg.solve(matrix.T, 1.0 / powers)
         points = [_stage(scene, part, first.state + part * h * first.rate) for part in parts]
-        # The programs' matrix: they solve for the coefficients of t, t**2, ...
+        # Of the programs' matrix, with which they solve for the coefficients of t, t**2, ...
         condition = float(np.linalg.cond(powers * matrix, np.inf))
     else:
         points = _stages(scene, run)
@@ -149,7 +149,7 @@ class _Quotients:
 
     values: Array  # shape (n, m) for n steps, 1/s
     rounding: Array  # shape (n, m): bound on the difference of two computations, 1/s
-    names: list[str]  # of the m quotients
+    names: list[str]  # names of the m quotients
 
 
 def stops(chosen: Selection) -> Iterator[Attempt]:

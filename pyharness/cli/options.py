@@ -76,8 +76,8 @@ class Cost(NamedTuple):
     """The time and memory of a random draw, on one core of 2026, and the largest count of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
-    seconds: float  # per draw
-    n_bytes: float  # per draw
+    seconds: float  # run time (s) of a draw
+    n_bytes: float  # memory (bytes) of a draw
     most: int  # largest allowed number of draws
 
 

@@ -191,7 +191,7 @@ def _rows(case: int) -> Iterator[list[Any]]:
             yield [*names, step, *state]
 
 
-# One for each option of the machine's compiler.
+# The arithmetics of the original machine, one for each option of its compiler.
 _MACHINE = ("cdc48", "cdc48-rounded")
 _PAGES = "program case listing word steps card_steps page"
 _SYSTEMS = {"nos": "NOS", "nosbe": "NOS/BE"}

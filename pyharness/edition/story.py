@@ -105,7 +105,7 @@ def context() -> dict[str, Any]:
         _chart_of_case("points-run", 6, {"two-term": _run(6, "two-term")}, _span(6)),
         *(_race_chart(listing) for listing in ("original", "corrected")),
     ]
-    point_at = POINTS_STEP * scene.step_size  # what DT has become
+    point_at = POINTS_STEP * scene.step_size  # the value of DT in this step (s)
     ratios = {case: _ratios(case) for case in RACE_CASES}
     others = [ratio for case in RACE_CASES if case != 7 for ratio in ratios[case].values()]
     corrected = {name: _run(2, name, "corrected") for name in PROGRAMS}

@@ -16,7 +16,7 @@ from pyharness.model.report import Column, Report, Table, counted, digits, words
 from pyharness.thesis.cards import Card, deck, tight
 from pyharness.thesis.collation import witness_lines
 
-_TAIL = 0.025  # beyond each end of a 95 % interval
+_TAIL = 0.025  # probability beyond each end of a 95 % interval
 _COLUMNS = (
     *words("unit"), Column("first"), Column("second"), Column("both"),
     Column("estimate", digits(".1f")), Column("lower"), Column("upper"), Column("uncorrected"),

@@ -132,7 +132,7 @@ def _axis_row(axis: Axis) -> tuple[Any, ...]:
 _MOST_PANELS = 6
 _MOST_PLACES = 200  # values along an axis of a map; more would not be visible
 _MOST_DOTS = 5000  # values in a panel with a line or dots
-_COLUMNS = 3  # of panels
+_COLUMNS = 3  # number of columns of panels
 # A scale without negative values is logarithmic if it spans more than so many orders of magnitude.
 _ORDERS = 3.0
 # The ends of a scale for all panels, and whether it is logarithmic.

@@ -27,7 +27,7 @@ _ENOUGH = 0.2  # s; a sample that took longer is usually large enough
 # The next larger sample is measured anyway if it has at most the fraction `_PART` of all scenes and
 # takes at most `_LONGEST`: a small sample includes too much of a batch's constant cost.
 _PART = 0.01
-_LONGEST = 60.0  # s
+_LONGEST = 60.0  # longest expected time (s) of such a sample
 # Fewest values sampled along a dimension in which all scenes of a batch are equal.
 _PLACES = 5
 _FILES = 20  # most chunks solved, or written and read, for a measurement

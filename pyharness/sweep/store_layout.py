@@ -41,7 +41,7 @@ class Label(NamedTuple):
     """The identity of a store."""
 
     schema: object  # number of the store's format; an integer if pyharness wrote the store
-    version: str  # of pyharness
+    version: str  # version of pyharness
     fingerprint: str  # SHA-256 of the sweep
 
 

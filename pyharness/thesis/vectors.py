@@ -23,7 +23,7 @@ from pyharness.model.schema import check_schema
 from pyharness.thesis.word import WORDS, Pair, framed
 
 OURS = Path(__file__).parent.parent / "data" / "words" / "cdc.json"
-_LARGEST = 1 << 24  # bytes of a file
+_LARGEST = 1 << 24  # largest size (bytes) of a file
 _FIELDS = ("name", "op", "x", "y", "result")
 BITS = 48
 _WORD = re.compile(r"[0-7]{20}")

@@ -223,7 +223,7 @@ class Batch:
         for i, time in enumerate(t_end.tolist()):
             try:
                 found = solve(self.scene_of(i), time, method, tolerance, attitude=attitude)
-            except InputError:  # refuses this scene alone
+            except InputError:  # the solver refuses only this scene
                 continue
             status[i] = ENDS.index(found.ended)
             if found.has_all_rows:
@@ -244,7 +244,7 @@ class Batch:
                     rate = own.pop("torque_rate")[0]
                     scene = replace(scene, torque=replace(scene.law, rate=rate))
                 part = self._run(scene, own, at)
-            except InputError:  # refuses this scene alone
+            except InputError:  # the solver refuses only this scene
                 continue
             for name in ("omega", "status", "n_rows", "stop_variable", "stop_quotient"):
                 getattr(found, name)[i] = getattr(part, name)[0]

@@ -32,7 +32,7 @@ class End:
 
     omega: Array  # shape (3,), rad/s; NaN if the time was not reached
     ended: str = "complete"  # "complete", or why there is no full result
-    steps: int = 0  # as the candidate counts them
+    steps: int = 0  # number of steps, as the candidate counts them
     evaluations: int | None = None  # of the right-hand side, if counted
     attitude: Array | None = None  # shape (4,), scalar first, if propagated
 

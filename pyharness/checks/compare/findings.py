@@ -28,9 +28,9 @@ class ProgramFinding:
     listing: Listing
     trajectory: Trajectory
     accuracy: Accuracy
-    ulps: float | None  # between Fortran and Python; None if only Python ran
+    ulps: float | None  # largest difference between Fortran and Python; None if only Python ran
     differences: tuple[str, ...]  # results in which Fortran and Python differ
-    order: Order | None  # for a corrected program in binary64 only
+    order: Order | None  # measured for a corrected program in binary64 only
     seconds_per_step: float
 
     __repr__ = short_repr

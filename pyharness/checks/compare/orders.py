@@ -46,17 +46,17 @@ State = Literal["as due", "rounding", "misses", "unsettled", "singular", "sensit
 class Order:
     """A method's order of convergence, measured by halving the step, or why it is undecided."""
 
-    due: int  # expected by theory
+    due: int  # order expected by theory
     # `as due`: as expected. `rounding`: the error reached rounding before the order showed.
     # `misses`: the error decreases too slowly. Else undecided: no step was small enough
     # (`unsettled`), the program found its matrix singular (`singular`), the motion amplifies
     # rounding errors too much (`sensitive`), or the solution is unbounded (`unbounded`).
     state: State
-    value: float | None  # measured, if possible
+    value: float | None  # measured order, if any
     step_size: float  # smallest tried (s); if `singular`, the largest singular one
-    steps: int = 0  # of the finest run compared with the reference
-    error: float = math.inf  # largest of that run (rad/s)
-    time: float = math.nan  # of that error (s)
+    steps: int = 0  # steps of the finest run compared with the reference
+    error: float = math.inf  # largest error of that run (rad/s)
+    time: float = math.nan  # time of that error (s)
 
     @property
     def is_judged(self) -> bool:

@@ -22,7 +22,7 @@ from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Array
 
 _STATES = {each.name: each.state for each in FAULTS}
-_STEP_AXIS = np.array([0.6, 0.0, 0.8])  # of the rotation that a first-order fault adds
+_STEP_AXIS = np.array([0.6, 0.0, 0.8])  # axis of the rotation that a first-order fault adds
 
 
 # A function of a quaternion, omega at both ends of a step, and the size of the step (s).

@@ -30,16 +30,16 @@ DRAWS = 2
 """The default number of random scenes of each kind of torque."""
 PARTS = ("omega", "attitude")
 """The parts of a state whose errors are measured."""
-_COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerances
-_EACH = 2  # coarsest steps between requested times
+_COARSEST, _PER_LEVEL = 1e-3, 0.1  # tolerance of level 0, and factor from level to level
+_EACH = 2  # number of coarsest steps between requested times
 _ORDER_ONE = 1.5  # a smaller measured order counts as 1
-_SEVERAL = 4  # steps that must show the order 1
+_SEVERAL = 4  # number of step sizes that must show the order 1
 _LATE = 3  # earlier tolerances that must show the order too
-_LEAST = 1e-300  # in place of an error of 0
+_LEAST = 1e-300  # replaces an error of 0, to compute an order
 # An error larger than this many roundings, times the square root of the number of steps, is due to
 # the method.
 _ROUNDINGS = 240.0
-_BETWEEN = 8.0  # s from a row to the next
+_BETWEEN = 8.0  # time (s) from a row to the next
 _ROWS, _FEWEST, _FEWEST_COARSE = 64, 16, 4
 # Levels of the largest step size (1/32 s) and tolerance (1e-6) of the long motion.
 _FIRST = {"step_size": 4, "tolerance": 3}
@@ -169,7 +169,7 @@ class Convergence:
 
     @property
     def converges(self) -> bool:
-        """Return whether the order of decrease is at least 1, up to `ORDER_SLACK`."""
+        """Return whether the order is at least 1 - `ORDER_SLACK`, or the errors are rounding."""
         return self.order is None or self.order >= 1.0 - ORDER_SLACK
 
     @property

@@ -273,7 +273,7 @@ def _pivoting(matrix: Fractions, order: Sequence[int], sizes: Fractions) -> tupl
     for j, (chosen, candidates, _) in enumerate(_columns(matrix, order)):
         best = max(candidates.values())
         shortfall = max(shortfall, 1 - candidates[chosen] / best)
-        # Both have the rounding errors of a sum and a scale.
+        # Each of the two candidates has the rounding errors of a sum and a scale factor.
         wrong = max(scale[i] * sizes[i, j] for i in candidates) * gamma(len(matrix) + 2)
         allowed = max(allowed, 2 * wrong / best)
     return float(shortfall), float(allowed)

@@ -155,7 +155,7 @@ def of_flow(flow: Array, times: Array, state: Array, source: Array, largest: flo
         arriving = (sizes @ made[:, :, None])[:, :, 0]
         return np.asarray((0.5 * (arriving[1:] + arriving[:-1]) * np.abs(steps)[:, None]).sum(0))
 
-    # Both ends are rounded once, even in a very short time.
+    # The first and the last omega are rounded once, even in a very short time.
     ends = sizes[0] @ np.abs(state[0]) + np.abs(state[-1])
     span = abs(float(times[-1])) or 1.0
     unamplified = float((0.5 * (source[1:] + source[:-1]) * np.abs(steps)[:, None]).sum(0).max())

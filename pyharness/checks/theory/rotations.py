@@ -69,7 +69,7 @@ class SteadyRotations:
     """The steady rotations of a scene, perturbed by the same relative magnitude."""
 
     told: str  # text: which steady rotations exist, and which are shown
-    disturbance: float  # perturbation over rotation
+    disturbance: float  # perturbation divided by the rotation
     rotations: tuple[SteadyRotation, ...]
 
 

@@ -78,7 +78,7 @@ class FixedStep:
     """A program or method with a fixed step."""
 
     name: str
-    order: int  # of the global error
+    order: int  # order of the global error
     scheme: Scheme  # ``scheme(arithmetic, omega)`` returns omega after a step
     # Bound of the rounding error of a step's last additions, in units of 2**-53 times omega.
     roundings: float = 1.0

@@ -53,8 +53,8 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     else:
         degree = 3 * n if weighting == "galerkin" else 3 * n - 1
         nodes, quadrature = _gauss(degree // 2 + 1)
-        # They span the same space as the weight functions t ... t**n (Galerkin) or 1 ... t**(n-1)
-        # (least squares).
+        # These tests span the same space as the weight functions t ... t**n (Galerkin) or
+        # 1 ... t**(n-1) (least squares).
         tests = basis(nodes, n)
         if weighting == "galerkin":
             tests = tests * nodes[:, None]

@@ -41,7 +41,7 @@ MOTIONS = {
 # Initial conditions of each motion. With so many, over two decades of steps, a random walk is
 # mistaken for a drift with a probability below one in a thousand.
 STARTS = 12
-_EFFORT = 10.0  # on the work limit of the Taylor series
+_EFFORT = 10.0  # factor on the work limit of the Taylor series
 # With fewer revolutions the rounding of the result is not negligible.
 _FIT_FROM = 10**2.5
 # Half the difference of the powers for random and biased rounding.

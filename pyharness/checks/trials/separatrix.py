@@ -15,7 +15,7 @@ from pyharness.engine.registry import FIXED_STEP
 from pyharness.model.basis import Basis
 from pyharness.model.scene import Scene
 
-_STAYS = 50.0  # s
+_STAYS = 50.0  # time (s) for which the rotation must stay constant
 # The long time is for closed forms, whose limits need no error amplification.
 _UNKNOWN = unknown_flow(max(map(abs, SYMMETRIC_START)))
 _UNDISTURBED = Basis(

@@ -48,7 +48,7 @@ SCENES = (
 )
 # The computation of its error amplification needs many steps.
 _BRAKED = Scene("braked", (0.3, 1.1, 2.7), moments=(40.0, 30.0, 20.0), torque=damping(0.5))
-_LATE = 20.0  # s
+_LATE = 20.0  # end time (s)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pyharness.model.pipes import read_input
 from pyharness.thesis.cards import chosen
 from pyharness.thesis.collation import expected_lines, faults, rows, undeclared, unexplained
 
-_LARGEST_SCAN = 1 << 24  # bytes
+_LARGEST_SCAN = 1 << 24  # largest size (bytes) of a text
 # Outputs instead of cards. TEI, with its header and apparatus, is always of all cards.
 _KINDS = ("--format tei", "--classes", "--collate", "--origins", "--second-reading", "--scan")
 FORMATS = (*shared.FORMATS, "tei")

@@ -807,20 +807,63 @@ contains
     end subroutine correct
 
     subroutine add_nodes()
-      !! Compute the unknowns at the nodes of the step.
-      real(dp) :: change(tape%n_unknowns), error(tape%n_unknowns)
-      integer :: k
+      !! Compute the unknowns at the nodes of the step, as `evaluate` and `correct`, side by side.
+      real(dp) :: parts(SIDE_BY_SIDE), powers(SIDE_BY_SIDE), errors(SIDE_BY_SIDE, n)
+      real(dp) :: changes(SIDE_BY_SIDE, n), sizes(SIDE_BY_SIDE), low
+      integer :: first, i, k, lane
 
       solution%n_steps = solution%n_steps + 1
       if (solution%n_steps >= size(solution%ends)) return
       solution%ends(solution%n_steps + 1) = t_next(1)
-      do k = 1, size(solution%nodes)
-        call evaluate(factor*solution%nodes(k), change, error)
-        call correct(y, y_low + change, error, solution%at_nodes(:, k, solution%n_steps))
+      do first = 1, size(solution%nodes), SIDE_BY_SIDE
+        do i = 1, SIDE_BY_SIDE
+          parts(i) = factor*solution%nodes(min(first + i - 1, size(solution%nodes)))
+        end do
+        powers = powers_of(parts/factor, s%order + 1)
+        sizes = 0.0_dp
+        do i = 1, n
+          changes(:, i) = 0.0_dp
+          do k = s%order, 1, -1
+            changes(:, i) = parts*(changes(:, i) + s%a(k, FIRST_UNKNOWN - 1 + i))
+          end do
+          errors(:, i) = s%blocks(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
+          do k = last_terms(1) - 1, 0, -1
+            errors(:, i) = parts*errors(:, i) + s%blocks(1, k, FIRST_UNKNOWN - 1 + i, 1)
+          end do
+          errors(:, i) = errors(:, i) - powers*left(i)
+          sizes = max(sizes, weights(i)*abs(errors(:, i)))
+        end do
+        do k = first, min(first + SIDE_BY_SIDE - 1, size(solution%nodes))
+          lane = k - first + 1
+          if (.not. sizes(lane) <= found%error) found%error = sizes(lane)
+          do i = 1, n
+            low = y_low(i) + changes(lane, i)
+            if (sizes(lane) <= min(LINEAR_RANGE, request%tolerance)) low = low - errors(lane, i)
+            solution%at_nodes(i, k, solution%n_steps) = y(i) + low
+          end do
+        end do
       end do
     end subroutine add_nodes
 
   end subroutine march
+
+  pure function powers_of(x, exponent) result(powers)
+    !! Return whole powers, each by the same products as a single one.
+    real(dp), intent(in) :: x(SIDE_BY_SIDE)
+    integer, intent(in) :: exponent !! above 0
+    real(dp) :: powers(SIDE_BY_SIDE), square(SIDE_BY_SIDE)
+    integer :: left
+
+    powers = 1.0_dp
+    square = x
+    left = exponent
+    do
+      if (mod(left, 2) == 1) powers = powers*square
+      left = left/2
+      if (left == 0) exit
+      square = square*square
+    end do
+  end function powers_of
 
   pure function transposed(n, lanes) result(matrix)
     !! Compute the matrix of the open block from the perturbations in the lanes.

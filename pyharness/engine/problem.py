@@ -70,18 +70,17 @@ def trajectory_of(
     error: float | None = None,
     growth: float | None = None,
     attitudes: Array | None = None,
+    **more: Any,
 ) -> Trajectory:
     """Return the trajectory from the first `n_rows` columns of a kernel's omega and attitudes.
 
     It has no `error` and `growth` if they are negative, or if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
-    estimates = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
-    more = {
-        name: float(value)
-        for name, value in estimates.items()
-        if value is not None and value >= 0.0
-    }
+    if ended in WITH_ALL_ROWS:
+        for name, value in (("error", error), ("growth", growth)):
+            if value is not None and value >= 0.0:
+                more[name] = float(value)
     attitude = None if attitudes is None else attitudes.T[:n_rows]
     return rows_trajectory(
         times[:n_rows], rows.T[:n_rows], evaluations, steps, ended, attitude=attitude, **more

@@ -172,7 +172,8 @@ def solve(
     below = [t for t in values if t < 0.0]
     # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
-    more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
+    needs_steps = dense_output or functions is not None
+    more = (True,) if chosen.gives_steps and needs_steps else ()
     parts = [integrate(chosen, scene, each, tolerance, effort, *more) for each in sides if each]
     parts = [
         with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
@@ -182,12 +183,16 @@ def solve(
         parts[0] = in_reverse(parts[0])
     found = parts[0] if len(parts) == 1 else joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
-    steps = found.sol
-    found = replace(found, moments=moments, tolerance=reported, scene=given, sol=None)
+    sol = found.sol if needs_steps else None
     if axes is not None:
         turned_to = partial(states_in_scene_axes, axes=axes, own=7 if attitude else 3)
-        steps, found = transformed_steps(steps, turned_to), in_scene_axes(found, axes)
-    if found.ended == "unchecked" and (dense_output or functions is not None):
+        sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, axes)
+    if sol is not None:
+        sol = replace(sol, rates=partial(rates_of, given))
+    found = replace(
+        found, moments=moments, tolerance=reported, scene=given, sol=sol if dense_output else None
+    )
+    if found.ended == "unchecked" and needs_steps:
         raise InputError(
             f"dense output and events of {method} need the series of a recorded torque, which ends "
             "before the last time; allowed: a smooth torque, or opaque(function)"
@@ -195,13 +200,11 @@ def solve(
     if found.reason is not None:
         found = replace(found, reason=with_text(found.reason, given))
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
-    if dense_output or functions is not None:
-        if steps is None:
-            sol = solution_of(given, found, rows, method, tolerance)
-        else:
-            sol = replace(steps, rates=partial(rates_of, given))
+    if needs_steps and sol is None:
+        sol = solution_of(given, found, rows, method, tolerance)
         found = replace(found, sol=sol) if dense_output else found
     if functions is not None:
+        assert sol is not None
         ends = values[0], values[-1]
         found = with_events(given, found, sol, functions, ends, rows, method, tolerance)
         if turned or (len(values) == 1 and values[0] < 0.0):

@@ -7,6 +7,7 @@ module tape_march
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
+  use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, N_INPUTS, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, find_growth, MOST_UNKNOWNS, transitions_t
@@ -808,32 +809,26 @@ contains
 
     subroutine add_nodes()
       !! Compute the unknowns at the nodes of the step, as `evaluate` and `correct`, side by side.
-      real(dp) :: parts(SIDE_BY_SIDE), powers(SIDE_BY_SIDE), errors(SIDE_BY_SIDE, n)
-      real(dp) :: changes(SIDE_BY_SIDE, n), sizes(SIDE_BY_SIDE), low
+      real(dp) :: parts(AT_ONCE), powers(AT_ONCE), errors(AT_ONCE, n)
+      real(dp) :: changes(AT_ONCE, n), sizes(AT_ONCE), low
       integer :: first, i, k, lane
 
       solution%n_steps = solution%n_steps + 1
       if (solution%n_steps >= size(solution%ends)) return
       solution%ends(solution%n_steps + 1) = t_next(1)
-      do first = 1, size(solution%nodes), SIDE_BY_SIDE
-        do i = 1, SIDE_BY_SIDE
-          parts(i) = factor*solution%nodes(min(first + i - 1, size(solution%nodes)))
-        end do
+      do first = 1, size(solution%nodes), AT_ONCE
+        parts = factor*parts_from(first, solution%nodes)
         powers = powers_of(parts/factor, s%order + 1)
         sizes = 0.0_dp
         do i = 1, n
-          changes(:, i) = 0.0_dp
-          do k = s%order, 1, -1
-            changes(:, i) = parts*(changes(:, i) + s%a(k, FIRST_UNKNOWN - 1 + i))
-          end do
-          errors(:, i) = s%blocks(1, last_terms(1), FIRST_UNKNOWN - 1 + i, 1)
-          do k = last_terms(1) - 1, 0, -1
-            errors(:, i) = parts*errors(:, i) + s%blocks(1, k, FIRST_UNKNOWN - 1 + i, 1)
-          end do
+          call sum_at_nodes(s%a(1:s%order, FIRST_UNKNOWN - 1 + i), 1, s%order, parts, changes(:, i))
+          call sum_at_nodes(s%blocks(:, 1:last_terms(1), FIRST_UNKNOWN - 1 + i, 1), SIDE_BY_SIDE, &
+                            last_terms(1), parts, errors(:, i))
+          errors(:, i) = errors(:, i) + s%blocks(1, 0, FIRST_UNKNOWN - 1 + i, 1)
           errors(:, i) = errors(:, i) - powers*left(i)
           sizes = max(sizes, weights(i)*abs(errors(:, i)))
         end do
-        do k = first, min(first + SIDE_BY_SIDE - 1, size(solution%nodes))
+        do k = first, min(first + AT_ONCE - 1, size(solution%nodes))
           lane = k - first + 1
           if (.not. sizes(lane) <= found%error) found%error = sizes(lane)
           do i = 1, n
@@ -846,24 +841,6 @@ contains
     end subroutine add_nodes
 
   end subroutine march
-
-  pure function powers_of(x, exponent) result(powers)
-    !! Return whole powers, each by the same products as a single one.
-    real(dp), intent(in) :: x(SIDE_BY_SIDE)
-    integer, intent(in) :: exponent !! above 0
-    real(dp) :: powers(SIDE_BY_SIDE), square(SIDE_BY_SIDE)
-    integer :: left
-
-    powers = 1.0_dp
-    square = x
-    left = exponent
-    do
-      if (mod(left, 2) == 1) powers = powers*square
-      left = left/2
-      if (left == 0) exit
-      square = square*square
-    end do
-  end function powers_of
 
   pure function transposed(n, lanes) result(matrix)
     !! Compute the matrix of the open block from the perturbations in the lanes.

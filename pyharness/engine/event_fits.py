@@ -111,7 +111,7 @@ class Solution:
 
     @cached_property
     def _sizes(self) -> Array:
-        """The sizes of the unknowns from time 0 to the end of each polynomial."""
+        """The largest magnitudes of the unknowns from time 0 to the end of each polynomial."""
         largest = np.abs(self.pieces.values).max(axis=1)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):
@@ -206,7 +206,7 @@ class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
     Beside an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the signs there; 0 where the function decays, and at the ends of the solution.
+    the signs of the function on the two sides; 0 where it decays, and at the ends of the solution.
     """
 
     low: Array
@@ -240,7 +240,8 @@ class ZeroIntervals:
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
         found: Index = roots.time <= before
-        # Times of sign changes of a function that is not smooth have so many rounding errors.
+        # The time of a sign change of a function that is not smooth has an error of up to 256
+        # spacings of floats.
         longest = np.diff(solution.pieces.edges).max()
         apart = np.minimum(roots.time - before, after - roots.time)
         found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))

@@ -33,7 +33,7 @@ class LeavesError(Exception):
     """The reason why leaves can't be compiled or loaded, in one line."""
 
 
-# The second: no home folder is known; the third: CC has an open quotation.
+# RuntimeError: no home folder is known. ValueError: a quotation mark in CC is not closed.
 _FAILURES = (LeavesError, RuntimeError, ValueError)
 
 
@@ -67,7 +67,7 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 def leaves_of(tape: Tape) -> tuple[int, str]:
     """Return the address of the compiled leaves of a tape, and ``compiled``; or 0, and why not.
 
-    They are compiled if the folder has none.
+    If the folder has no leaves for this tape, they are compiled.
     """
     shape = structure(listing(tape))
     if shape is None:

@@ -1,7 +1,7 @@
 """Conversion of scenes to arguments of the Fortran kernels, and of their results.
 
-A torque over moments is four arrays: constant (1/s2), rate (1/s3), sines and cosines, whose columns
-are three amplitudes and the frequency (rad/s).
+A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines, whose
+columns are three amplitudes (rad/s2) and the frequency (rad/s).
 """
 
 import math

@@ -205,7 +205,10 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, or the method's default; raise InputError if it is no number."""
+    """Return the tolerance, or the method's default if None; raise InputError if it is no number.
+
+    The range is not checked.
+    """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 

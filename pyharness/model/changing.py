@@ -28,7 +28,7 @@ class Changing:
 
         @property
         def place(self) -> str:
-            """The key of a scene file."""
+            """The key in a scene file: "moments" or "inertia"."""
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
@@ -124,8 +124,8 @@ class ChangingMoments(Changing):
     Raises
     ------
     InputError
-        If these are not three lists of finite numbers, if a moment is not above 0 at time 0, or if
-        the numbers are the rows of a symmetric matrix.
+        If `polynomials` are not three lists of finite numbers, a moment is not above 0 at time 0,
+        or the lists are the rows of a symmetric matrix.
 
     Examples
     --------
@@ -173,7 +173,7 @@ class ChangingMoments(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the inertia matrix; zero elements have empty ones."""
+        """The polynomials of the inertia matrix; those of zero elements are empty."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
 
@@ -182,13 +182,14 @@ class ChangingMoments(Changing):
 class ChangingInertia(Changing):
     """An inertia matrix about the body axes that is a polynomial of time.
 
-    Its principal axes may rotate in the body. Assumptions and equations are those of
+    The principal axes may rotate in the body. The assumptions and equations are those of
     `ChangingMoments`.
 
     Parameters
     ----------
     matrices : one to ten matrices, each of three rows of three numbers
-        The symmetric coefficients in ascending powers of time (s): kg m2, kg m2/s, and so on.
+        The symmetric coefficient matrices in ascending powers of time (s), in kg m2, kg m2/s, and
+        so on.
 
     Raises
     ------

@@ -44,8 +44,8 @@ class Places:
     N_SINES = 3
     N_COSINES = 4
     COEFFICIENTS = 5  # three: A, B, C
-    CONSTANT = 8  # three, 1/s2: constant term of torque over moment
-    RATE = 11  # three, 1/s3: its factor of time
+    CONSTANT = 8  # three, rad/s2: constant term of torque over moment
+    RATE = 11  # three, rad/s3: factor of time of torque over moment
     EFFORT = 14  # factor on the work limits
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
     MOMENTS = 18  # three, kg m2: for the closed form with attitude

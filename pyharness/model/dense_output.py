@@ -87,8 +87,8 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    They are the largest component of omega for all its components, 1 for the quaternion, and the
-    own value for each own state; 1 in place of 0. Shapes are (..., m).
+    The size of each component of omega is the largest of the three values, that of the quaternion
+    is 1, and that of an own state is its value; 1 replaces 0. Shapes are (..., m).
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)

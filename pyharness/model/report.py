@@ -1,6 +1,7 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-Each start of the program creates the types; dataclasses would take five times as long as tuples.
+Every start of the program creates these types; as dataclasses, they would take five times as long
+to create as named tuples.
 """
 
 import math

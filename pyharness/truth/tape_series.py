@@ -1,7 +1,8 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
-A tape is a list of operations, whose results are in numbered slots. The recurrences, order by order
-together with the solution, are those of Jorba and Zou 2005, Experimental Mathematics 14.
+A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
+order by order, together with those of the solution, by the recurrences of Jorba and Zou 2005,
+Experimental Mathematics 14.
 """
 
 from bisect import bisect_left, bisect_right
@@ -18,7 +19,7 @@ _LARGEST_ANGLE = Decimal("1e308")
 _INVISIBLE = 400
 # Largest ratio of a step to the distance of a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
-_MANY_FACTORS = 3  # products of so many factors are checked; those of two show in any series
+_MANY_FACTORS = 3  # products of this many factors are checked; those of two show in any series
 # The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
 # whose factors are 0 here shows in the series.
 _ORDER_A_FACTOR = 4
@@ -215,8 +216,9 @@ class TapeSeries:
 
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument therefore changes by at most half
-        the order, unless the function remains negligible. The mean order of the terms of a product
-        is limited in the same way. A divisor has no zero in the circle around the beginning.
+        the order, unless the function remains negligible. The mean order of the terms of a product,
+        weighted by their magnitudes, is limited in the same way. A divisor has no zero in the
+        circle around the beginning whose radius is the step.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -235,7 +237,8 @@ class TapeSeries:
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
         """Return whether a product may matter in a step, although its computed terms do not.
 
-        The mean order of a product's terms is the sum of the mean orders of its factors.
+        The mean order of a product's terms, weighted by their magnitudes, is the sum of those of
+        its factors.
         """
         (factors, size, slots), order = power, Decimal(0)
         for slot, count in factors.items():

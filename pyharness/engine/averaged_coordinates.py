@@ -89,7 +89,7 @@ class Coordinates(NamedTuple):
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return a bound of |omega| components (rad/s) on the torque-free orbits through points."""
+        """Return a bound of the components of omega (rad/s) without torque from the points on."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2

@@ -105,7 +105,7 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots without derivatives."""
+        """Return roots with 0 in place of derivatives."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting

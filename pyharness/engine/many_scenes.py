@@ -112,7 +112,7 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the arrays of a scene."""
+    """Return the arrays of `solve_many` for one scene."""
     law = checked_scene(scene, any_axes=True).body_torque
     kind = next(name for name in BODIES if getattr(scene, name) is not None)
     return {

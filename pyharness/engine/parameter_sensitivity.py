@@ -140,7 +140,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns by name, the derivatives, (n, 3 or 7, m), and those at time 0."""
+    """Return the columns by name, the derivatives, (n, 3 or 7, m), and their values at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))

@@ -119,10 +119,10 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return the equations of motion of bodies that differ in parameters, which are further inputs.
+    """Return one tape of the equations of motion for bodies that differ in parameters.
 
-    These are A, B, C and the reciprocal moments, unless `body` has them for all bodies, and the
-    torque's parameters `names`.
+    The parameters are further inputs: A, B, C and the reciprocal moments, unless `body` has them
+    for all bodies, and the torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))

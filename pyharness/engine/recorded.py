@@ -253,7 +253,8 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of a tape's compiled leaves; 0 for built ones, or none.
+    `leaves` is the address of a tape's compiled leaves; 0 if they were built with the package, or
+    there are none.
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:

@@ -21,7 +21,7 @@ from pyharness.model.values import Number, boolean, tolerance_of
 # Smallest tolerances of Gauss collocation with 1 to 8 stages; low orders would need too many steps
 # for smaller ones.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
-# At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors, at 1e-12 303:
+# At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors; at 1e-12, 303 are:
 # `python -m tests.campaigns.default_campaign 1000 2026-11-26`.
 _DEFAULT = 1e-9
 _ONE_STAGE_DEFAULT = 1e-6

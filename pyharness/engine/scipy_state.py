@@ -58,7 +58,8 @@ _UNBOUNDED = 1e3
 # Largest difference from the series of a recorded torque, in tolerances.
 _AGREEMENT = 0.5
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
-# A jump of the rates is searched this far ahead, over the time span, by so many halvings.
+# A jump of the rates is searched up to this fraction of the time span ahead, by this number of
+# halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)

@@ -210,12 +210,12 @@ class Solver(BoundKernel[Result]):
 
     @property
     def status(self) -> str:
-        """Return how the last call ended; ``complete`` before the first.
+        """Return how the last call ended; ``complete`` before the first call.
 
         It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left, and
         ``refused`` if the method does not apply. It is ``sensitive`` if amplified rounding errors
-        exceed the tolerance. The test for ``sensitive`` takes microseconds for a closed form,
-        milliseconds for Gauss collocation.
+        exceed the tolerance. Testing this takes microseconds for a closed form, milliseconds for
+        Gauss collocation.
         """
         return self._judge()[0]
 
@@ -292,7 +292,7 @@ def prepare(
     Parameters
     ----------
     scene : Scene
-        The scene.
+        The body, its torque and its default attitude. Each call supplies the initial omega.
     method : str
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float

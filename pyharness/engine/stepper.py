@@ -324,7 +324,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the length (s) of each step to `end` (s) by its end (s), except ends in `bounds`."""
+    """Return the lengths (s) of steps to `end` (s) by their ends (s), without ends in `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

@@ -112,13 +112,13 @@ class ChangingMoments(Changing):
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
     in the body. With the moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
-    This assumes that mass that moves has no angular momentum relative to the body axes, and mass
-    that leaves has none about the centre of mass.
+    Mass that moves is assumed to have no angular momentum relative to the body axes, and mass that
+    leaves, no angular momentum about the centre of mass.
 
     Parameters
     ----------
     polynomials : three lists of numbers
-        For each moment at most ten coefficients in ascending powers of time (s): kg m2, kg m2/s,
+        For each moment at most ten coefficients in ascending powers of time (s), in kg m2, kg m2/s,
         and so on.
 
     Raises
@@ -274,7 +274,8 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))
-        # Differences of nearly equal moments have no rounding errors; those of products would.
+        # Differences of nearly equal moments have no rounding errors; differences of products
+        # would.
         products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
         return [
             (torque[k] - rate[k][k] * omega[k] + products[k]) / moment

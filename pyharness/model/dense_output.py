@@ -106,8 +106,9 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        Functions that return the states (omega, rad/s, the attitude if requested, and the scene's
-        own states) and their derivatives, in rows.
+        A function of times (s) that returns the states in rows (omega in rad/s, the attitude if
+        requested, and the scene's own states); and a function of times and states that returns the
+        derivatives of the states.
     n_own : int
         The number of own states.
 
@@ -154,8 +155,8 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times as for the state. Where a table of the torque changes, the derivative just after
-            the change is returned.
+            Times (s), as in a call of the object. Where a table of the torque changes, the
+            derivative just after the change is returned.
 
         Returns
         -------

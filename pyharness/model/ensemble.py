@@ -200,8 +200,8 @@ class Ensemble(BatchResult):
         -------
         xarray.Dataset
             Its variables are `omega` (dimensions `body`, `time` if there are `times`, and `axis`),
-            `ended`, and, if present, `attitude` (`component` in place of `axis`), `error`,
-            `growth` and own states.
+            `ended`, and, if present, `attitude` (with the dimension `component` in place of
+            `axis`), `error`, `growth` and own states.
 
         Raises
         ------

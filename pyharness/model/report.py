@@ -73,7 +73,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: head and format of rounded numbers, and for CSV of all digits."""
+    """A column of a table: its head and format for rounded numbers, and those for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain

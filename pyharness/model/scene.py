@@ -315,7 +315,7 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """The exact moments minus `moments` (kg m2)."""
+        """The exact moments minus `moments` (kg m2): 0 except in a `PrincipalScene`."""
         return 0.0, 0.0, 0.0
 
     @property

@@ -97,8 +97,8 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
-    Masses, forces and case are not written. Raise InputError for an opaque torque or one recorded
-    from Python, and above 50 ready terms or 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for an opaque torque, a torque
+    recorded from Python, more than 50 ready terms, or more than 1 000 000 bytes.
     """
     import json
 

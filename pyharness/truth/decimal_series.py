@@ -428,7 +428,7 @@ def _triple(x: Row, y: Row, z: Row) -> Decimal:
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
-    """Return coefficient k of q (0, omega)/2, from those of q, and of omega in reverse."""
+    """Return coefficient k of q (0, omega)/2, from those of q and, in reverse order, of omega."""
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-product(b, x) - product(c, y) - product(d, z)) / 2,

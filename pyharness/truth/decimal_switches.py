@@ -100,7 +100,7 @@ class Switches:
         return first.copy_sign(length)
 
     def step(self, is_whole: bool) -> None:
-        """Change the results at the end of a step, unless it was shortened."""
+        """Change the results at the end of a step, unless the step was shortened."""
         self._levels = {}
         if is_whole:
             for slot, level in self._next.items():

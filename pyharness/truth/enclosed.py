@@ -20,7 +20,7 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the solution of one scene at requested times; None if not requested.
+    """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
     derivatives of omega and of the (not normalised) quaternion by omega at time 0.

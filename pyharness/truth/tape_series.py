@@ -58,13 +58,13 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order at which the tape's powers are visible.
+    the lowest order at which all products of the tape show in the series.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations, with terms of sums changed by plus or minus `change` (relative).
+        """Store the operations; terms of sums are multiplied by 1 plus or minus `change`.
 
         `results` has the results of switches by slot, which the caller changes.
         """
@@ -185,7 +185,7 @@ class TapeSeries:
         return sine, cosine
 
     def _tangent(self, operand: int, found: Row, k: int) -> Decimal:
-        """Return coefficient k of the hyperbolic tangent of a slot; `found` has 0 to k - 1."""
+        """Return coefficient k of a slot's hyperbolic tangent; `found` has those up to k - 1."""
         if k == 0:
             x = self._slots[operand][0]
             small = (-2 * abs(x)).exp()
@@ -265,7 +265,10 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) of a table's next change, or None; before `time` unless `forward`."""
+        """Return the time (s) of the next change of a table after `time`, or None.
+
+        Unless `forward`, it is the last change before `time`.
+        """
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
@@ -312,7 +315,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return by slot the divisors of quotients, and arguments of roots, that depend on it."""
+    """Return, by slot, the divisors of quotients and the arguments of roots that depend on it."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -338,7 +341,7 @@ def _sum(linear: Linear | None, change: Decimal) -> _Sum:
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
-    """Return coefficients 0 to 3 of a table's piece after (or before) `time` (s)."""
+    """Return coefficients 0 to 3 of a table's piece after `time` (s) if `forward`, else before."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece].tolist())
     s = time - breaks[piece]
@@ -346,7 +349,7 @@ def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
-    """Return Taylor coefficient k of the square root of x; `root` has 0 to k - 1.
+    """Return Taylor coefficient k of the square root of x; `root` has those up to k - 1.
 
     If x is 0 throughout, so is its root. Raise ArithmeticError where x is 0 and changes, because
     the root then has no Taylor series.

@@ -78,7 +78,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return an even number `count` of angles and their arrays."""
+    """Return the arrays of `count` equidistant angles; `count` is even."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)

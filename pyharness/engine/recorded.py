@@ -244,7 +244,7 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
 
 
 def has_ready_leaves(tape: Tape) -> bool:
-    """Return whether leaves for the tape, that of a ready torque, were built with the package."""
+    """Return whether leaves for the tape were built with the package, as for ready torques."""
     return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 

@@ -1,7 +1,8 @@
 """Write the constants that Python and the kernels share: make_codes.py SOURCE FOLDER.
 
-Each class becomes a Fortran module in a file of its own, since Meson records one module a file. C
-gets a header. A file is written only if it changes, so that only its users are compiled again.
+Each class becomes a Fortran module in a file of its own, because Meson records one module per file.
+C code gets a header, codes.h. A file is written only if it changes, so that only its users are
+compiled again.
 """
 
 import runpy

@@ -47,7 +47,7 @@ def nodes(stages: int) -> list[Decimal]:
 
 
 def integrals(c: Sequence[Decimal], begin: Decimal, end: Decimal) -> list[Decimal]:
-    """Return the integrals of the Lagrange polynomials of `c` from `begin` to `end`."""
+    """Return the integrals of the Lagrange polynomials of the nodes `c` from `begin` to `end`."""
     result = []
     for j, own in enumerate(c):
         basis = [Decimal(1)]

@@ -1,6 +1,7 @@
 """Write leaves (C code of the Taylor series) of ready torques: make_leaves.py ROOT SOURCE HEADER.
 
-The body has three different moments. The torques have as many numbers as they can have.
+The leaves are for a body with three different moments, and for torques whose arguments have no
+zeros, except some wheels and drag.
 """
 
 import sys
@@ -9,7 +10,7 @@ from typing import Any
 
 
 def main(root: str, target: str, header: str) -> None:
-    """Write the C source of all leaves, which has tables of them, and the header of their keys."""
+    """Write the C source of all leaves with a table of them, and the header with their keys."""
     sys.dont_write_bytecode = True
     sys.path.insert(0, root)
     # The finder of an editable installation, an instance, would start a build.

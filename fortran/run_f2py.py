@@ -1,4 +1,4 @@
-"""Run f2py, and fail if it meets an unknown kind, which it would map to C float."""
+"""Run f2py, and fail if it meets an unknown kind of number, which it would map to C float."""
 
 import subprocess
 import sys

@@ -1,7 +1,8 @@
 """Rigid-body rotation: a fast engine, checks, and three FORTRAN programs of a thesis.
 
-The engine estimates the error of each result. The programs run as printed or as corrected. The
-checks also accept ports of them, and other integrators.
+The engine integrates the motion, and estimates the error of each result. The programs of the thesis
+(1982) run as printed or as corrected. The checks also test ports (translations) of the programs,
+and other integrators.
 """
 
 # The public names by module; type checkers read `__init__.pyi`. A module is imported at its first

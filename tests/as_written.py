@@ -20,8 +20,8 @@ from pyharness.model.trajectory import Array
 COMPILER = os.environ.get("FC", "gfortran")
 _FORTRAN = Path(__file__).parent.parent / "fortran"
 _TAYLOR = (
-    "two_words", "problem", "torque_noise", "torque_terms", "taylor_plan", "taylor_series",
-    "taylor_error", "taylor_attitude", "taylor_rows", "taylor_march", "taylor",
+    "two_words", "step_nodes", "problem", "torque_noise", "torque_terms", "taylor_plan",
+    "taylor_series", "taylor_error", "taylor_attitude", "taylor_rows", "taylor_march", "taylor",
 )  # fmt: skip
 _MANY = ("two_words", "problem", "torque_noise", "torque_terms", "taylor_plan")
 _BODIES = (

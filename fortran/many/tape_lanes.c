@@ -68,12 +68,20 @@ struct bodies {
   const double *parameters; /* of each set */
 };
 
+/* An operation, whose operands and result are series. */
+struct operation {
+  int kind, combination;
+  lanes *x, *y, *out;
+};
+
 /* What is known of the bodies that are being integrated. */
 struct group {
   const struct bodies *all;
   int n, order;
   int body[SIDE_BY_SIDE], steps[SIDE_BY_SIDE], tries[SIDE_BY_SIDE]; /* body: -1 for none */
   series *a;                      /* terms of each slot */
+  struct operation *operations;
+  lanes **terms;                  /* series of each term of the combinations */
   int *depends;                   /* of each slot: the unknowns on which it depends, as bits */
   lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
   lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
@@ -124,7 +132,7 @@ static inline lanes combined(const struct group *g, int n, int k)
   const struct tape *tape = &g->all->tape;
   lanes sum = all_of(k == 0 ? tape->constants[n] : 0.0);
   for (int i = tape->starts[n] - 1; i < tape->starts[n + 1] - 1; i++)
-    sum += tape->coefficients[i] * g->a[tape->slots[i] - 1][k];
+    sum += tape->coefficients[i] * g->terms[i][k];
   return sum;
 }
 
@@ -262,40 +270,37 @@ static inline void multiply(lanes *out, const lanes *x, const lanes *y, int k)
 /* Compute the terms of all slots, and those of the unknowns up to the order. */
 static void expand(struct group *g)
 {
-  const struct tape *tape = &g->all->tape;
-  const int derivatives = tape->n_combinations - g->n;
+  const int derivatives = g->all->tape.n_combinations - g->n;
+  const struct operation *const end = g->operations + g->all->tape.n_operations;
   for (int k = 0; k < g->order; k++) {
-    for (int n = 0; k > 0 && n < tape->n_operations; n++) {
-      const int *operation = tape->operations[n];
-      const lanes *x = g->a[operation[1] - 1], *y = g->a[operation[2] > 0 ? operation[2] - 1 : 0];
-      series *out = g->a + operation[3] - 1;
-      const double whole = k;
-      switch (operation[0]) {
-      case LINEAR: out[0][k] = combined(g, operation[1] - 1, k); break;
-      case PRODUCT: multiply(out[0], x, y, k); break;
-      case QUOTIENT: out[0][k] = (x[k] - convolved(out[0], y, k, 0, k - 1)) / y[0]; break;
-      case SQRT:
-        out[0][k] = (x[k] - convolved(out[0], out[0], k, 1, k - 1)) / (2.0 * out[0][0]);
-        break;
+    const double whole = k;
+    for (const struct operation *o = g->operations; k > 0 && o < end; o++) {
+      const lanes *x = o->x, *y = o->y;
+      lanes *out = o->out, *second = out + TERMS, *third = second + TERMS;
+      switch (o->kind) {
+      case LINEAR: out[k] = combined(g, o->combination, k); break;
+      case PRODUCT: multiply(out, x, y, k); break;
+      case QUOTIENT: out[k] = (x[k] - convolved(out, y, k, 0, k - 1)) / y[0]; break;
+      case SQRT: out[k] = (x[k] - convolved(out, out, k, 1, k - 1)) / (2.0 * out[0]); break;
       case EXP: /* The second slot has k times the terms of the argument. */
-        out[1][k] = whole * x[k];
-        out[0][k] = convolved(out[0], out[1], k, 0, k - 1) / whole;
+        second[k] = whole * x[k];
+        out[k] = convolved(out, second, k, 0, k - 1) / whole;
         break;
       case SINE_COSINE:
-        out[2][k] = whole * x[k];
-        out[0][k] = convolved(out[1], out[2], k, 0, k - 1) / whole;
-        out[1][k] = -convolved(out[0], out[2], k, 0, k - 1) / whole;
+        third[k] = whole * x[k];
+        out[k] = convolved(second, third, k, 0, k - 1) / whole;
+        second[k] = -convolved(out, third, k, 0, k - 1) / whole;
         break;
       case TANH: /* The second slot is 1 minus the square, the derivative. */
-        out[2][k] = whole * x[k];
-        out[0][k] = convolved(out[1], out[2], k, 0, k - 1) / whole;
-        out[1][k] = -convolved(out[0], out[0], k, 0, k);
+        third[k] = whole * x[k];
+        out[k] = convolved(second, third, k, 0, k - 1) / whole;
+        second[k] = -convolved(out, out, k, 0, k);
         break;
       case LOG:
       case ATAN:
       case ASIN:
-        out[1][k] = whole * x[k];
-        out[0][k] = convolved(y, out[1], k, 0, k - 1) / whole;
+        second[k] = whole * x[k];
+        out[k] = convolved(y, second, k, 0, k - 1) / whole;
         break;
       default: /* a table */
         break;
@@ -383,6 +388,20 @@ static void set_noise(struct group *g, lanes *noise)
     }
     g->noises[out] = sum;
   }
+}
+
+/* Find the series of the operands and results of all operations, and of all terms of combinations. */
+static void find_series(struct group *g)
+{
+  const struct tape *tape = &g->all->tape;
+  for (int n = 0; n < tape->n_operations; n++) {
+    const int *operation = tape->operations[n];
+    g->operations[n] = (struct operation){
+        operation[0], operation[1] - 1, g->a[operation[1] - 1],
+        g->a[operation[2] > 0 ? operation[2] - 1 : 0], g->a[operation[3] - 1]};
+  }
+  for (int i = 0; i < tape->starts[tape->n_combinations] - 1; i++)
+    g->terms[i] = g->a[tape->slots[i] - 1];
 }
 
 /* Find the unknowns on which each slot depends. */
@@ -815,16 +834,19 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
 {
   struct group g;
   const size_t of_slot = TERMS + 3, n_slots = all->n_slots;
+  const int n = all->tape.n_operations, n_terms = all->tape.starts[all->tape.n_combinations] - 1;
   lanes *memory = aligned_alloc(sizeof(lanes), n_slots * of_slot * sizeof(lanes));
   int next = 0, active = 0, unseen = 0;
 
   all->interrupted = 0;
   memset(&g, 0, sizeof g);
   g.depends = calloc(n_slots, sizeof *g.depends);
-  if (memory != NULL && g.depends != NULL) g.order = order_for(all, g.depends);
+  g.operations = malloc(n * sizeof *g.operations + n_terms * sizeof *g.terms);
+  if (memory != NULL && g.depends != NULL && g.operations != NULL) g.order = order_for(all, g.depends);
   if (g.order == 0) {
     free(memory);
     free(g.depends);
+    free(g.operations);
     return;
   }
   memset(g.depends, 0, n_slots * sizeof *g.depends);
@@ -835,6 +857,8 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   g.middle = memory + n_slots * TERMS;
   g.tangents = g.middle + n_slots;
   g.noises = g.tangents + n_slots;
+  g.terms = (lanes **)(g.operations + n);
+  find_series(&g);
   find_dependences(&g);
   for (int i = 0; i < SIDE_BY_SIDE; i++) clear(&g, i);
   g.h = g.previous = g.scale = g.local = all_of(1.0);
@@ -870,4 +894,5 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   }
   free(memory);
   free(g.depends);
+  free(g.operations);
 }

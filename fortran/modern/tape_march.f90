@@ -7,6 +7,7 @@ module tape_march
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: COMPLETE, INTERRUPTED, OVERFLOW, SLIDING
+  use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
   use step_limit, only: check_steps, limit_of, step_limit_t
   use tape, only: FIRST_UNKNOWN, N_INPUTS, next_break, tape_arrays_t, tape_t, TIME_SLOT
   use tape_growth, only: begin, count_step, find_growth, MOST_UNKNOWNS, transitions_t
@@ -807,16 +808,35 @@ contains
     end subroutine correct
 
     subroutine add_nodes()
-      !! Compute the unknowns at the nodes of the step.
-      real(dp) :: change(tape%n_unknowns), error(tape%n_unknowns)
-      integer :: k
+      !! Compute the unknowns at the nodes of the step, as `evaluate` and `correct`, side by side.
+      real(dp) :: parts(AT_ONCE), powers(AT_ONCE), errors(AT_ONCE, n)
+      real(dp) :: changes(AT_ONCE, n), sizes(AT_ONCE), low
+      integer :: first, i, k, lane
 
       solution%n_steps = solution%n_steps + 1
       if (solution%n_steps >= size(solution%ends)) return
       solution%ends(solution%n_steps + 1) = t_next(1)
-      do k = 1, size(solution%nodes)
-        call evaluate(factor*solution%nodes(k), change, error)
-        call correct(y, y_low + change, error, solution%at_nodes(:, k, solution%n_steps))
+      do first = 1, size(solution%nodes), AT_ONCE
+        parts = factor*parts_from(first, solution%nodes)
+        powers = powers_of(parts/factor, s%order + 1)
+        sizes = 0.0_dp
+        do i = 1, n
+          call sum_at_nodes(s%a(1:s%order, FIRST_UNKNOWN - 1 + i), 1, s%order, parts, changes(:, i))
+          call sum_at_nodes(s%blocks(:, 1:last_terms(1), FIRST_UNKNOWN - 1 + i, 1), SIDE_BY_SIDE, &
+                            last_terms(1), parts, errors(:, i))
+          errors(:, i) = errors(:, i) + s%blocks(1, 0, FIRST_UNKNOWN - 1 + i, 1)
+          errors(:, i) = errors(:, i) - powers*left(i)
+          sizes = max(sizes, weights(i)*abs(errors(:, i)))
+        end do
+        do k = first, min(first + AT_ONCE - 1, size(solution%nodes))
+          lane = k - first + 1
+          if (.not. sizes(lane) <= found%error) found%error = sizes(lane)
+          do i = 1, n
+            low = y_low(i) + changes(lane, i)
+            if (sizes(lane) <= min(LINEAR_RANGE, request%tolerance)) low = low - errors(lane, i)
+            solution%at_nodes(i, k, solution%n_steps) = y(i) + low
+          end do
+        end do
       end do
     end subroutine add_nodes
 

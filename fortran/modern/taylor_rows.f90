@@ -6,7 +6,8 @@ module taylor_rows
   use kinds, only: dp
   use problem, only: request_t, solution_t
   use statuses, only: INTERRUPTED, OVERFLOW
-  use taylor_attitude, only: add_attitude_row, attitude_t
+  use step_nodes, only: AT_ONCE, parts_from, powers_of, sum_at_nodes
+  use taylor_attitude, only: add_attitude_row, add_attitudes, attitude_t
   use taylor_error, only: blocks_t, rise
   use taylor_series, only: evaluate, series_t
   implicit none(type, external)
@@ -111,43 +112,64 @@ contains
     real(dp), intent(in) :: tolerance
     type(solution_t), intent(inout) :: solution
     real(dp) :: ends(3, 4)
-    real(dp) :: changes(size(solution%nodes), 4)
-    integer :: k
+    real(dp) :: parts(AT_ONCE), changes(AT_ONCE, 4)
+    integer :: first, i, n
 
     solution%n_steps = solution%n_steps + 1
     if (solution%n_steps >= size(solution%ends)) return
-    associate (s => room%s, now => room%now, nodes => solution%nodes, n => solution%n_steps, &
-               at_nodes => solution%at_nodes)
-      solution%ends(n + 1) = now%t + (now%t_low + h)
+    associate (s => room%s, now => room%now)
+      solution%ends(solution%n_steps + 1) = now%t + (now%t_low + h)
       ends = errors_at_ends(s, now, before, left)
-      call evaluate_side_by_side(order, s%terms, size(nodes), nodes, changes)
-      do k = 1, size(nodes)
-        call add_row_within(now, order, nodes(k), changes(k, :), ends, left, tolerance, &
-                            at_nodes(:3, k, n))
-      end do
-      if (.not. associated(solution%attitudes)) return
-      call evaluate_side_by_side(order, s%turns, size(nodes), nodes, changes)
-      do k = 1, size(nodes)
-        call add_attitude_row(room%attitude%q_low + changes(k, :), order, nodes(k), &
-                              min(LINEAR, tolerance), room%attitude, at_nodes(4:, k, n))
+      do first = 1, size(solution%nodes), AT_ONCE
+        n = min(AT_ONCE, size(solution%nodes) - first + 1)
+        parts = parts_from(first, solution%nodes)
+        do i = 1, 3
+          call sum_at_nodes(s%terms(i, 1), 4, order, parts, changes(:, i))
+        end do
+        call add_states(now, order, parts, changes(:, :3), ends, left, tolerance, &
+                        solution%at_nodes(:3, first:first + n - 1, solution%n_steps))
+        if (.not. associated(solution%attitudes)) cycle
+        do i = 1, 4
+          call sum_at_nodes(s%turns(i, 1), 4, order, parts, changes(:, i))
+          changes(:, i) = room%attitude%q_low(i) + changes(:, i)
+        end do
+        call add_attitudes(changes, order, parts, min(LINEAR, tolerance), room%attitude, &
+                           solution%at_nodes(4:7, first:first + n - 1, solution%n_steps))
       end do
     end associate
   end subroutine add_nodes
 
-  pure subroutine evaluate_side_by_side(order, terms, n, parts, changes)
-    !! Compute the change of omega, or of an attitude, at fractions of the step.
-    integer, intent(in) :: order, n
-    real(dp), intent(in) :: terms(4, 0:order), parts(n)
-    real(dp), intent(out) :: changes(n, 4)
+  pure subroutine add_states(now, order, parts, changes, ends, left, tolerance, rows)
+    !! Compute omega within the step, as `add_row_within`, side by side.
+    type(state_t), intent(inout) :: now
+    integer, intent(in) :: order
+    real(dp), intent(in) :: parts(AT_ONCE)      !! of the step
+    real(dp), intent(in) :: changes(AT_ONCE, 3) !! from its beginning, rad/s
+    real(dp), intent(in) :: ends(3, 4)          !! of errors_at_ends
+    real(dp), intent(in) :: left(3)
+    real(dp), intent(in) :: tolerance
+    real(dp), intent(out) :: rows(:, :)         !! rad/s
+    real(dp) :: to_go(AT_ONCE), powers(AT_ONCE), sizes(AT_ONCE), errors(AT_ONCE, 3), small
     integer :: i, k
 
-    changes = 0.0_dp
-    do k = order, 1, -1
-      do i = 1, 4
-        changes(:, i) = (changes(:, i) + terms(i, k))*parts
+    to_go = 1.0_dp - parts
+    powers = powers_of(parts, order + 1)
+    sizes = 0.0_dp
+    do i = 1, 3
+      errors(:, i) = &
+        (to_go*to_go)*((1.0_dp + 2.0_dp*parts)*ends(i, 1) + parts*ends(i, 2)) &
+        + (parts*parts)*((1.0_dp + 2.0_dp*to_go)*ends(i, 3) - to_go*ends(i, 4)) - powers*left(i)
+      sizes = max(sizes, abs(errors(:, i)))
+    end do
+    do k = 1, size(rows, 2)
+      if (.not. sizes(k) <= now%worst) now%worst = sizes(k)
+      do i = 1, 3
+        small = now%w_low(i) + changes(k, i)
+        if (sizes(k) <= min(LINEAR, tolerance)*now%scale) small = small - errors(k, i)
+        rows(i, k) = now%w(i) + small
       end do
     end do
-  end subroutine evaluate_side_by_side
+  end subroutine add_states
 
   pure function errors_at_ends(s, now, before, left) result(ends)
     !! Return the errors of omega at the ends of the step, rad/s, and their rates times the step.

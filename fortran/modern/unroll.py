@@ -18,6 +18,7 @@ from unroll_many import attitude_sums, many_steps, paired
 
 MODULES = (
     "two_words",
+    "step_nodes",
     "torque_terms",
     "scaled_motion",
     "scaled_march",

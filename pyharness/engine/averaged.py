@@ -25,16 +25,17 @@ from pyharness.model.errors import InputError, TimedError
 from pyharness.model.scene import Scene, Triple
 from pyharness.model.trajectory import ROUNDING, Trajectory
 
-# Cosines and sines of the angles psi at which the initial omega is perturbed.
+# Cosines and sines of eight angles psi (see averaged_coordinates) at which the initial omega is
+# perturbed.
 _PSI = np.cos(0.25 * math.pi * np.arange(8)), np.sin(0.25 * math.pi * np.arange(8))
 _MOST_ENDS = 4  # ends of macro-steps at which the error is estimated
 
-NODES = 20  # in a macro-step
+NODES = 20  # Chebyshev points in a macro-step
 _TURN = 2.0 * math.pi
 _FEWEST = 100  # revolutions in a macro-step
-_MOST_STEPS = 3000  # some ten seconds
-# The last macro-step is longer than the rest of the motion by this fraction and these revolutions,
-# because the time at its end is only estimated.
+_MOST_STEPS = 3000  # work limit in macro-steps, some ten seconds
+# The last macro-step is longer than the rest of the motion by this fraction and this number of
+# revolutions, because the time at its end is only estimated.
 _BEYOND, _TURNS_BEYOND = 0.02, 3
 # Factors on the length of a macro-step after a failure, and on the length of the next one after a
 # success at the first and at a later attempt.
@@ -55,9 +56,9 @@ _LARGEST_PHASE = 1e15  # rad
 
 
 class Done(NamedTuple):
-    """A completed macro-step."""
+    """A completed macro-step; its points are those of `Coordinates`."""
 
-    start: Array  # shape (4,); the point at the start
+    start: Array  # shape (4,); the point at the start of the step
     by_omega: Array  # shape (8, 3, 3); derivatives of the start by omega, at eight psi
     error: Array  # shape (4,); error of the point at the end
     transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
@@ -66,7 +67,10 @@ class Done(NamedTuple):
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest error of omega (rad/s) and amplification at up to five ends of steps."""
+    """Return the largest error of omega (rad/s) and error amplification at the ends of macro-steps.
+
+    They are computed at the end of the last step and of up to four earlier ones.
+    """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
     for n in (count, *range(1, count, -(-count // _MOST_ENDS))):
@@ -95,12 +99,12 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    `steps` of the result counts macro-steps; `error` is measured with more nodes and a higher order
-    of averaging. Raise InputError if the torque is opaque, depends on the attitude, is not weak, or
-    may be in resonance; if omega without torque would not circle a principal axis, as for a sphere,
-    or is near the separatrix; and if the work limit is exceeded. A recorded torque must be a
-    polynomial in omega and time, times waves, because changes of any other might be missed within a
-    macro-step.
+    In the result, `steps` counts macro-steps, and `error` is measured by a solution with more nodes
+    and a higher order of averaging. Raise InputError if the torque is opaque, depends on the
+    attitude, is not weak, or may be in resonance; if omega without torque would not circle a
+    principal axis, as for a sphere, or is near the separatrix; and if the work limit is exceeded. A
+    recorded torque must be a polynomial in omega and time, times waves, because a macro-step might
+    miss changes of another torque.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -269,7 +273,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles for a squared modulus; raise TimedError near 1."""
+        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

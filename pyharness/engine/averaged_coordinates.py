@@ -1,10 +1,10 @@
 """Coordinates of omega that a weak torque changes slowly, and the torque, for `averaged`.
 
 The body rotates about principal axis a; b and c are the next axes in cyclic order. Euler's
-equations are w_b' = P w_c w_a + n_b, and so on, where n is the torque over the moment. The
-coefficients P and Q of axes b and c have opposite signs. Let x = |Q|^(1/2) w_b, y = +-|P|^(1/2)
-w_c, u = w_a^2, and let psi be the angle with psi' = |PQ|^(1/2) |w_a|. Without torque the motion is
-exactly 2 pi-periodic in psi:
+equations are w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is the torque over
+the moment (rad/s2). The coefficients P and Q have opposite signs. Let x = |Q|^(1/2) w_b, y =
++-|P|^(1/2) w_c, u = w_a^2, and let psi be the angle with psi' = |PQ|^(1/2) |w_a|. Without torque
+the motion is exactly 2 pi-periodic in psi:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
@@ -30,7 +30,8 @@ from pyharness.model.torque_law import TorqueLaw
 
 _MOST_DEGREE = 8.0
 
-# Function of time (s) and three omegas (rad/s) that returns the torque over the moments (1/s2).
+# A function of time (s) and the components of omega (rad/s) that returns the components of the
+# torque over the moments (rad/s2).
 Torque = Callable[[Array, list[Array]], list[Array] | Array]
 
 
@@ -72,7 +73,10 @@ class Coordinates(NamedTuple):
         return np.array([self.on_b * b, y, a * a - self.bend * y * y, 0.0])
 
     def modulus(self, point: Array) -> Array:
-        """Return the squared elliptic modulus: 0 about axis a, 1 on the separatrix, inf beyond."""
+        """Return the squared elliptic modulus: 0 for rotation about axis a, 1 on the separatrix.
+
+        Beyond the separatrix it is infinite.
+        """
         one = point[2]
         other = one + self.bend * (point[0] * point[0] + point[1] * point[1])
         low, high = np.minimum(one, other), np.maximum(one, other)
@@ -85,7 +89,7 @@ class Coordinates(NamedTuple):
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return a bound of the components of omega (rad/s) on the orbits of points."""
+        """Return a bound of the components of omega (rad/s) without torque from the points on."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
@@ -115,7 +119,7 @@ class Coordinates(NamedTuple):
     def slopes(
         self, point: Array, time: Array, cosine: Array, sine: Array, torque: Torque, mean: float
     ) -> Array:
-        """Return d/dpsi of a point, with `mean` (s) subtracted from dt/dpsi."""
+        """Return d/dpsi of a point, with `mean` (s/rad) subtracted from dt/dpsi."""
         omega, y, fast = self.omega(point, cosine, sine)
         pace = 1.0 / (self.rate * fast)
         torques = torque(time, omega)
@@ -166,7 +170,7 @@ def torque_of(scene: Scene) -> tuple[Torque, bool]:
 class _Slot(NamedTuple):
     """The dependence of a slot of a tape on omega and time."""
 
-    degree: float = 0.0  # of the polynomial factor; infinite if there is another than waves
+    degree: float = 0.0  # of the polynomial factor; infinite if another factor is no wave
     fastest: float = 0.0  # highest frequency of the waves, rad/s
     rate: float | None = None  # 1/s, of a slot that is linear in time alone
 
@@ -174,8 +178,9 @@ class _Slot(NamedTuple):
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
     """Return the highest frequency of the waves of a torque (rad/s).
 
-    Raise InputError if a recorded torque is no polynomial of degree 8 at most times waves, because
-    a macro-step may then miss a pulse, or an effect in a narrow range of omega.
+    Raise InputError unless a recorded torque is a polynomial, of degree 8 at most, times waves,
+    because a macro-step may miss other torques, such as a pulse, or an effect in a narrow range of
+    omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -1,7 +1,7 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v depend on the fast angle psi, with period 2 pi, and on the slow variable s =
-psi/length, from 0 to 1. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v, the coordinates p1, p2, p3 and the time, depend on the fast angle psi, with period 2
+pi, and on the slow variable s = psi/length, from 0 to 1. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
@@ -53,7 +53,7 @@ class Fast(NamedTuple):
     cosine: Array
     sine: Array
     mean: Array  # weights of the mean; a product is faster than a sum along rows
-    integral: Array  # right factor, from values to the integral from 0 of values minus mean
+    integral: Array  # right factor: from values to the integral from 0 of values minus mean
 
 
 @lru_cache(maxsize=16)
@@ -78,7 +78,7 @@ def slow_nodes(count: int) -> Slow:
 
 @lru_cache(maxsize=16)
 def fast_nodes(count: int) -> Fast:
-    """Return an even number `count` of angles and their arrays."""
+    """Return the arrays of `count` equidistant angles; `count` is even."""
     angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     waves = np.fft.rfft(np.eye(count), axis=1)
     divided = np.zeros_like(waves)
@@ -89,7 +89,7 @@ def fast_nodes(count: int) -> Fast:
 
 
 def between_nodes(count: int, at: Array) -> Array:
-    """Return the barycentric interpolation matrix from `count` nodes to `at`, from 0 to 1."""
+    """Return the barycentric interpolation matrix from `count` nodes to points `at` from 0 to 1."""
     slow = slow_nodes(count)
     distance = at[:, None] - slow.nodes
     hit = np.abs(distance) < 1e-17
@@ -102,7 +102,10 @@ def between_nodes(count: int, at: Array) -> Array:
 
 
 def between_angles(count: int, at: Array) -> Array:
-    """Return the trigonometric interpolation matrix from `count` angles (even) to `at` (rad)."""
+    """Return the trigonometric interpolation matrix from `count` equidistant angles to `at` (rad).
+
+    `count` is even.
+    """
     half = 0.5 * (at[:, None] - fast_nodes(count).angles)
     sine = np.sin(half)
     hit = np.abs(sine) < 1e-17
@@ -119,8 +122,9 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), is the point at psi = 0, its time without the part that is
-    proportional to psi. `error` is its measured error, `modulus` the largest squared modulus.
+    `stroboscopic`, shape (4, nodes), has the points at psi = 0; their times are without the part
+    that is proportional to psi. `error` is the measured error of these points, and `modulus` their
+    largest squared elliptic modulus.
     """
 
     def __init__(
@@ -179,7 +183,7 @@ class MacroStep:
         self.error = self._measured()
 
     def _check(self, mean: Array) -> None:
-        """Set the largest modulus; raise NotResolvedError unless it is below 1."""
+        """Set `modulus`; raise NotResolvedError unless it is below 1 and the points are finite."""
         self.modulus = float(self.coordinates.modulus(mean).max())
         if not (np.isfinite(mean).all() and self.modulus < 1.0):
             raise NotResolvedError
@@ -238,7 +242,10 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return the error of V at an angle (rad), (4,), and the transition matrix, (4, 4)."""
+        """Return the error of V at an angle (rad), (4,), and the transition matrix.
+
+        The matrix, shape (4, 4), has the derivatives of V there by V at the start.
+        """
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)

@@ -18,12 +18,12 @@ from pyharness.model.principal import principal
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import Trajectory
 
-_CALM = 1e3  # a smaller amplification is largest at the last time
+_CALM = 1e3  # error amplification; a smaller one is taken at the last time alone
 _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 if it has none, or under a torque."""
+    """Return the period of omega (s); 0 without one, under a torque or with a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time, or if large, the maxima over 16 rows."""
+    """Return error and amplification at the last time; if large, their maxima over 16 rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

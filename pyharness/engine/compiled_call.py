@@ -19,8 +19,8 @@ class CompiledCall(NamedTuple):
 
     ``function(data, start, t_end, state)`` reads doubles at the address `start`: omega (rad/s), and
     for an attitude solver a unit quaternion. It writes the state at `t_end` (s) to the address
-    `state`, and returns a status of `pyharness.h`, 0 if complete. `data` is valid while `solver`
-    exists.
+    `state`, and returns a status, a constant of `pyharness.h`; 0 means complete. `data` is valid
+    while `solver` exists.
     """
 
     function: Any

@@ -22,7 +22,10 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, from 0 to the rows of `found`."""
+    """Return the solution as a function of time, from time 0 to the rows of `found`.
+
+    `rows` computes further rows by the same method.
+    """
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
 
@@ -49,7 +52,7 @@ def with_events(
                 period = period_of(scene)
             shown = _first_periods(found, rows, tolerance, period)
             pieces = dense.state_pieces(scene, shown, rows, tolerance, METHODS[method].finest)
-        # The tolerance 1 stands for a fixed step.
+        # The tolerance 1 means fixed steps.
         own = tolerance if tolerance < 1.0 else 0.0
         events = found_events(functions, Solution(pieces, sol, own), period)
     cut: dict[str, Any] = {}
@@ -73,7 +76,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return the trajectory; a side of 0 of more than six periods (s) is shortened to three."""
+    """Return the trajectory; beside time 0, more than six periods (s) are shortened to three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

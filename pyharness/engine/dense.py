@@ -33,9 +33,10 @@ from pyharness.model.trajectory import Trajectory
 # may have larger errors between its nodes. The second is for methods that can't meet the first.
 _NODE_TOLERANCE = 0.25
 _LARGEST_NODE_TOLERANCE = 0.75
-# Bound of the last coefficients of a polynomial, in tolerances, and relative to the state.
+# Bound of the last coefficients of a polynomial, relative to the state, over the tolerance.
 _LAST = 0.02
-# Rounding errors of a method, over the error amplification. They are not smooth in time.
+# Rounding errors of a method, over the error amplification; they are not smooth in time. Then the
+# smallest bound of the last coefficients.
 _OWN_ROUNDING = 4e-15
 _ROUNDING = 4e-16
 _TAIL = 3  # last coefficients, whose magnitude estimates the omitted ones
@@ -50,7 +51,7 @@ _SHORT = 0.25  # a change in a shorter part of an interval might be hidden betwe
 
 @dataclass(frozen=True, eq=False)
 class _Open:
-    """An interval (s) that has no polynomial yet, and is part of a longer one."""
+    """An interval (s) without a polynomial yet; it may be part of a divided longer interval."""
 
     low: float
     high: float
@@ -87,10 +88,10 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time from 0 to the rows of `found`.
+    """Return the solution as a function of time from time 0 to the rows of `found`.
 
-    `rows` computes further rows; the tolerance 1 stands for a fixed step. Raise InputError if more
-    than 200 000 polynomials are needed.
+    `rows` computes further rows, `finest` is the smallest tolerance of the method, and the
+    tolerance 1 means fixed steps. Raise InputError if more than 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -104,7 +105,10 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials between 0 and the rows of `found`."""
+    """Return the solution as polynomials of time, from time 0 to the rows of `found`.
+
+    The arguments are as in `dense_output`.
+    """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))

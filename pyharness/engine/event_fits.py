@@ -81,7 +81,7 @@ class Solution:
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return values, their `noise`, and its part by rounding errors."""
+        """Return values, their `noise`, and the part of the noise that is due to rounding."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state
@@ -111,7 +111,7 @@ class Solution:
 
     @cached_property
     def _sizes(self) -> Array:
-        """The sizes of the unknowns from time 0 to the end of each polynomial."""
+        """The sizes of the unknowns, by `sizes_of`, from time 0 to the end of each polynomial."""
         largest = np.abs(self.pieces.values).max(axis=1)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):
@@ -172,7 +172,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return polynomials, with noise where they may be 0, and roots at the ends."""
+    """Return the polynomials, with noise where they may be 0, and roots at ends of the solution."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -206,7 +206,7 @@ class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
     Beside an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the signs there; 0 where the function decays, and at the ends of the solution.
+    the signs of the function on the two sides; 0 where it decays, and at the ends of the solution.
     """
 
     low: Array
@@ -240,7 +240,8 @@ class ZeroIntervals:
         before = np.append(-math.inf, self.high)[following]
         after = np.append(self.low, math.inf)[following]
         found: Index = roots.time <= before
-        # Times of sign changes of a function that is not smooth have so many rounding errors.
+        # The time of a sign change of a function that is not smooth has an error of up to 256
+        # spacings of floats.
         longest = np.diff(solution.pieces.edges).max()
         apart = np.minimum(roots.time - before, after - roots.time)
         found |= apart <= 256.0 * np.spacing(np.maximum(np.abs(roots.time), longest))

@@ -54,8 +54,8 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    Event number `limit` ends the integration, none if infinite. `is_vectorized` is true if the
-    function accepts arrays, None if not yet known.
+    The event of number `limit` ends the integration; if `limit` is infinite, no event does.
+    `is_vectorized` is true if the function accepts arrays, None if that is not yet known.
     """
 
     name: str
@@ -226,7 +226,7 @@ def _arguments(given: Callable[..., Any], name: str, with_own: bool = False) -> 
     if type(given) is FunctionType and not (given.__defaults__ or vars(given).keys() & _SIGNED):
         code = given.__code__
         count = code.co_argcount - with_own
-        # A function without defaults and flags for others has so many arguments and no other.
+        # A function without defaults, *args and **kwargs has exactly `count` arguments.
         if count in (2, 3) and not (code.co_kwonlyargcount or code.co_flags & _MORE_ARGUMENTS):
             return count
     try:

@@ -57,7 +57,7 @@ C = TypeVar("C", bound=_Columns)
 
 
 def together(parts: list[C], order: str) -> C:
-    """Return all rows in ascending order of a column."""
+    """Return the rows of all tables, in ascending order of the column `order`."""
     names = parts[0].__dataclass_fields__
     found = type(parts[0])(*(np.concatenate([getattr(x, name) for x in parts]) for name in names))
     return found.only(np.argsort(getattr(found, order), kind="stable"))
@@ -90,9 +90,9 @@ class Roots(_Columns):
     """Candidates for roots at n times (s).
 
     `change` is 1 for a sign change to positive in the order of time, -1 to negative, 0 for a touch.
-    `slope` (1/s) and `curvature` (1/s2) are derivatives of the polynomial. Values of the function
-    below `noise`, and of the polynomial below `near`, can't be distinguished from 0. The function
-    remains 0 for `lasting` (s), negative before time 0.
+    `slope` and `curvature` are the first and second derivatives of the polynomial by time (s).
+    Values of the function below `noise`, and of the polynomial below `near`, can't be distinguished
+    from 0. The function remains 0 for `lasting` (s), negative before time 0.
     """
 
     time: Array
@@ -105,7 +105,7 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots without derivatives."""
+        """Return roots with 0 in place of derivatives."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting

@@ -142,7 +142,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
     begin = np.flatnonzero(np.append(True, ~is_same))
     change = np.sign(np.add.reduceat(roots.change, begin))
     chosen, size = begin.copy(), np.diff(begin, append=len(roots.time))
-    # A jump there and back by rounding is no event.
+    # Two opposite sign changes due to rounding are no event.
     is_event = (change != 0) | ~np.minimum.reduceat(is_jump, begin)
     for k in np.flatnonzero(size > 1):
         chosen[k] = _chosen(roots, np.arange(begin[k], begin[k] + size[k]), change[k], ends)
@@ -194,7 +194,8 @@ def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) ->
 def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -> Array:
     """Return the times of events after (`side` 1) or before (-1) time 0, in order away from 0.
 
-    As in SciPy, a root at time 0 counts as a sign change from 0, and one at the end as one to 0.
+    As in SciPy, a root at time 0 counts as a sign change from 0, and a root at the end as a sign
+    change to 0.
     """
     end = solution.pieces.edges[-1 if side > 0 else 0]
     if side * end <= 0.0 or not roots.time.size:

@@ -15,9 +15,10 @@ from pyharness.model.values import Number, Numbers, finite, three
 def gravity_gradient(inertia: Numbers | Iterable[Numbers] | Changing, rate: Number) -> StateTorque:
     """Return the torque of the gravity gradient, 3 n^2 r x I r, in a circular orbit.
 
-    The unit vector r from the centre of attraction is (cos n t, sin n t, 0) along the axes of
-    space. The torque is 0 if a principal axis is along r; for rotations in the plane of the orbit,
-    this is stable if the axis has the smaller of the two moments in that plane.
+    I is the inertia matrix, and n the rate of the orbit. The unit vector r from the centre of
+    attraction is (cos n t, sin n t, 0) along the axes of space. The torque is 0 if a principal axis
+    is along r. For rotations in the plane of the orbit, this attitude is stable if that axis has
+    the smaller of the two moments in the plane.
 
     Parameters
     ----------
@@ -121,9 +122,10 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque m x b of coils that damp the rotation in a magnetic field.
 
     The coils have the moment m = -k b'. Here b = R^T B is the field about the body axes, where R
-    rotates from body to space, and b' = R^T B' - omega x b is its rate. In a constant field the
-    torque -k (|b|^2 omega - (omega . b) b) damps the part of omega that is perpendicular to the
-    field. In a rotating field the body finally rotates with the field.
+    rotates from body to space, and b' = R^T B' - omega x b is the rate of change of b, as measured
+    in the body. In a constant field the torque -k (|b|^2 omega - (omega . b) b) damps the part of
+    omega that is perpendicular to the field. In a rotating field the body finally rotates with the
+    field.
 
     Parameters
     ----------
@@ -169,7 +171,8 @@ def magnetic_damping(gain: Number, field: TorqueLaw | Numbers) -> StateTorque:
 def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     """Return the torque R^T N, where N has components about the axes of space.
 
-    The matrix R rotates from body to space. Use this term in sums; a scene alone takes a TorqueLaw.
+    The matrix R rotates from body to space. Use this term in a sum of torques; as the only torque
+    of a scene, the TorqueLaw suffices.
 
     Parameters
     ----------

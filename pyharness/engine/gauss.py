@@ -16,8 +16,8 @@ from pyharness.model.extension import COMPLETE, GAVE_UP, REFUSED, SENSITIVE, ext
 from pyharness.model.scene import Scene
 from pyharness.model.trajectory import ROUNDING, Array, Trajectory
 
-# Work limit, some ten seconds: right-hand sides of all trial integrations. A wave of the torque
-# counts as half of one.
+# Work limit: the right-hand sides of all trial integrations, some ten seconds. A wave of the torque
+# counts as half a right-hand side.
 _MOST_EVALUATIONS = 200_000_000
 _ORDER_THAT_SHOWS = 8  # highest order that the error estimate assumes
 # Shorter steps do not reduce a relative difference of two solutions below this limit.

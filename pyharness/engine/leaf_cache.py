@@ -33,12 +33,12 @@ class LeavesError(Exception):
     """The reason why leaves can't be compiled or loaded, in one line."""
 
 
-# The second: no home folder is known; the third: CC has an open quotation.
+# RuntimeError: no home folder is known. ValueError: a quotation mark in CC is not closed.
 _FAILURES = (LeavesError, RuntimeError, ValueError)
 
 
 def folder() -> Path:
-    """Return the folder, which may be missing."""
+    """Return the folder of compiled leaves, which may be missing."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
     return (home if home.is_absolute() else Path("~/.cache").expanduser()) / "pyharness" / "leaves"
 
@@ -65,9 +65,9 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of the compiled leaves of a tape, and ``compiled``; or 0, and why not.
+    """Return the address of the compiled leaves of a tape and ``compiled``, or 0 and the reason.
 
-    They are compiled if the folder has none.
+    If the folder has no leaves for this tape, they are compiled.
     """
     shape = structure(listing(tape))
     if shape is None:
@@ -80,7 +80,7 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
 
 @cache  # a kernel may use what has been loaded for as long as the process lives
 def loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
-    """Return the addresses of leaves in their order in `_FUNCTIONS`; raise LeavesError."""
+    """Return the addresses of a tape's leaves in the order of `_FUNCTIONS`; raise LeavesError."""
     try:
         found = _found(Path(place), _key(source(tape)))
         library = CDLL(str(found or compiled_file(Path(place), source(tape))))
@@ -189,7 +189,7 @@ def _run(command: list[str]) -> str:
 
 
 def _clean(place: Path) -> None:
-    """Delete the oldest files beyond the size limit, and those of killed compilations."""
+    """Delete the oldest files beyond the size limit, and folders of killed compilations."""
     import time
     from shutil import rmtree
 

@@ -52,9 +52,10 @@ _Listed = tuple[int, int, int, int]  # kind, operands x and y, and slot o of an 
 class Operation(NamedTuple):
     """The recurrence and the slopes of an operation, as C.
 
-    Its slots are o, p and q, its operands x and y. Of slot o, t_o is term k (l_o if it is known
-    before), b_o term k - 1, z_o term 0, f_o term 1, and m_o the value at a node; i is 1/k. s0 and
-    s1 are sums of products of terms 1 to k - 1 of the slots in `pairs`.
+    The slots of its results are o, p and q, those of its operands x and y. For slot o, t_o is term
+    k of the series (l_o if it is known before), b_o term k - 1, z_o term 0, f_o term 1, and m_o the
+    value at a node; likewise for the other slots. i is 1/k. s0 and s1 are sums of products of terms
+    1 to k - 1 of the slots in `pairs`.
     """
 
     series: tuple[str, ...]
@@ -77,7 +78,7 @@ OPERATIONS = {
     Operations.QUOTIENT: Operation(
         ("t_o = (t_x - s0 - t_y*z_o)/z_y",), ("yo",), "m_x/m_y", ("1.0/m_y", "-m_o/m_y")
     ),
-    # A norm is constant at rest.
+    # A root of 0, such as a norm at rest, is constant: its terms would be 0/0.
     Operations.SQRT: Operation(
         ("t_o = halved(t_x - s0, z_o)",), ("oo",), slopes=("slope_of_root(m_o)",)
     ),

@@ -14,7 +14,10 @@ def propagators(scene: Scene, times: Array, omega: Array) -> Array:
 
 
 def transitions(times: Array, slopes: Array) -> Array:
-    """Return transition matrices from n times (s) to the last, (n, m, m), from Jacobians (1/s)."""
+    """Return the transition matrices from n times (s) to the last, (n, m, m).
+
+    `slopes` are the Jacobian matrices (1/s) in the intervals, shape (n - 1, m, m).
+    """
     # The Jacobian hardly changes in an interval, so that exp(interval * Jacobian) is the
     # state-transition matrix.
     pieces = exponentials(np.diff(times)[:, None, None] * slopes)

@@ -82,39 +82,43 @@ def solve_many(
     Parameters
     ----------
     scene : Scene, or sequence of Scene
-        One scene, whose values apply where no array is given; or all scenes, without arrays.
+        One scene, whose values apply where no array is given; or a sequence of all scenes, without
+        arrays.
     t_end : float, or array of shape (n,)
         Final times, s; positive, negative or 0.
     times : float or iterable of float, shape (m,)
-        Times (s) in order for all bodies, instead of `t_end`. The result has a further axis of
-        length m after that of the bodies; each row is bit for bit that of a call with this `t_end`.
+        Strictly monotonic times (s) of the results for all bodies, instead of `t_end`. The arrays
+        of the result have a further axis, of length m, after the axis of the bodies. The states at
+        a time are bit for bit those of a call with this time as `t_end`.
     omega : array, shape (n, 3) or (3,)
         Initial angular velocities, rad/s. A single row, here and below, applies to all bodies.
     attitude : array, shape (n, 4) or (4,), or scipy.spatial.transform.Rotation
         Quaternions at time 0, from body to space, scalar first. The default is the scene's
         attitude; if it has none, no attitudes are returned.
     moments, coefficients : array, shape (n, 3) or (3,)
-        Principal moments (kg m2), or Euler's coefficients A, B, C; not both.
+        Principal moments (kg m2), or the coefficients A, B, C of Euler's equations; not both.
     inertia : array, shape (n, 3, 3) or (3, 3)
-        Inertia matrices (kg m2) instead of moments, about the axes of all vectors and attitudes.
+        Inertia matrices (kg m2), instead of moments, about the same body axes as all vectors and
+        attitudes.
     torque_constant, torque_rate : array, shape (n, 3) or (3,)
-        Constant torques (N m) and rates (N m/s). For bodies given by coefficients, these are
-        torques over moments (1/s2, 1/s3).
+        Constant parts of the torques (N m), and their rates of change (N m/s). For bodies given by
+        coefficients, these are torques over moments (rad/s2, rad/s3).
     sines, cosines : array, shape (n, k, 4) or (k, 4)
-        The k waves of each torque: three amplitudes (in the unit of `torque_constant`) and a
-        frequency (rad/s).
+        The k waves of each torque, sines or cosines of time: three amplitudes (in the unit of
+        `torque_constant`) and a frequency (rad/s).
     parameters : dict of arrays, shape (n,), or of float
         Values of keyword arguments of the torque's function, or of constants of its expressions, by
-        name. Bodies that differ in them, in moments and in starts are solved side by side.
+        name. Bodies that differ only in these values, moments or coefficients, and initial states
+        are solved side by side.
     states : dict of arrays, shape (n,), or of float
-        Values at time 0 of the scene's own states, by name; the scene's by default. Such bodies are
-        solved one by one, without events, sensitivities and `out`.
+        Values at time 0 of the scene's own states, by name; by default those in the scene. Bodies
+        with own states are solved one by one, without events, sensitivities and `out`.
     method : str
-        A name in `pyharness.engine.solver.PREPARED`. `auto` uses closed forms or the Taylor
-        series.
+        A name in `pyharness.engine.solver.PREPARED`. `auto` uses a closed form if there is one,
+        else the Taylor series.
     tolerance : float
-        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
-        end, and of the attitude's angle (rad). The default depends on the method.
+        Largest allowed error of a component of omega, relative to the largest |omega| from time 0
+        to the end, and of the attitude, as an angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
     effort : float
@@ -126,7 +130,7 @@ def solve_many(
         `auto`, `taylor` or `closed-form`. Events take some milliseconds per body.
     sensitivities : iterable of str
         Names of parameters, as in `solve`, with respect to which the final states are
-        differentiated. The same three methods are allowed.
+        differentiated. The same three methods are allowed as for events.
     threads : int
         Number of threads. The kernel releases the GIL.
     out : Ensemble, or array of shape (n, 3), optional
@@ -137,7 +141,8 @@ def solve_many(
     Returns
     -------
     Ensemble
-        The final states. A body that can't be solved has NaN, and its status has the reason.
+        The states at the final times or at `times`. For a body that can't be solved they are NaN,
+        and its status has the reason.
 
     Raises
     ------

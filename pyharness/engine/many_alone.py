@@ -1,6 +1,7 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-The vector kernel has no torque of the state or about the axes of space, and no changing inertia.
+The vector kernel can't solve scenes with a torque of the state or about the axes of space, or with
+a changing inertia.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -186,9 +187,9 @@ def prepare_details(
     tolerance: Number | None, effort: float, events: object,
     sensitivities: Iterable[str] | None, has_rows: bool,
 ) -> Callable[[Ensemble], Ensemble]:  # fmt: skip
-    """Return a function that adds events and sensitivities to a result; check the request.
+    """Check the request; return a function that adds events and sensitivities to a result.
 
-    `t_end` has the times of all bodies if `has_rows`. The arrays are copied.
+    If `has_rows`, `t_end` are the common times (s) of all bodies. The arrays are copied.
     """
     if method not in _METHODS:
         where = "sensitivities" if events is None else "events"

@@ -63,7 +63,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s), with NaN, which kernels refuse, where a changing moment has reached 0."""
+    """Return times (s); those after a changing moment reached 0 are NaN, which kernels refuse."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -103,7 +103,7 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    Single calls are for bodies whose error can't be measured; for all bodies, if the torque is
+    Single calls are for bodies whose error can't be measured; and for all bodies if the torque is
     neither recorded nor in space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
@@ -144,7 +144,7 @@ def solve_lanes(
 ) -> list[int]:  # fmt: skip
     """Solve bodies whose equations are a tape with `parameters`, (n, k) or (1, k), side by side.
 
-    Return the indices of those that remain unsolved.
+    Return the indices of bodies that remain unsolved.
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

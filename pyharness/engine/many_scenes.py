@@ -49,11 +49,11 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 
 
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
-    """Return arrays of bodies with inertia matrices as arrays about principal axes, and the axes.
+    """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
-    The arrays have A, B, C, because rounded moments would be less accurate; NaN for a matrix that
-    is not symmetric and positive definite. The axes are columns, (n, 3, 3), and also quaternions,
-    (n, 4), if there are attitudes.
+    The arrays have A, B, C, because rounded moments would be less accurate; these are NaN if a
+    matrix is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3), and
+    also quaternions, (n, 4), if there are attitudes.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -112,7 +112,7 @@ def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Ar
 
 
 def from_scene(scene: Scene) -> dict[str, Any]:
-    """Return the arrays of a scene."""
+    """Return the arrays of `solve_many` for one scene."""
     law = checked_scene(scene, any_axes=True).body_torque
     kind = next(name for name in BODIES if getattr(scene, name) is not None)
     return {

@@ -42,8 +42,9 @@ _VARIES = 1e-2
 _METHODS = ("auto", "taylor", "closed-form")
 _MOST_COLUMNS = 200
 _THREE = (0.0, 0.0, 0.0)  # stands for omega and attitude, which have three columns
-# The parameters for which one period of a body without torque is extrapolated. A torque changes the
-# period with time, the others once.
+# The parameters for which one period of a body without torque is extrapolated. A change of the
+# torque changes each period by another amount; a change of another parameter changes all periods
+# alike.
 _CONSTANT = "torque.constant"
 _PERIODIC = {OMEGA, "moments", "coefficients", "inertia", _CONSTANT}
 
@@ -52,7 +53,7 @@ _LEVELS, _RATIO = 13, 2.0
 _ENOUGH = 1e-11  # estimated error, relative, at which no smaller differences are tried
 # Largest estimated error, relative to the largest derivative by a parameter.
 _ALLOWED = 1e-7
-_SMALL = 1e-10  # allowed too: this relative change of the state by a change of the parameter
+_SMALL = 1e-10  # allowed in addition: error relative to the state over the size of the parameter
 
 # A function that returns the states at the times, shape (n, m), of a scene.
 States = Callable[[Scene], Array]
@@ -139,7 +140,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns by name, the derivatives, (n, 3 or 7, m), and those at time 0."""
+    """Return the columns by name, the derivatives, (n, 3 or 7, m), and their values at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))

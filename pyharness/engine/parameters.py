@@ -1,4 +1,4 @@
-"""Parameters of a scene, and partial derivatives of its equations."""
+"""Parameters of a scene, and partial derivatives of its equations of motion by them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -36,8 +36,9 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
     The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
-    parameter has a column; `columns` has the columns by name. `forcings`, shape (n, m), has for n
-    rates and m columns the number of the output, from 1, or 0 for a derivative of 0.
+    parameter has a column; `columns` has the columns by name. `forcings`, shape (n, m), has for
+    each of n rates and m columns the number, from 1, of the output with this partial derivative, or
+    0 if the derivative is 0.
     """
 
     tape: Tape
@@ -72,7 +73,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless `names` are parameters of the torque with one value."""
+    """Raise InputError unless each of `names` is a parameter of the torque that is one number."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
@@ -118,10 +119,10 @@ def tape_of_bodies(
     torque: StateTorque | TorqueLaw, body: tuple[Triple, Triple] | None, names: tuple[str, ...],
     attitude: bool,
 ) -> Tape:  # fmt: skip
-    """Return the equations of motion of bodies that differ in parameters, which are further inputs.
+    """Return one tape of the equations of motion for bodies that differ in parameters.
 
-    These are A, B, C and the reciprocal moments, unless `body` has them for all bodies, and the
-    torque's parameters `names`.
+    The parameters are further inputs: A, B, C and the reciprocal moments, unless `body` has them
+    for all bodies, and the torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))

@@ -104,7 +104,7 @@ def chosen_method(
 def by_plan(
     scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0, *more: bool
 ) -> Trajectory:
-    """Return the trajectory at `times` (s) by the chosen method, or else by its fallback."""
+    """Return the trajectory at `times` (s) by the chosen method; if it refuses, by its fallback."""
     name, fallback = chosen_method(scene, closed_form(scene), tolerance, rows=True)
     method = REGISTRY[name]
     more = more if method.gives_steps else ()

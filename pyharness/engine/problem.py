@@ -1,7 +1,7 @@
 """Conversion of scenes to arguments of the Fortran kernels, and of their results.
 
-A torque over moments is four arrays: constant (1/s2), rate (1/s3), sines and cosines, whose columns
-are three amplitudes and the frequency (rad/s).
+A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines, whose
+columns are three amplitudes (rad/s2) and the frequency (rad/s).
 """
 
 import math
@@ -42,8 +42,9 @@ def normalized(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 def remainders(scene: Scene) -> Triple:
     """Return the exact coefficients A, B, C minus their values in binary64.
 
-    Without these remainders, a closed form has an error of 1e-10 rad after 1e6 rad. They are 0 for
-    a body given by coefficients, and under a torque, where no kernel uses them.
+    Without these remainders, a closed form has an error of 1e-10 rad after a phase of 1e6 rad. The
+    remainders are 0 for a body given by coefficients, and under a torque, where no kernel uses
+    them.
     """
     found, moments = scene.euler_coefficients, scene.exact_moments
     if moments is None or not scene.torque.is_zero or not all(map(math.isfinite, found)):
@@ -70,18 +71,17 @@ def trajectory_of(
     error: float | None = None,
     growth: float | None = None,
     attitudes: Array | None = None,
+    **more: Any,
 ) -> Trajectory:
     """Return the trajectory from the first `n_rows` columns of a kernel's omega and attitudes.
 
     It has no `error` and `growth` if they are negative, or if the last time was not reached.
     """
     ended = ENDS[status] if ENDS[status] in (*WITH_ALL_ROWS, "sliding") else "overflow"
-    estimates = {"error": error, "growth": growth} if ended in WITH_ALL_ROWS else {}
-    more = {
-        name: float(value)
-        for name, value in estimates.items()
-        if value is not None and value >= 0.0
-    }
+    if ended in WITH_ALL_ROWS:
+        for name, value in (("error", error), ("growth", growth)):
+            if value is not None and value >= 0.0:
+                more[name] = float(value)
     attitude = None if attitudes is None else attitudes.T[:n_rows]
     return rows_trajectory(
         times[:n_rows], rows.T[:n_rows], evaluations, steps, ended, attitude=attitude, **more

@@ -142,7 +142,7 @@ def extremum(axis: int, *, terminal: bool | int = False, direction: int = 0) -> 
 
 
 def rest(value: Number, *, terminal: bool | int = False, direction: int = -1) -> Event:
-    """Return the event that the magnitude of omega falls to a value.
+    """Return the event that the magnitude of omega reaches a value, by default by falling.
 
     Parameters
     ----------

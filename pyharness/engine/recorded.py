@@ -67,9 +67,10 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     """Return the equations of motion of a scene with principal axes as a tape.
 
-    They are equations 16-18 of the thesis and, if `attitude`, by default if the scene has one,
-    q' = q (0, omega)/2; then the rates of the scene's own states. The inputs are the time and the
-    unknowns in this order. Raise InputError for an opaque torque.
+    The outputs are the rates of omega by equations 16-18 of the thesis; if `attitude`, the rates of
+    the quaternion, q' = q (0, omega)/2; and the rates of the scene's own states. `attitude` is by
+    default true if the scene has an attitude. The inputs are the time and the unknowns in this
+    order. Raise InputError for an opaque torque.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -136,8 +137,9 @@ def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
 class Listing(NamedTuple):
     """A tape as lists, with slots and combinations numbered from 1.
 
-    An operation is a kind of `Operations`, two operands and a result; a combination is a constant
-    and pairs of slot and coefficient. The last `n_unknowns` combinations are derivatives.
+    A slot is an input or a result of an operation. An operation is a kind of `Operations`, two
+    operands and a result. A (linear) combination is a constant and pairs of slot and coefficient.
+    The last `n_unknowns` combinations are the derivatives of the unknowns.
     """
 
     n_unknowns: int
@@ -153,7 +155,7 @@ _LEAVES = 7
 
 @lru_cache(maxsize=64)
 def listing(tape: Tape, n_unknowns: int | None = None) -> Listing:
-    """Return a tape as lists; the last `n_unknowns` outputs, by default all, are derivatives.
+    """Return a tape as lists; its last `n_unknowns` outputs (default: all) are derivatives.
 
     Sine and cosine of one angle become one operation, because the recurrence of one needs the
     other.
@@ -242,7 +244,7 @@ def _in_pairs(integers: Sequence[int] | NDArray[np.int64]) -> Array:
 
 
 def has_ready_leaves(tape: Tape) -> bool:
-    """Return whether leaves for the tape, that of a ready torque, were built with the package."""
+    """Return whether leaves for the tape were built with the package, as for ready torques."""
     return bool(kernel_tape(tape)[_LEAVES] != 0.0)
 
 
@@ -251,7 +253,8 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of a tape's compiled leaves; 0 for built ones, or none.
+    `leaves` is the address of a tape's compiled leaves; 0 if they were built with the package, or
+    there are none.
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:

@@ -21,7 +21,7 @@ from pyharness.model.values import Number, boolean, tolerance_of
 # Smallest tolerances of Gauss collocation with 1 to 8 stages; low orders would need too many steps
 # for smaller ones.
 _GAUSS_FINEST = (1e-8, 1e-11, 1e-12, 1e-13, 1e-14, 1e-14, 1e-14, 1e-14)
-# At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors, at 1e-12 303:
+# At this tolerance 5 of 1000 ordinary motions are sensitive to rounding errors; at 1e-12, 303 are:
 # `python -m tests.campaigns.default_campaign 1000 2026-11-26`.
 _DEFAULT = 1e-9
 _ONE_STAGE_DEFAULT = 1e-6
@@ -205,7 +205,10 @@ SCIPY_METHODS = {name: method.scipy for name, method in REGISTRY.items() if meth
 
 
 def requested_tolerance(method: str, tolerance: Number | None) -> float:
-    """Return the tolerance, or the method's default; raise InputError if it is no number."""
+    """Return the tolerance, or the method's default if None; raise InputError if it is no number.
+
+    The range is not checked.
+    """
     chosen = REGISTRY[method]
     return chosen.default if tolerance is None else tolerance_of(tolerance, chosen.finest)
 

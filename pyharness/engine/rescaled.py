@@ -96,8 +96,9 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    It allows for the omega that the torque may cause until `time` (s), an estimate for a torque of
-    the state. It is 1 if no rescaling is needed or possible, as for an opaque torque.
+    It allows for the omega that the torque may cause until `time` (s); this omega is a bound, or an
+    estimate for a torque of the state. The factor is 1 if no rescaling is needed or possible, as
+    for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0

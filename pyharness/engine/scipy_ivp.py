@@ -218,7 +218,7 @@ class _Run(Run):
 
 
 def _pushes(scene: Scene) -> list[tuple[float, float]]:
-    """Return each wave's largest ratio of amplitude to moment (1/s2), and its frequency."""
+    """Return each wave's largest ratio of amplitude to moment (rad/s2), and frequency (rad/s)."""
     moments = scene.moments or (1.0, 1.0, 1.0)
     return [
         (max(abs(a) / moment for a, moment in zip(amplitude, moments, strict=True)), abs(frequency))

@@ -1,7 +1,7 @@
 """Integrations by SciPy's `solve_ivp` under one work limit, and their check by a Taylor series.
 
-SciPy may step over a short change of a recorded torque. If the results differ, the steps of the
-series limit those of SciPy.
+SciPy may step over a short change of a recorded torque. If its results differ from those of the
+series, the steps of the series limit the steps of SciPy.
 """
 
 import contextlib
@@ -37,13 +37,14 @@ _SHORTEST_SPAN = 2.0**-300
 # LSODA in older versions of SciPy has one state for all threads, and fails if two integrations
 # alternate. The lock is reentrant, so that a torque may integrate too.
 _ALONE = {"LSODA": threading.RLock()}
-# SciPy's longest step over those of the series; LSODA evaluates the torque only once in a step.
+# Ratio of SciPy's longest step to the steps of the series; LSODA evaluates the torque only once in
+# a step.
 _PART = 0.5
 # Stiff equations need more steps of the series; they are not checked.
 _MOST_STEPS = 20_000
-# Largest ratio of the steps of the series in a span.
+# Largest ratio of two steps of the series in a span.
 _RATIO = 8.0
-# Tolerance of a step of the series, relative to that of the result.
+# Tolerance of a step of the series, relative to the tolerance of the result.
 _FINER = 0.01
 _FINEST = 1e-13  # tolerance of the steps that end at switches
 
@@ -92,9 +93,9 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`.
 
-        It has dense output if `with_steps`, or without `times`. Its times are in units of
-        `self.unit` seconds, the arguments in s. Raise NoNumberError if Radau's linear algebra
-        refuses a number, or the time is NaN.
+        It has dense output if `with_steps`, or without `times`. The times in the result are in
+        units of `self.unit` seconds, those in the arguments in s. Raise NoNumberError if Radau's
+        linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
 
@@ -133,7 +134,7 @@ class Run:
                 ) from None
 
     def phase_error(self, time: float) -> TimedError:
-        """Return the exception for a phase above the limit at `time`, in units of `self.unit`."""
+        """Return the exception for a phase above the limit at `time` (in units of `self.unit`)."""
         return TimedError(
             f"{self.label} stopped at t = {{time}} s: beyond {LARGEST_PHASE:.0e} radians the phase "
             "has hardly a digit left; use a shorter time",

@@ -51,14 +51,15 @@ _COARSE = 1e-3
 # over this factor.
 _FAR = 4.0
 _MOST_GUESSES = 200
-# Steps that do not change the time; LSODA would not return.
+# Largest number of successive steps that do not change the time; without it LSODA might not return.
 _MOST_STUCK = 50
 # Omega counts as unbounded if it has grown by this factor when the phase is too large.
 _UNBOUNDED = 1e3
 # Largest difference from the series of a recorded torque, in tolerances.
 _AGREEMENT = 0.5
 _ORDINARY = 1e100  # rad/s; products of smaller omegas are finite
-# A jump of the rates is searched this far ahead, over the time span, by so many halvings.
+# A jump of the rates is searched up to this fraction of the time span ahead, by this number of
+# halvings.
 _AHEAD, _HALVINGS = 1e-3, 50
 # Local tolerances of the two integrations that determine the smallest tolerance.
 _TRIAL = (1e-7, 1e-8)
@@ -86,8 +87,8 @@ def solve_state(
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
 
     The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
-    work limit in right-hand sides of a body without torque. With `with_steps`, `sol` has the steps
-    under an opaque torque, by SciPy's interpolants.
+    work limit in right-hand sides of a body without torque. With `with_steps`, and under an opaque
+    torque, `sol` of the result has the steps, by SciPy's interpolants.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
     if the series of a recorded torque does not reach the end. Raise InputError if an opaque

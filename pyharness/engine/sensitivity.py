@@ -66,8 +66,8 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
 
-    The error is relative to the largest |omega| so far, or that of the angle (rad) if larger. Both
-    are None if unknown.
+    The error is that of omega, relative to the largest |omega| so far, or of the attitude (rad) if
+    larger. Both results are None if unknown.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.

@@ -75,39 +75,40 @@ def solve(
     times : float or iterable of float, shape (n,)
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
-        A name in `pyharness.engine.registry.METHODS`. `auto` uses closed forms or the Taylor
-        series, and `dop853` for an opaque torque.
+        A name in `pyharness.engine.registry.METHODS`. `auto` uses a closed form if there is one,
+        else the Taylor series; for an opaque torque, `dop853`.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
-        from 0 on. The default depends on the method, 1e-9 for `auto`. Methods with a fixed step
-        take none.
+        since time 0. The default depends on the method; for `auto` it is 1e-9. Methods with a fixed
+        step take no tolerance.
     effort : float
         Factor on the work limit; 1 means some ten seconds.
     attitude : bool, optional
-        Whether to compute the attitude, from the scene's or (1, 0, 0, 0); by default, if the scene
-        has one or its torque needs one. The tolerance also applies to its angle (rad).
+        Whether to compute the attitude, from the scene's initial attitude or, if it has none, from
+        (1, 0, 0, 0). By default it is computed if the scene has an attitude or its torque needs
+        one. The tolerance also limits the error of the attitude, as an angle (rad).
     dense_output : bool
         Whether to return `sol`, the solution as a function of time between 0 and `times`, to within
-        the tolerance. It is free with closed forms and Taylor series, and under an opaque torque
-        with `dop853` and `lsoda`. Other methods need further integrations; those with a fixed step
-        give a cubic on each step.
+        the tolerance. Closed forms and Taylor series supply it without further integrations, and so
+        do `dop853` and `lsoda` under an opaque torque. Other methods need further integrations;
+        methods with a fixed step supply a cubic polynomial on each step.
     events : callable, Event, or list of these
-        Functions with the arguments of a torque, or events of `pyharness.events`, whose roots
-        between 0 and `times` become `t_events` and `y_events`. `terminal` and `direction` are as in
-        SciPy's `solve_ivp`; rows after a terminal event are removed. Functions that accept arrays
-        are called with arrays.
+        Functions of (t, omega) or (t, omega, attitude), or events of `pyharness.events`. Their
+        roots between 0 and `times` become `t_events`, and the states there `y_events`. A function
+        may have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`; rows after a
+        terminal event are removed. Functions that accept arrays are called with arrays.
     sensitivities : iterable of str
-        Parameters by which omega and the quaternion are differentiated: `omega`, `attitude` (small
-        initial rotations about the body axes, rad), `moments`, `coefficients`, `inertia` (columns
-        I11, I22, I33, I12, I13, I23) or `torque.NAME`. NAME is a constant of a scene file's
-        expressions, or a function's keyword argument with a number as default; for a TorqueLaw,
-        `constant`, `rate`, `sines` or `cosines` (four columns per wave: three amplitudes,
-        frequency). The method must be `auto`, `taylor` or `closed-form`.
+        Names of the parameters by which omega and the quaternion are differentiated: `omega`,
+        `attitude` (small initial rotations about the body axes, rad), `moments`, `coefficients`,
+        `inertia` (columns I11, I22, I33, I12, I13, I23) or `torque.NAME`. NAME is a constant of a
+        scene file's expressions, or a function's keyword argument with a number as default; for a
+        TorqueLaw, `constant`, `rate`, `sines` or `cosines` (four columns per wave: three
+        amplitudes, frequency). The method must be `auto`, `taylor` or `closed-form`.
 
     Returns
     -------
     Trajectory
-        One row per time, in the order of `times`, none beyond an overflow.
+        The states, one row per time in the order of `times`; there are no rows after an overflow.
 
     Raises
     ------
@@ -115,8 +116,8 @@ def solve(
         If the method is unknown, or can't solve the scene or its attitude; if the torque needs the
         attitude, and `attitude` is false; if the times are not in order; or if a changing moment
         reaches 0. Also if the tolerance can't be met within `effort`; if dense output needs too
-        many polynomials; if an event has other arguments or results; or if sensitivities can't be
-        computed.
+        many polynomials; if the function of an event has wrong arguments or results; or if
+        sensitivities can't be computed.
     NotBuiltError
         If the method needs the extension, and it is not built.
 
@@ -172,7 +173,8 @@ def solve(
     below = [t for t in values if t < 0.0]
     # Methods take times on one side of 0, in order away from 0.
     sides = (below[::-1], values[len(below) :])
-    more = (True,) if chosen.gives_steps and (dense_output or functions is not None) else ()
+    needs_steps = dense_output or functions is not None
+    more = (True,) if chosen.gives_steps and needs_steps else ()
     parts = [integrate(chosen, scene, each, tolerance, effort, *more) for each in sides if each]
     parts = [
         with_reason(scene, part, each[-1]) if part.ended == "overflow" else part
@@ -182,12 +184,16 @@ def solve(
         parts[0] = in_reverse(parts[0])
     found = parts[0] if len(parts) == 1 else joined(*parts)
     reported = None if chosen.is_fixed_step else tolerance
-    steps = found.sol
-    found = replace(found, moments=moments, tolerance=reported, scene=given, sol=None)
+    sol = found.sol if needs_steps else None
     if axes is not None:
         turned_to = partial(states_in_scene_axes, axes=axes, own=7 if attitude else 3)
-        steps, found = transformed_steps(steps, turned_to), in_scene_axes(found, axes)
-    if found.ended == "unchecked" and (dense_output or functions is not None):
+        sol, found = transformed_steps(sol, turned_to), in_scene_axes(found, axes)
+    if sol is not None:
+        sol = replace(sol, rates=partial(rates_of, given))
+    found = replace(
+        found, moments=moments, tolerance=reported, scene=given, sol=sol if dense_output else None
+    )
+    if found.ended == "unchecked" and needs_steps:
         raise InputError(
             f"dense output and events of {method} need the series of a recorded torque, which ends "
             "before the last time; allowed: a smooth torque, or opaque(function)"
@@ -195,13 +201,11 @@ def solve(
     if found.reason is not None:
         found = replace(found, reason=with_text(found.reason, given))
     rows = partial(_more_rows, given, method, effort, found.attitude is not None)
-    if dense_output or functions is not None:
-        if steps is None:
-            sol = solution_of(given, found, rows, method, tolerance)
-        else:
-            sol = replace(steps, rates=partial(rates_of, given))
+    if needs_steps and sol is None:
+        sol = solution_of(given, found, rows, method, tolerance)
         found = replace(found, sol=sol) if dense_output else found
     if functions is not None:
+        assert sol is not None
         ends = values[0], values[-1]
         found = with_events(given, found, sol, functions, ends, rows, method, tolerance)
         if turned or (len(values) == 1 and values[0] < 0.0):

@@ -60,10 +60,10 @@ _FEW_WAVES = 16  # fewer waves take less time than releasing the GIL
 class Solver(BoundKernel[Result]):
     """A solver of a scene, prepared for one method by `prepare`.
 
-    Call it as ``solver(omega, t_end)`` or ``solver(omega, t_end, out=out)``: three numbers
-    (rad/s), and the final time (s), positive, negative or 0. A call returns omega (rad/s) at
-    `t_end` as a new array of shape (3,), or in `out`, a contiguous array of three floats, which may
-    be `omega`.
+    Call it as ``solver(omega, t_end)`` or ``solver(omega, t_end, out=out)``, with three numbers for
+    the initial omega (rad/s), and the final time (s), positive, negative or 0. A call returns omega
+    (rad/s) at `t_end` as a new array of shape (3,), or in `out`, a contiguous array of three
+    floats, which may be the array `omega`.
 
     A solver prepared with ``attitude=True`` is called as ``solver(omega, t_end, attitude)``, with
     the initial quaternion from body to space, scalar first; by default it is the scene's, or
@@ -84,10 +84,12 @@ class Solver(BoundKernel[Result]):
     plan : Plan
         The chosen method and the computed parts, with reasons, for the scene about principal axes.
     status, error, growth, digits, steps, method
-        Reports on this thread's last call, unless it raised an error.
+        The ending, estimated error, error amplification, correct digits, steps and method of this
+        thread's last call that raised no error.
     leaves : str or None
-        The code for the series of a recorded torque: ``built`` with the package, ``compiled``, or
-        ``interpreter``, with the reason if compilation was requested. None for other torques.
+        The origin of the code that computes the Taylor series of a recorded torque: ``built`` with
+        the package, ``compiled`` for this torque, or an ``interpreter``, with the reason if
+        compilation was requested. None for other torques.
     many : callable
         A function that solves from many initial states in one call.
 
@@ -123,7 +125,8 @@ class Solver(BoundKernel[Result]):
         packed = packed_scene(chosen.scene, code, tolerance, effort, address)
         packed_with_gil = None
         if chosen.closed_form and packed.size < Places.WAVES + 4 * _FEW_WAVES:
-            # It has no fallback, which may take long. Then the kernel is called without the GIL.
+            # This kernel has no fallback, which may take long; if it refuses, the other kernel is
+            # called without the GIL.
             packed_with_gil = packed.copy()
             is_sphere = chosen.closed_form == "sphere" and not with_attitude
             packed_with_gil[Places.METHOD] = CODES["sphere" if is_sphere else "closed-form"]
@@ -156,14 +159,15 @@ class Solver(BoundKernel[Result]):
         """Return the function that solves many initial states in one call.
 
         ``solver.many(omega, t_end, threads=1, out=None)`` takes `omega` (rad/s) of shape (n, 3),
-        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in `out`
-        unless None, and the statuses of `Ensemble`, int8, shape (n,). A row does not depend on the
-        others or on `threads`, but may differ by rounding from a single call. Invalid arguments
-        raise an InputError; a body whose moment reaches 0 before `t_end` is REFUSED.
+        and `t_end` (s), a number or of shape (n,). It returns omega (rad/s), shape (n, 3), in the
+        array `out` if given, and the statuses of `Ensemble`, int8, shape (n,). A row does not
+        depend on the other rows or on `threads`, but may differ by rounding from the result of a
+        single call. Invalid arguments raise an InputError; a body with a moment that reaches 0
+        before `t_end` has the status `refused`.
 
-        With attitude it is ``solver.many(omega, t_end, attitude=None, threads=1, out=None)``,
-        with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and statuses; `out`
-        may be an Ensemble, or an array for omega.
+        For a solver with attitude, it is ``solver.many(omega, t_end, attitude=None, threads=1,
+        out=None)`` with quaternions of shape (n, 4) or (4,), and returns omega, attitudes and
+        statuses; `out` may be an Ensemble, or an array for omega.
         """
         if self.with_attitude:
             return partial(many_states, self)
@@ -206,18 +210,18 @@ class Solver(BoundKernel[Result]):
 
     @property
     def status(self) -> str:
-        """Return how the last call ended; ``complete`` before the first.
+        """Return how the last call ended; ``complete`` before the first call.
 
         It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left, and
         ``refused`` if the method does not apply. It is ``sensitive`` if amplified rounding errors
-        exceed the tolerance. The test for ``sensitive`` takes microseconds for a closed form,
-        milliseconds for Gauss collocation.
+        exceed the tolerance. Testing this takes microseconds for a closed form, milliseconds for
+        Gauss collocation.
         """
         return self._judge()[0]
 
     @property
     def error(self) -> float | None:
-        """Return the estimated error of the last result (relative, or rad), or None if unknown."""
+        """Return the estimated error of the last result, as in `Trajectory`; None if unknown."""
         return self._judge()[1]
 
     @property
@@ -288,21 +292,23 @@ def prepare(
     Parameters
     ----------
     scene : Scene
-        The scene.
+        The body, its torque and its default attitude. Each call supplies the initial omega.
     method : str
         A name in `pyharness.engine.solver.PREPARED`; `auto` selects the fastest.
     tolerance : float
-        Largest allowed error of a component of omega, relative to the largest |omega| from 0 to the
-        end, by default as in `solve`. It does not affect the error of fixed steps and Gauss
-        collocation. If the motion amplifies perturbations by a factor K, no method has a relative
-        error below some 1e-15 K.
+        Largest allowed error of a component of omega, relative to the largest |omega| from time 0
+        to the end; the default is that of `solve`. It does not affect the errors of methods with a
+        fixed step and of Gauss collocation. If the motion amplifies perturbations by a factor K, no
+        method has a relative error below some 1e-15 K.
     effort : float
-        Factor on the work limit of a call (some ten seconds); beyond it the status is `gave up`.
+        Factor on the work limit of a call, some ten seconds. Beyond the limit the status is `gave
+        up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
-        Whether a C compiler translates a recorded torque, in some 0.1 s, unless the user's cache
-        has it; without a compiler it is interpreted. `Solver.leaves` says which.
+        Whether a C compiler translates the series of a recorded torque, in some 0.1 s, unless the
+        user's cache has the result. Without a compiler the torque is interpreted. `Solver.leaves`
+        says which of these applies.
 
     Returns
     -------

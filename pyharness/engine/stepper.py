@@ -41,9 +41,9 @@ class Stepper:
     scene : Scene
         The body, its torque and its state at time 0. The torque must not be opaque.
     tolerance : float, optional
-        The largest error of a step, in a component of omega relative to the largest |omega| so far,
-        in the attitude's angle (rad), and in an own state relative to its largest absolute value so
-        far. Default is 1e-9.
+        The largest error of a step: of a component of omega, relative to the largest |omega| so
+        far; of the attitude, as an angle (rad); and of an own state, relative to its largest
+        absolute value so far. Default is 1e-9.
     attitude : bool, optional
         Whether the attitude is computed, as in `pyharness.solve`.
 
@@ -59,10 +59,10 @@ class Stepper:
         The scene's own states. Another dict, of some or all names, may be set.
     held_torque : ndarray, shape (3,)
         A torque about the body axes that is added to the scene's: in N m, or for a body given by
-        coefficients as an acceleration, 1/s2. It is 0 at first, and applies until it is set again,
-        even if another scene is set.
+        coefficients, as torque over moment, in rad/s2. It is 0 at first, and applies until it is
+        set again, even if another scene is set.
     scene : Scene
-        The scene. If another one is set, time, omega, attitude and states are kept.
+        The scene. If another scene is set, time, omega, attitude and states are kept.
     steps : int
         The number of steps so far.
 
@@ -190,7 +190,7 @@ class Stepper:
 
     @property
     def held_torque(self) -> Array:
-        """The torque that is added to the scene's (N m, or 1/s2; body axes), shape (3,)."""
+        """The torque added to the scene's, about the body axes (N m or rad/s2), shape (3,)."""
         return _copy_fixed(self._state[-3:])
 
     @held_torque.setter
@@ -282,8 +282,8 @@ class Stepper:
     def at(self, times: float | Sequence[float] | Array) -> Array:
         """Return the state at times (s) within the last step, without later changes by the user.
 
-        It is omega (rad/s), the quaternion if computed, and own states, shape (m,), or (m, n) for n
-        times. Raise InputError for a time outside the step.
+        The state is omega (rad/s), the quaternion if computed, and own states, with shape (m,), or
+        (m, n) for n times. Raise InputError for a time outside the step.
         """
         try:
             given: Array = np.asarray(times, dtype=float)
@@ -309,7 +309,7 @@ class Stepper:
 def steps_to(
     scene: Scene, attitude: bool, end: float, tolerance: float, most: int = _MOST_STEPS
 ) -> Iterator[tuple[float, Stepper]]:
-    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after it.
+    """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after the step.
 
     The steps end before a singularity, and after `most` steps.
     """
@@ -324,7 +324,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the length (s) of each step to `end`, by its end (s), without steps to `bounds`."""
+    """Return the lengths (s) of steps to `end` (s) by their ends (s), without ends in `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -334,7 +334,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory that ends early, ``singular`` if its torque becomes undefined."""
+    """Return a trajectory that ends early, as ``singular`` if its torque becomes undefined."""
     if not is_recorded(scene):
         return found
     try:

@@ -86,7 +86,7 @@ def inertia_table(
 ) -> InertiaFunction:
     """Return the inertia that a table of moments or matrices over time specifies.
 
-    The first holds before the first time, and the last after the last time.
+    The first value holds before the first time, and the last value after the last time.
 
     Parameters
     ----------

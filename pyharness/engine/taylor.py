@@ -1,7 +1,6 @@
 """Integration by Taylor series, with adapted order and step size."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,10 @@ from pyharness.model.constant_body import with_constant_body
 from pyharness.model.dense_output import NODES, Pieces
 from pyharness.model.effort import advice
 from pyharness.model.errors import TimedError
-from pyharness.model.extension import GAVE_UP, extension
+from pyharness.model.extension import ENDS, GAVE_UP, extension
 from pyharness.model.scene import Scene
 from pyharness.model.state_torque import StateTorque
-from pyharness.model.trajectory import Trajectory
+from pyharness.model.trajectory import WITH_ALL_ROWS, Trajectory
 
 
 def taylor(
@@ -31,8 +30,8 @@ def taylor(
     """Return the trajectory of a scene at `times` (s) by Taylor series.
 
     The integration is repeated if inaccurate; `evaluations` counts the series of all integrations.
-    With `with_steps`, `sol` has the steps, up to 20 000. Raise InputError for an opaque torque, and
-    if the work limit is exceeded.
+    With `with_steps`, `sol` has the steps if all rows are present and the steps are at most 20 000.
+    Raise InputError for an opaque torque, and if the work limit is exceeded.
     """
     # The kernel reads the initial attitude in the first column, and writes a column for each time.
     n_attitudes = 0 if scene.attitude is None else len(times)
@@ -69,16 +68,17 @@ def taylor(
             times[n_rows],
         )
     attitudes = joint[:, 1:] if n_attitudes else None
-    found = trajectory_of(
-        times, rows, n_rows, status, steps, int(work[4]), work[2], work[3], attitudes
-    )
+    ended = ENDS[status]
+    more: dict[str, Any] = {}
     if n_own:
-        found = replace(found, own=own[:n_own, 1 : 1 + len(found.time)].T)
-    if is_tape and found.ended in ("sliding", "sensitive"):
-        found = replace(found, reason=reason_of(found.ended, work[1], int(work[5])))
-    if not 0 < kept <= most or not found.has_all_rows:
-        return found
-    edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T.copy()
-    if times[-1] < 0.0:
-        edges, values = edges[::-1], values[::-1, ::-1]
-    return replace(found, sol=steps_output(scene, Pieces(edges, values)))
+        more["own"] = own[:n_own, 1 : 1 + n_rows].T
+    if is_tape and ended in ("sliding", "sensitive"):
+        more["reason"] = reason_of(ended, work[1], int(work[5]))
+    if 0 < kept <= most and ended in WITH_ALL_ROWS:
+        edges, values = ends[: kept + 1].copy(), at_nodes[:, :, :kept].T.copy()
+        if times[-1] < 0.0:
+            edges, values = edges[::-1], values[::-1, ::-1]
+        more["sol"] = steps_output(scene, Pieces(edges, values))
+    return trajectory_of(
+        times, rows, n_rows, status, steps, int(work[4]), work[2], work[3], attitudes, **more
+    )

@@ -27,11 +27,11 @@ _LEAST_RTOL = 100.0 * np.finfo(float).eps
 # The least allowed error that counts, whose reciprocal is finite.
 _LEAST_SCALE = 2.0**-1000
 # `solve_ivp` misses pairs of roots in a step, and in the first step roots of an event function that
-# is 0 at the start. Therefore the state changes by this part in the first step, and steps grow at
-# most by this factor, as in SciPy's methods.
+# is 0 at the start. Therefore the state changes at most by this fraction in the first step, and
+# steps grow at most by this factor, as in SciPy's methods.
 _FIRST_CHANGE = 0.01
 _MOST_GROWTH = 10.0
-_FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over that which the tolerances allow
+_FIRST_PARTS = 1e-12, 1e-2  # least and largest first step, over the step that the tolerances allow
 
 
 class Taylor(OdeSolver):  # type: ignore[misc]
@@ -58,8 +58,9 @@ class Taylor(OdeSolver):  # type: ignore[misc]
         The longest step. Default is inf. Shorter steps separate two roots of an event, which
         `solve_ivp` misses within one step.
     rtol, atol : float or array_like, shape (n,), optional
-        The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. A component
-        that is 0 is compared with the largest if `atol` is 0. Defaults are 1e-3 and 1e-6.
+        The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. If `atol` is
+        0, the error of a component that is 0 is relative to the largest component. Defaults are
+        1e-3 and 1e-6.
     vectorized : bool, optional
         Ignored.
     first_step : float, optional

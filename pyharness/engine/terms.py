@@ -214,21 +214,22 @@ def attitude_control(
 def wheels(
     momentum: Numbers, motor: TorqueLaw | Numbers | Callable[..., Any] | None = None
 ) -> StateTorque:
-    """Return the torque -omega x h - u on a body by its wheels, which store the momentum h.
+    """Return the torque -omega x h - u of wheels, with the angular momentum h, on their body.
 
     The motors exert u on the wheels: h' = u. Without motors, h is constant, and the body is a
     gyrostat.
 
-    If h is the absolute momentum of the wheels about their axes, the inertia of the body must
-    exclude their moments about these axes; if h is relative to the body, include them.
+    If h is the absolute angular momentum of the wheels about their axes, the inertia of the body
+    must exclude the moments of the wheels about these axes. If h is relative to the body, the
+    inertia must include them.
 
     Parameters
     ----------
     momentum : three numbers
-        The momentum h at time 0, about the body axes (N m s).
+        The angular momentum h at time 0, about the body axes (N m s).
     motor : TorqueLaw, three numbers, or function of (t, omega[, attitude], h), optional
-        The torque u (N m), about the body axes. Under a function, h is an unknown: a scene with
-        this torque gets the states ``wheel1`` to ``wheel3`` (N m s), unless it has them.
+        The torque u (N m), about the body axes. If it is a function, h is an unknown: a scene with
+        this torque gets the states ``wheel1`` to ``wheel3`` (N m s), unless it defines them.
 
     Returns
     -------

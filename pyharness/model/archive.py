@@ -1,4 +1,4 @@
-"""Archives of `numpy.savez` with a digest, for trajectories and ensembles.
+"""Archives in the format of `numpy.savez` with a digest, for trajectories and ensembles.
 
 The array `header` is JSON with the kind of the content and its schema number, and `sha256` is a
 digest of all other arrays. Files are not trusted: nothing is executed or unpickled, and no array is
@@ -48,7 +48,7 @@ def checked_file(where: str, path: object) -> str:
 
 
 def archive_of(arrays: dict[str, Any]) -> bytes:
-    """Return the bytes of an archive of arrays with a digest."""
+    """Return the bytes of an npz archive of the arrays, with their SHA-256 digest as last entry."""
     buffer, digest = io.BytesIO(), hashlib.sha256()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in [*(each for each in arrays if each != DIGEST), DIGEST]:

@@ -8,7 +8,7 @@ from pyharness.model.listing import Listing
 from pyharness.model.scene import Scene
 
 MARK = "*"
-"""The sign on a number that is assumed, in commands and pages; every terminal has it."""
+"""The sign on a number that is assumed, in commands and pages; every terminal can show it."""
 
 ASSUMED = f"{MARK} assumed"
 """The sign with its word."""
@@ -31,7 +31,7 @@ def open_starts() -> dict[int, str]:
 def assumed(scene: Scene, listings: Iterable[Listing] = ()) -> list[dict[str, Any]]:
     """Return the assumptions on which the numbers of a case and its runs of `listings` depend.
 
-    There are none for a scene that is no case, or a value that the user supplies.
+    A scene that is no case, and a value that the user supplies, depend on none.
     """
     among = list(listings)
     return [each for each in assumptions() if _is_made(each, scene, among)]
@@ -69,7 +69,7 @@ def case_mark(case: int) -> str:
 
 
 def assumption_records(runs: Runs) -> list[dict[str, Any]]:
-    """Return for JSON the assumptions on which runs depend, each with its cases."""
+    """Return records for JSON of the assumptions on which runs depend, each with its cases."""
     found: dict[tuple[str, str], dict[str, Any]] = {}
     for scene, listings in runs:
         for each in assumed(scene, listings):
@@ -82,7 +82,7 @@ def assumption_records(runs: Runs) -> list[dict[str, Any]]:
 
 
 def claim_records() -> list[dict[str, Any]]:
-    """Return for JSON the assumptions on which claims alone depend."""
+    """Return records for JSON of the assumptions on which claims alone depend."""
     return [_record(each, each["what"]) for each in assumptions() if each["on"] == "claim"]
 
 

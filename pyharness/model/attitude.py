@@ -176,7 +176,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes, (4,) or (n, 4), of the axes that `turn` rotates to the principal axes."""
+    """Return attitudes, (4,) or (n, 4), of principal axes as those of the axes before `turn`."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

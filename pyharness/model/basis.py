@@ -14,8 +14,8 @@ MARKS = {
 class Basis:
     """The basis of a limit.
 
-    `mark` is a key of `MARKS`, that of the weakest part. `limit` states the limit, and `source` the
-    theorem, derivation or command, in Markdown.
+    `mark`, a key of `MARKS`, is the mark of the weakest part. `limit` states the limit, and
+    `source` names the theorem, derivation or command, in Markdown.
     """
 
     mark: str

@@ -74,7 +74,7 @@ def build() -> Build:
 
 
 def installation() -> dict[str, Any]:
-    """Return the installation, the machine and versions for a bug report, with None for unknown.
+    """Return data on the installation and the machine for a bug report; None means unknown.
 
     "arithmetic" names the option or library that changes the kernels' arithmetic, or is ``as
     written``. "environment" has the variables of `INFLUENCES` that are set.

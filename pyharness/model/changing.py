@@ -28,7 +28,7 @@ class Changing:
 
         @property
         def place(self) -> str:
-            """The key of a scene file."""
+            """The key in a scene file: "moments" or "inertia"."""
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
@@ -112,20 +112,20 @@ class ChangingMoments(Changing):
 
     Mass moves relative to the body, as with booms or propellant, but the principal axes are fixed
     in the body. With the moments I and the torque N, I omega' = N - I' omega - omega x (I omega).
-    This assumes that mass that moves has no angular momentum relative to the body axes, and mass
-    that leaves has none about the centre of mass.
+    Mass that moves is assumed to have no angular momentum relative to the body axes, and mass that
+    leaves, no angular momentum about the centre of mass.
 
     Parameters
     ----------
     polynomials : three lists of numbers
-        For each moment at most ten coefficients in ascending powers of time (s): kg m2, kg m2/s,
+        For each moment at most ten coefficients in ascending powers of time (s), in kg m2, kg m2/s,
         and so on.
 
     Raises
     ------
     InputError
-        If these are not three lists of finite numbers, if a moment is not above 0 at time 0, or if
-        the numbers are the rows of a symmetric matrix.
+        If `polynomials` are not three lists of finite numbers, a moment is not above 0 at time 0,
+        or the lists are the rows of a symmetric matrix.
 
     Examples
     --------
@@ -173,7 +173,7 @@ class ChangingMoments(Changing):
 
     @property
     def elements(self) -> Sequence[Sequence[Polynomial]]:
-        """The polynomials of the inertia matrix; zero elements have empty ones."""
+        """The polynomials of the inertia matrix; those of zero elements are empty."""
         first, second, third = self.polynomials
         return (first, (), ()), ((), second, ()), ((), (), third)
 
@@ -182,13 +182,14 @@ class ChangingMoments(Changing):
 class ChangingInertia(Changing):
     """An inertia matrix about the body axes that is a polynomial of time.
 
-    Its principal axes may rotate in the body. Assumptions and equations are those of
+    The principal axes may rotate in the body. The assumptions and equations are those of
     `ChangingMoments`.
 
     Parameters
     ----------
     matrices : one to ten matrices, each of three rows of three numbers
-        The symmetric coefficients in ascending powers of time (s): kg m2, kg m2/s, and so on.
+        The symmetric coefficient matrices in ascending powers of time (s), in kg m2, kg m2/s, and
+        so on.
 
     Raises
     ------
@@ -273,7 +274,8 @@ def rates_of_changing(changing: Changing, time: Any, omega: Any, torque: Any) ->
     matrix, rate, (x, y, z) = changing.matrix(time), changing.matrix_rate(time), omega
     if changing.is_diagonal:
         a, b, c = (matrix[k][k] for k in range(3))
-        # Differences of nearly equal moments have no rounding errors; those of products would.
+        # Differences of nearly equal moments have no rounding errors; differences of products
+        # would.
         products = (b - c) * (y * z), (c - a) * (z * x), (a - b) * (x * y)
         return [
             (torque[k] - rate[k][k] * omega[k] + products[k]) / moment

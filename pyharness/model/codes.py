@@ -44,8 +44,8 @@ class Places:
     N_SINES = 3
     N_COSINES = 4
     COEFFICIENTS = 5  # three: A, B, C
-    CONSTANT = 8  # three, 1/s2: constant term of torque over moment
-    RATE = 11  # three, 1/s3: its factor of time
+    CONSTANT = 8  # three, rad/s2: constant term of torque over moment
+    RATE = 11  # three, rad/s3: factor of time of torque over moment
     EFFORT = 14  # factor on the work limits
     COEFFICIENTS_LOW = 15  # three: exact minus rounded A, B, C, for the closed form
     MOMENTS = 18  # three, kg m2: for the closed form with attitude
@@ -61,13 +61,13 @@ class Series:
     MOST_ORDER = 24
     LEAST_LOCAL_TOLERANCE = 1e-19  # relative to omega: size of the last Taylor terms of a step
     SLACK = 16.0  # a step is shortened if its last Taylor terms exceed this many local tolerances
-    # Radians of the fastest perturbation. In a longer motion, inaccurate perturbations lose their
-    # phase, and their computed growth, the error amplification, is too small.
+    # Phase (rad) of the fastest perturbation. In a longer motion, inaccurate perturbations lose
+    # their phase, and their computed growth, the error amplification, is too small.
     LONG = 5000.0
 
 
 class Waves:
-    """The limit of angles (rad) of our sine in binary128, as a power of 2."""
+    """The limit of the angle (rad) of our sine in binary128, as a power of 2."""
 
     ANGLE_BITS = 60  # the angle must be below 2**ANGLE_BITS rad; otherwise its sine is NaN
 
@@ -96,7 +96,7 @@ class Operations:
     EXP = 5  # slots: the exponential, and the weighted terms of its argument
     SINE_COSINE = 6  # slots: the sine, the cosine, and the weighted terms of their argument
     TABLE = 7  # cubic polynomials of time between breakpoints
-    TANH = 8  # slots: the tangent, its derivative, and the weighted terms of the argument
+    TANH = 8  # slots: the function, its derivative, and the weighted terms of its argument
     # The second operand is the derivative. Slots: the function, the weighted terms of the argument.
     LOG = 9
     ATAN = 10

@@ -168,7 +168,7 @@ class Conversions:
             if torque.in_space:
                 omega = turned_to_space(self._attitudes(), omega)
         else:
-            # A torque that ignores the attitude gets any.
+            # A torque that ignores the attitude gets an arbitrary one.
             needed = torque.needs_attitude
             attitudes = self._attitudes() if needed else np.eye(4)[[0] * len(self.time)]
             own = np.zeros((len(self.time), 0)) if self.own is None else self.own
@@ -182,9 +182,9 @@ class Conversions:
         """Return the work of the torque on the body from time 0 to each row.
 
         It is the change of the kinetic energy, computed as (omega - omega0) . I (omega + omega0)/2,
-        which loses no digits where omega has changed little. Its error is the error of omega times
-        the angular momentum. The work that the motors of `pyharness.torques.wheels` do on the
-        wheels is not included.
+        which loses no digits where omega has changed little. The error of the work is the error of
+        omega times the angular momentum. The work that the motors of `pyharness.torques.wheels` do
+        on the wheels is not included.
 
         Returns
         -------
@@ -334,7 +334,7 @@ class Conversions:
         -------
         matplotlib.axes.Axes
             The diagram, with legend and units. Its lines connect the rows; with dense output they
-            are smooth, from `sol.t_min` to `sol.t_max`.
+            are smooth curves from `sol.t_min` to `sol.t_max`.
 
         Raises
         ------
@@ -363,7 +363,7 @@ class Conversions:
         return ax
 
     def animate(self, path: str | os.PathLike[str]) -> None:
-        """Write an animation of a brick that has the body's moments, and moves as the body.
+        """Write an animation of a brick that has the moments of the body and moves like it.
 
         The frames are 0.05 s apart. A motion shorter than 2 s is stretched to 2 s, and one longer
         than 10 s compressed to 10 s. Without dense output, each frame shows the nearest row.

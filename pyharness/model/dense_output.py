@@ -87,8 +87,8 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    They are the largest component of omega for all its components, 1 for the quaternion, and the
-    own value for each own state; 1 in place of 0. Shapes are (..., m).
+    The size of each component of omega is the largest of the three values, that of the quaternion
+    is 1, and that of an own state is its value; 1 replaces 0. Shapes are (..., m).
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -106,8 +106,9 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        Functions that return the states (omega, rad/s, the attitude if requested, and the scene's
-        own states) and their derivatives, in rows.
+        A function of times (s) that returns the states in rows (omega in rad/s, the attitude if
+        requested, and the scene's own states); and a function of times and states that returns the
+        derivatives of the states.
     n_own : int
         The number of own states.
 
@@ -154,8 +155,8 @@ class DenseOutput:
         Parameters
         ----------
         t : float or array_like, shape (n,)
-            Times as for the state. Where a table of the torque changes, the derivative just after
-            the change is returned.
+            Times (s), as in a call of the object. Where a table of the torque changes, the
+            derivative just after the change is returned.
 
         Returns
         -------

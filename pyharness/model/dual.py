@@ -9,8 +9,8 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
-# Factors on the limit of operations of a recorded torque: for a tape that no kernel reads, and for
-# one that a kernel reads, with memory in proportion.
+# Factors on the largest number of operations of a recorded torque: for a tape that no kernel reads,
+# and for a tape that a kernel reads, whose memory is proportional to it.
 _MORE, _FEWER = 100, 10
 
 
@@ -72,7 +72,7 @@ def dual(value: Any, count: int) -> Dual:
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape with its outputs, then the derivatives of each by the inputs in `slots`."""
+    """Return a tape of the outputs, then the derivatives of each by the inputs in `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])

@@ -31,13 +31,13 @@ class Ensemble(BatchResult):
         apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
         `sensitive` (amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
-        Unit quaternions from body to space, scalar first. This and the following fields are None if
-        not requested.
+        Unit quaternions from body to space, scalar first. This field and the following ones are
+        None if they were not requested.
     estimates : ndarray, shape (n, 2), or None
-        The columns `error` and `growth`.
+        The estimated errors and the error amplifications, as columns.
     t_events, y_events : list of list of ndarray, or None
-        Times (s) and states of events, indexed by function, then by body: for k events shape (k,),
-        and (k, 3) or (k, 7); None for a body without a result.
+        Times (s) and states of events, indexed by function, then by body. For k events, the shapes
+        are (k,), and (k, 3) or (k, 7); None for a body without a result.
     sensitivities : dict of ndarray, or None
         By name, the derivatives of the final states with respect to a parameter with m values,
         shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
@@ -46,8 +46,8 @@ class Ensemble(BatchResult):
     own, names : ndarray, shape (n, k), or None, and tuple of str
         The values and names of the scene's own states, which `states` has by name.
     times : ndarray, shape (m,), or None
-        The times (s) of the rows of all bodies. All arrays then have an axis of length m after the
-        first, such as `omega` the shape (n, m, 3).
+        The times (s) of the results of all bodies. All arrays then have an axis of length m after
+        the first axis: for example, `omega` has the shape (n, m, 3).
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Ensemble(BatchResult):
     def angular_momentum(
         self, frame: str = "body", *, moments: Any = None, inertia: Any = None
     ) -> Array:
-        """Return the angular momentum of each body; give it the bodies of `solve_many`.
+        """Return the angular momentum of each body, whose moments or inertia must be given.
 
         Parameters
         ----------
@@ -111,8 +111,8 @@ class Ensemble(BatchResult):
         Raises
         ------
         InputError
-            Unless one of `moments` and `inertia` is given, with one row or n; if the frame is
-            unknown, or "space" is requested without attitudes.
+            If not exactly one of `moments` and `inertia` is given, or it has not one row or n rows;
+            if the frame is unknown, or "space" is requested without attitudes.
         """
         if frame not in FRAMES:
             raise unknown("frame", str(frame), FRAMES)
@@ -143,7 +143,7 @@ class Ensemble(BatchResult):
         return energy
 
     def with_times(self, times: Array) -> "Ensemble":
-        """Return the result for n m bodies as one for n bodies and m times, without copies."""
+        """Return the result for n * m bodies as one for n bodies and m times, without copies."""
 
         def divided(array: Any) -> Any:
             return None if array is None else array.reshape(-1, len(times), *array.shape[1:])
@@ -200,8 +200,8 @@ class Ensemble(BatchResult):
         -------
         xarray.Dataset
             Its variables are `omega` (dimensions `body`, `time` if there are `times`, and `axis`),
-            `ended`, and, if present, `attitude` (`component` in place of `axis`), `error`,
-            `growth` and own states.
+            `ended`, and, if present, `attitude` (with the dimension `component` in place of
+            `axis`), `error`, `growth` and own states.
 
         Raises
         ------
@@ -325,7 +325,10 @@ _NO_ESTIMATES = np.empty((2, 0), order="F")
 def place_for(
     out: "Ensemble | Array | None", n: int, with_attitude: bool, with_estimates: bool = False
 ) -> Ensemble:
-    """Return `out`, or a new Ensemble, for n bodies; raise InputError for a wrong array."""
+    """Return an Ensemble for n bodies: `out`, one around the array `out`, or a new one.
+
+    Raise InputError if `out` does not fit.
+    """
     shape = (n, 3)
     if out is None or isinstance(out, np.ndarray):
         omega = np.empty(shape) if out is None else buffer_of("out", out, shape, "d")

@@ -23,7 +23,8 @@ _WRITTEN = "a file that Ensemble.save wrote"
 # The length of a row, by attribute.
 _WIDTHS = {"omega": 3, "attitude": 4, "estimates": 2}
 _ARRAYS = (*_WIDTHS, "own", "status", "times")
-# Counts of events, (functions, bodies), -1 without a result; times and states of all events.
+# Counts of events, shape (functions, bodies), -1 for a body without a result; times and states of
+# all events, one after the other.
 _EVENTS = ("event_counts", "t_events", "y_events")
 _SENSITIVITY = "sensitivity_"
 

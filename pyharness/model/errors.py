@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-_LONGEST = 900  # most characters of a message; one that quotes long input is shortened
+_LONGEST = 900  # most characters of a message; a longer one, which quotes input, is shortened
 
 
 class InputError(ValueError):
@@ -103,7 +103,7 @@ def kind_of(value: object) -> str:
 
 
 def known(what: str, name: object, allowed: Iterable[str]) -> str:
-    """Return the allowed name that `name` is, in upper or lower case; raise InputError if none."""
+    """Return the allowed name that equals `name` in lower case; raise InputError if none does."""
     names = list(allowed)
     found = name.lower() if isinstance(name, str) else ""
     if found not in names:

@@ -20,7 +20,7 @@ def _product(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Frac
 
 
 def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
-    """Return the determinant of a symmetric matrix of polynomials."""
+    """Return the coefficients of the determinant of a symmetric matrix of polynomials."""
     (a, f, e), (_, b, d), (_, _, c) = ([[Fraction(x) for x in p] for p in row] for row in elements)
     terms = ((1, (a, b, c)), (2, (d, e, f)), (-1, (a, d, d)), (-1, (b, e, e)), (-1, (c, f, f)))
     products = [[sign * each for each in _product(_product(x, y), z)] for sign, (x, y, z) in terms]

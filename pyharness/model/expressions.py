@@ -61,7 +61,7 @@ def parsed(
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
     Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and own
-    states, whose `rates` are expressions too. Values are in N m, or in 1/s2 for a body with
+    states, whose `rates` are expressions too. Values are in N m, or in rad/s2 for a body with
     coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)
@@ -85,13 +85,13 @@ def parsed(
 def components(
     texts: Mapping[str, str], inputs: Sequence[Any], constants: Mapping[str, Any]
 ) -> list[Any]:
-    """Return the values of checked expressions, `texts` by place, for eight symbols."""
+    """Return the values of checked expressions, `texts` by place, for the eight input symbols."""
     names = {**dict(zip(INPUTS, inputs, strict=True)), "pi": math.pi, **constants}
     return [_component(text, names, place) for place, text in texts.items()]
 
 
 def text_components(values: Mapping[str, object], inputs: Sequence[Any]) -> list[Any]:
-    """Return numbers, and the values of expressions, by place, for eight symbols."""
+    """Return numbers, and the values of expressions for symbols of the eight inputs."""
     found = []
     for place, value in values.items():
         if isinstance(value, str):

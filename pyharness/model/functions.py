@@ -1,6 +1,6 @@
 """Elementary functions of floats, by the C library, and of the numbers of `pyharness.thesis.word`.
 
-The latter have other formats than binary64, and methods that round correctly.
+These numbers have other formats than binary64, and their methods round correctly.
 """
 
 import math

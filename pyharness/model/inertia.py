@@ -22,7 +22,8 @@ Exact = tuple[Fraction, Fraction, Fraction]
 
 SYMMETRIC = 1e-12  # allowed asymmetry of elements, over the largest element
 _KEPT = 256  # number of cached principal frames
-# Least number of bits of an eigenvalue that is not 0; more than the 106 of double-double.
+# Least number of bits of an eigenvalue that is not 0; more than the 106 bits of double-double
+# numbers.
 _BITS = 128
 _PAIRS = ((0, 1), (0, 2), (1, 2))
 _NOISE = 8  # an off-diagonal element below 2**_NOISE units of its last bit is rounding error
@@ -31,7 +32,7 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments (kg m2) and axes of one body, rounded, and to at least 30 digits.
+    """The principal moments (kg m2) and axes of a body, rounded, and with at least 30 digits.
 
     The columns of `axes` form a right-handed frame, each near the body's own axis of the same
     number. `moments_low` is the exact minus the rounded moments.

@@ -20,7 +20,7 @@ from pyharness.model.values import three
 
 COUNTS = {"moments": 3, "inertia": 9}
 _RETURNS = {"moments": "three moments", "inertia": "three rows of three numbers"}
-_CHECKED = 1000  # number of times to the end at which moments must be above 0
+_CHECKED = 1000  # number of times up to the end at which moments must be above 0
 _TRIED = (0.0, 0.37, 1.9, 11.3, -0.7)  # times (s) at which a matrix must be symmetric
 _CONTINUOUS = 1e-9  # largest relative jump of an element that counts as rounding
 
@@ -216,7 +216,8 @@ def _check_continuous(tape: Tape, where: str) -> None:
             raise jumps
         elif kind == "select":
             condition, first, second = operands
-            # It is continuous if the difference of the values is 0 where the condition changes.
+            # The choice is continuous if the difference of its two values is 0 where the condition
+            # changes.
             one, other = expanded(first), expanded(second)
             difference = {x: one.get(x, 0.0) - other.get(x, 0.0) for x in {*one, *other}}
             if condition not in switches or not _are_proportional(

@@ -1,8 +1,8 @@
 """Listings: programs of the thesis with a choice of their defects, readings and conjectures.
 
 A card is one line of a program. A defect is a mistake of the printed program, active if not
-corrected. A reading is an interpretation of a doubtful card other than ours. A conjecture is an
-assumption about a statement for which no card exists.
+corrected. A reading is an interpretation of a doubtful card that differs from ours. A conjecture is
+an assumption about a statement for which no card exists.
 """
 
 from collections.abc import Iterable, Set
@@ -32,8 +32,8 @@ class Listing:
         The active readings: interpretations of doubtful statements, other than the one that we
         adopt. None changes a corrected program.
     conjectures : frozenset of str
-        The active assumptions about missing statements. `defects` accepts these names, and those of
-        readings, too.
+        The active assumptions about missing statements. The argument `defects` also accepts the
+        names of conjectures and readings.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Listing:
 
     @property
     def label(self) -> str:
-        """The kind: `corrected` (none active), `original` (`switches` active), or `custom`."""
+        """The kind: `corrected` (nothing active), `original` (`switches` active), or `custom`."""
         if not self.active:
             return "corrected"
         is_original = self.active - self.readings == set(switches(self.program))
@@ -164,13 +164,13 @@ def subset(
         The listing to start from. The default is `corrected` if only `keep` has names, else
         `original`.
     fix, keep : iterable of str
-        Names to correct, and names to keep active.
+        Names of defects, readings and conjectures to correct, and to keep active.
     readings : iterable of str
-        The readings to activate. In a corrected base only `keep` activates one, because a corrected
-        statement is the same under every reading.
+        The readings to activate. In a corrected base only `keep` activates a reading, because a
+        corrected statement is the same under every reading.
     conjectures : iterable of str, optional
-        The assumptions to make, or ``none``; by default those of `Listing.original`. In a corrected
-        base only `keep` activates one.
+        The conjectures to activate, or ``none``; by default those of `Listing.original`. In a
+        corrected base only `keep` activates a conjecture.
 
     Returns
     -------

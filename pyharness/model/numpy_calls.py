@@ -1,8 +1,8 @@
 """NumPy's functions for arrays of symbols, while a user's function is recorded.
 
-NumPy can't overload choices, comparisons and linear algebra of objects, nor the result of
-numpy.zeros. During recording these functions are therefore replaced in the modules numpy,
-numpy.linalg and math. Calls from other threads, and without symbols, reach the originals.
+Symbols can't overload NumPy's choices, comparisons and linear algebra, nor can they be assigned to
+the result of numpy.zeros. During recording these functions are therefore replaced in the modules
+numpy, numpy.linalg and math. Calls from other threads, and without symbols, reach the originals.
 """
 
 import math
@@ -30,7 +30,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace NumPy's functions in this thread, and `with_targets` those that make new arrays."""
+    """Replace NumPy's functions in this thread; `with_targets`, also those that make arrays."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -144,7 +144,7 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return a function for each element of arrays of objects; a scalar result is no array."""
+    """Return a function that acts on the elements of arrays; of scalars, it is no array."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:

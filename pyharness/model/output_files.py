@@ -88,7 +88,7 @@ class DeferredInterrupt:
         """Install a handler that only records an interrupt."""
         self._came = False
         self._before = signal.getsignal(signal.SIGINT)
-        # Python raises KeyboardInterrupt in the main thread alone.
+        # Python raises KeyboardInterrupt only in the main thread.
         self._holds = callable(self._before) and current_thread() is main_thread()
         if self._holds:
             signal.signal(signal.SIGINT, self._note)

@@ -52,17 +52,17 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Parameters
     ----------
     scene : Scene
-        The scene, with a full inertia matrix. Any other is returned unchanged, with the identity
-        matrix.
+        A scene with a full inertia matrix. Any other scene is returned unchanged, with the identity
+        matrix as axes.
 
     Returns
     -------
     scene : Scene
-        The same problem with `moments`, and with the attitude of the principal axes. A torque about
-        the axes of space is unchanged, and the result then has an attitude.
+        The same problem with `moments`; an attitude is that of the principal axes. A torque about
+        the axes of space is unchanged, and the result then always has an attitude.
     axes : ndarray, shape (3, 3)
         The principal axes, in columns of components about the body's own axes. They form a
-        right-handed frame; each is near the body's own axis of the same number.
+        right-handed frame; each axis is near the body's own axis of the same number.
 
     Raises
     ------

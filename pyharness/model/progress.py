@@ -59,7 +59,7 @@ def count_done(n: int) -> None:
 
 @contextmanager
 def progress_of(choice: bool | Progress, what: str) -> Iterator[Progress]:
-    """Provide a function that reports progress: the user's, or for True one that shows a bar."""
+    """Provide a function that reports progress: `choice`, or for True one that shows a bar."""
     if callable(choice):
         yield choice
     elif not boolean("progress", choice):

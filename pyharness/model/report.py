@@ -1,6 +1,7 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-Each start of the program creates the types; dataclasses would take five times as long as tuples.
+Every start of the program creates these types; as dataclasses, they would take five times as long
+to create as named tuples.
 """
 
 import math
@@ -72,7 +73,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: head and format of rounded numbers, and for CSV of all digits."""
+    """A column of a table: its head and format for rounded numbers, and those for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain

@@ -100,18 +100,20 @@ class Scene:
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, ChangingMoments, or function of t, optional
         The principal moments of inertia (kg m2). A function of the time (s) is recorded, and must
-        not jump; `inertia_table` makes one from rows. The attribute is None if they change;
-        `changing` then has them.
+        not jump; `inertia_table` makes one from a table. If the moments change, the attribute
+        `moments` is None, and `changing` has them.
     coefficients : three numbers, optional
         The dimensionless coefficients A, B, C of Euler's equations (13-15 of the thesis).
     torque : TorqueLaw, three numbers, StateTorque, or function of (t, omega[, attitude])
-        The torque; zero by default, and constant for three numbers. `pyharness.torques` makes a
-        StateTorque. A function returns the components about the body axes; its arithmetic is
-        recorded in calls with symbols. Pass one that can't be recorded as ``opaque(function)``.
+        The torque; zero by default, and constant for three numbers. The functions of
+        `pyharness.torques` return a StateTorque. A function returns the components about the body
+        axes; its arithmetic is recorded in calls with symbols. Pass a function that can't be
+        recorded as ``opaque(function)``.
     attitude : four numbers or scipy.spatial.transform.Rotation, optional
         The quaternion from body to space at time 0, scalar first. It is normalised.
     inertia : three rows of three numbers, ChangingInertia, or function of t, optional
-        A symmetric inertia matrix about the body axes (kg m2); None if the inertia changes.
+        A symmetric inertia matrix about the body axes (kg m2). If it changes, the attribute is
+        None, and `changing` has it.
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
         An inertia that changes with time.
     states : dict of str to float, or to pair of floats, optional
@@ -120,12 +122,13 @@ class Scene:
         returns the torque and a dict of the states' rates. Errors of a state are relative to its
         largest absolute value so far, or to the second number of a pair if that is larger.
     step_size : float
-        The step size (s) of methods with a fixed step, and of the programs of 1982, to which also
-        the other arguments below belong.
+        The step size (s) of methods with a fixed step, and of the programs of 1982. The following
+        arguments are for these programs.
     steps : int
         The number of steps.
     masses, forces : three numbers
-        The masses (kg) and forces (N) in the velocity equations, by default as printed.
+        The masses (kg) and forces (N) in the equations of the translational velocity; by default as
+        printed in the thesis.
     case : int, optional
         The number of the case in Table 1 of the thesis.
 
@@ -312,14 +315,15 @@ class Scene:
 
     @property
     def moments_low(self) -> Triple:
-        """The exact moments minus `moments` (kg m2)."""
+        """The exact moments minus `moments` (kg m2): 0 except in a `PrincipalScene`."""
         return 0.0, 0.0, 0.0
 
     @property
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest then exceeds the sum of the others by more than 2**-50 of itself (rounding).
+        The largest moment then exceeds the sum of the others by more than rounding may: 2**-50 of
+        itself.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -355,7 +359,7 @@ class Scene:
         return [n * self.step_size for n in range(1, self.steps + 1)]
 
     def normalized_torque(self, time: float) -> Triple:
-        """Return M = N / I, the torque over the moments (1/s2), at `time` (s)."""
+        """Return M = N / I, the torque over the moments (rad/s2), at `time` (s)."""
         first, second, third = self.body_torque.at(time)
         if self.moments is None:
             return first, second, third
@@ -420,7 +424,7 @@ def checked_scene(
     changing: bool = False,
     states: bool = False,
 ) -> Scene:
-    """Return the argument `scene`; raise InputError unless it is a Scene of an accepted kind."""
+    """Return `scene`; raise InputError unless it is a Scene of a kind that the flags allow."""
     if isinstance(scene, Scene):
         if scene.states and not states:
             raise InputError(OWN_STATES)

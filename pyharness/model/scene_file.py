@@ -97,8 +97,8 @@ def toml_of(content: bytes, where: str) -> dict[str, Any]:
 def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
-    Masses, forces and case are not written. Raise InputError for an opaque torque or one recorded
-    from Python, and above 50 ready terms or 1 000 000 bytes.
+    Masses, forces and case are not written. Raise InputError for an opaque torque, a torque
+    recorded from Python, more than 50 ready terms, or more than 1 000 000 bytes.
     """
     import json
 
@@ -163,7 +163,7 @@ def _torque_lines(scene: Scene) -> list[str]:
 
 
 def _term_lines(term: tuple[tuple[str, Any], ...], changing: Changing | None) -> list[str]:
-    """Return the lines of a ready term; an inertia in it may change only if it is the body's."""
+    """Return the lines of a ready term; only the inertia of the body itself may change in it."""
     if any(isinstance(value, Changing) and value != changing for _, value in term):
         raise InputError(
             f"[torque]: a term {term[0][1]} whose inertia changes otherwise than that of the body "

@@ -32,8 +32,8 @@ _WITH_STATES = (
 class StateTorque:
     """A torque about the body axes that depends on time, omega and attitude.
 
-    The unit is N m for a body with moments or inertia, 1/s2 for one with coefficients. A scene
-    creates it if its torque is a function.
+    The unit is N m for a body with moments or inertia, rad/s2 for one with coefficients. A scene
+    creates a StateTorque if its torque is a function.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class StateTorque:
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
-        The three expressions of a scene file, if recorded from them, and pairs of name and value of
-        their constants.
+        The three expressions of a scene file, if the torque was recorded from them, and pairs of
+        name and value of their constants.
     terms : tuple
         The other summands in a scene file: at most one `TorqueLaw`, and ready terms (torques of
         `pyharness.torques`) as pairs of keys and values.
@@ -185,13 +185,13 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
         A function of (t, omega) or (t, omega, attitude) that returns the torque about the body axes
         (N m). Keyword arguments with numbers as defaults are parameters for sensitivities.
     states : sequence of str
-        The names of the scene's own states. With some, they are one more argument, a dict, and the
-        function returns the torque and a dict of their rates.
+        The names of the scene's own states. If there are any, the function has one more argument,
+        the dict of their values, and returns the torque and a dict of their rates.
 
     Returns
     -------
     StateTorque
-        The torque, which can be added to others.
+        The torque, which can be added to other torques.
 
     Raises
     ------
@@ -282,13 +282,13 @@ def count_arguments(function: Function, where: str, allowed: str) -> int:
 def opaque(function: Any) -> StateTorque:
     """Return a torque that is evaluated by calling a Python function.
 
-    Only SciPy's methods support it.
+    Only SciPy's methods can solve a scene with such a torque.
 
     Parameters
     ----------
     function : callable
-        A function of (t, omega) or (t, omega, attitude), a float and arrays, that returns the
-        torque about the body axes (N m).
+        A function of (t, omega) or (t, omega, attitude), where t is a float and the others are
+        arrays, that returns the torque about the body axes (N m).
 
     Returns
     -------

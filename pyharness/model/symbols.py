@@ -1,8 +1,8 @@
 """Symbols: arguments with which a function is called so that its arithmetic is recorded on a tape.
 
 A symbol is a linear combination of slots (places of inputs and results) of a tape. Sums, and
-products with numbers, only change its coefficients. Any other operation has a slot for its result,
-only one even if repeated.
+products with numbers, only change its coefficients. Any other operation has a slot for its result;
+a repeated operation has the same slot.
 """
 
 import math
@@ -131,7 +131,7 @@ class Recorder:
 def _of_symbols(
     operator: Callable[["Symbol", "Symbol"], Any],
 ) -> Callable[["Symbol", Any], "Symbol"]:
-    """Return an operator of a symbol and any real number; NotImplemented for no number."""
+    """Return an operator of a symbol and any real number; NotImplemented for other values."""
 
     @wraps(operator)
     def called(self: "Symbol", value: Any) -> "Symbol":
@@ -149,7 +149,7 @@ def _is_moderate(factor: float) -> bool:
 def _function(
     kind: str, derivative: "Callable[[Symbol], Symbol] | None" = None
 ) -> Callable[["Symbol"], "Symbol"]:
-    """Return a function of a symbol; the kernel needs the `derivative` of some."""
+    """Return a function of a symbol; the kernel needs the `derivative` of some functions."""
 
     def called(self: "Symbol") -> "Symbol":
         if not self._terms:
@@ -464,7 +464,7 @@ def negated(condition: Any) -> Any:
 
 
 def select(condition: Any, first: Any, second: Any) -> Any:
-    """Return `first` where the condition holds, else `second`; numbers or symbols."""
+    """Return `first` if the condition holds, else `second`; each may be a number or a symbol."""
     if not isinstance(condition, Symbol):
         return first if condition else second
     if not isinstance(condition, Condition):

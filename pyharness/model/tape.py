@@ -41,8 +41,8 @@ class Table:
     """A function of time that consists of cubic polynomials.
 
     Row k of `pieces`, shape (n, 4), has c0 to c3 of c0 + c1 s + c2 s^2 + c3 s^3, where s is the
-    time (s) minus breaks[k]. It applies from this break to the next; the first piece also before,
-    the last also after all breaks.
+    time (s) minus breaks[k]. Row k applies from breaks[k] to the next break; row 0 also applies
+    before breaks[0], and the last row to all later times.
     """
 
     def __init__(self, breaks: Any, pieces: Any) -> None:
@@ -67,8 +67,8 @@ class Operation(NamedTuple):
     """An operation of a tape: "linear", "table", or another kind on one to three slots.
 
     "log", "atan" and "asin" have the slot of their derivative as second operand. "switch" is 1
-    where its operand is positive, else 0; "select" is its second operand where its first, 0 or 1,
-    is 1, else its third.
+    where its operand is positive, else 0. "select" is its second operand where its first operand is
+    1, and its third where that is 0.
     """
 
     kind: str
@@ -203,7 +203,7 @@ def live_slots(
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
     called for each slot, `is_true` for a computed condition. Derivatives of `WITH_DERIVATIVE` are
-    computed `for_series` alone.
+    computed only if `for_series`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]

@@ -25,7 +25,7 @@ class TorqueLaw:
 
     N(t) = constant + rate t + sum of amplitude sin(frequency t) + sum of amplitude cos(frequency t)
 
-    in N m for a body with moments or inertia, in 1/s2 (torque over moment) for one with
+    in N m for a body with moments or inertia, in rad/s2 (torque over moment) for one with
     coefficients. The fields are tuples of floats.
 
     Parameters

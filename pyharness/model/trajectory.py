@@ -99,8 +99,8 @@ class Trajectory(Conversions):
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        Numbers of steps (SciPy's methods and the reference: of rows), and of evaluations of the
-        right-hand side.
+        The number of steps (for SciPy's methods and the reference, the number of rows), and the
+        number of evaluations of the right-hand side.
     ended : str
         How the integration ended. Endings with all rows are "complete"; "sensitive" if the
         amplified rounding error exceeds the tolerance; and "unchecked" if the series that bounds
@@ -119,31 +119,34 @@ class Trajectory(Conversions):
         The error amplification: the largest norm of the state-transition matrix of omega from any
         time to the end.
     reason : str or None
-        Why a recorded torque ended the integration or made it sensitive: the time and operation.
+        Why a recorded torque ended the integration or made it sensitive, with the time and the
+        operation.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
         The scene's own states, in the order of its `states`.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
-        Principal moments, kg m2, or an inertia that changes; None for coefficients.
+        Principal moments (kg m2), or an inertia that changes; None for a body given by
+        coefficients.
     axes : ndarray, shape (3, 3), or None
-        The principal axes in columns; None if they are the body's own.
+        The principal axes in columns; None if they are the body axes.
     exact : ndarray of object, shape (n, 8), or None
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
         the other attributes have the nearest floats.
     tolerance : float or None
         The tolerance of a method without a fixed step.
     scene : Scene or None
-        The scene, if `solve` solved it.
+        The scene, if `solve` returned the trajectory.
     sol : DenseOutput or None
         The solution as a function of time. It is not saved.
     t_events : list of ndarray, or None
         The times (s) of the events of each function, in order.
     y_events : list of ndarray, or None
-        The states (columns of `y`) at these times, shape (k, m) for k events.
+        The states at these times, shape (k, m) for k events; each row is ordered as a column of
+        `y`.
     sensitivities : dict of ndarray, or None
         By name of a parameter with m values, the derivatives of omega (rad/s), shape (n, 3, m), or
-        with the quaternion (n, 7, m).
+        of omega and the quaternion, shape (n, 7, m).
 
     Examples
     --------

@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
-The archive has an array for each attribute, the text `scene` of a scene file, and `header` with all
-else in JSON, such as a tape. There a linear combination is a list of its constant and pairs of slot
-and coefficient. An operation is a list of its kind, and its operands, linear combination, or breaks
-and pieces.
+The archive has an array for each attribute, the text `scene` of a scene file, and `header` with
+everything else in JSON, such as a tape (recorded torque). There a linear combination is a list of
+its constant and pairs of slot and coefficient. An operation is a list of its kind, and its
+operands, linear combination, or breaks and pieces.
 """
 
 import json

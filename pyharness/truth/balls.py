@@ -29,7 +29,7 @@ def fraction(x: Any) -> Fraction:
 
 
 def balls(row: Sequence[Any]) -> Balls:
-    """Return the exact middles of a row, with the largest of its radii."""
+    """Return the exact middles of a row of balls, with the largest of their radii."""
     return Balls(tuple(map(fraction, row)), max(fraction(x.rad()) for x in row))
 
 

@@ -26,7 +26,7 @@ PROVED, ESTIMATED = "proved", "estimated"
 _INTEGER_WORK, _BALL_WORK = 0.01, 0.0075
 _MOST_TIMES = 30  # for the prover in ball arithmetic, which needs a step for each time
 _SPARE_DIGITS = 2  # by which a ball is smaller than the estimated error
-_DIGITS, _MOST_DIGITS = 20, 60  # without an estimate; the largest number with a proof
+_DIGITS, _MOST_DIGITS = 20, 60  # decimal digits of a proof: without an estimate; at most
 _ROUNDED_UP = 1.0 + 2.0**-49  # exceeds the rounding errors of a few operations
 
 Row = Sequence[float | Fraction]
@@ -93,7 +93,7 @@ def bound_of(
 ) -> ErrorBound:
     """Return the error bound of the reference `known` of a scene.
 
-    If `before_rounding`, it is for omega plus `remainder`, the part that rounding removed.
+    If `before_rounding`, the bound is for omega plus `remainder`, the part that rounding removed.
     """
     exact = before_rounding and known.remainder is not None
     largest = float(np.abs(known.omega).max(initial=0.0))
@@ -128,9 +128,9 @@ def error_bound(
     `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, which remain where nothing is
     proved.
 
-    Without a library, omega is proved if the scene can have a certificate. With python-flint, the
-    attitude is proved in torque-free motion, and with `any_torque` both under any recorded torque.
-    The limit of a proof is about half a second times `effort`.
+    Without python-flint, omega is proved if the scene can have a certificate. With python-flint,
+    the attitude is proved in torque-free motion, and with `any_torque` both under any recorded
+    torque. The limit of a proof is about half a second times `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))

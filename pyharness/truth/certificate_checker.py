@@ -38,7 +38,7 @@ Expansion = tuple[list[list[int]], list[int], int]
 
 
 class NotProvedError(ValueError):
-    """The certificate does not prove what it states."""
+    """The exception for a certificate that does not prove what it states."""
 
 
 def over(numerator: int, denominator: int) -> int:

@@ -86,7 +86,10 @@ def _arctan_inverse(n: int) -> Decimal:
 
 
 def product(x: Row, reversed_y: Row) -> Decimal:
-    """Return the Taylor coefficient of a product of two series, the second one reversed."""
+    """Return coefficient k of the product of two series, from their coefficients 0 to k.
+
+    The coefficients of the second series are in reverse order.
+    """
     if x and not x[-1]:
         # Series of polynomials end in many zeros, which change no digit of the sum.
         n = len(x) - 1

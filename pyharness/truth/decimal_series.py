@@ -1,6 +1,7 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-The list `coefficients` has the Taylor coefficients of each unknown.
+In functions of Taylor series, `coefficients` has the Taylor coefficients of each unknown; elsewhere
+it is A, B, C.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +27,7 @@ _ORDINARY_STEPS = 20_000
 _FIRST_STEPS = 100
 _PACE_SLACK = 3.0
 # Largest defect of a series: the difference between the rates and its derivative at the end of a
-# step, times the step, over the local tolerance. A series that has converged is below.
+# step, times the step, over the local tolerance. A series that has converged has a smaller defect.
 _MOST_DEFECT = 64
 _NEARLY_1 = 1 - Decimal("1e-26")  # a relative change of thousands of rounding errors
 # Least growth of the number of steps, as a power of time, that the forecast extrapolates.
@@ -47,9 +48,10 @@ def taylor_series(
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     The rows end where omega grows without bound or the torque is singular. Quaternions keep the
-    norm of the scene's. `coefficients` are A, B, C; high powers in the torque may increase `order`,
-    the degree; `tolerance` is local and relative. `effort` is a factor on a work limit of some ten
-    seconds; None means 100 000 steps, fewer if the torque depends on the state.
+    norm of the scene's quaternion. `coefficients` are A, B, C. `order` is the degree of the series,
+    which high powers in the torque may increase. `tolerance` is local and relative. `effort` is a
+    factor on a work limit of some ten seconds; None means a limit of 100 000 steps, fewer if the
+    torque depends on the state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -426,7 +428,7 @@ def _triple(x: Row, y: Row, z: Row) -> Decimal:
 
 
 def _attitude_rates(q: list[Row], omega: list[Row]) -> Row:
-    """Return coefficient k of q (0, omega)/2, from those of q, and of omega in reverse."""
+    """Return coefficient k of q (0, omega)/2, from those of q and, in reverse order, of omega."""
     (a, b, c, d), (x, y, z) = q, omega
     return [
         (-product(b, x) - product(c, y) - product(d, z)) / 2,

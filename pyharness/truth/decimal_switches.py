@@ -19,8 +19,9 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    A switch changes where its operand crosses a level. `_levels` has, by slot, the operands at a
-    level: -1 if it is the lower end of their interval, 1 if the upper.
+    A switch changes where its operand crosses a level. `_levels` has, by slot of a switch whose
+    operand is at a level, -1 if the level is the lower end of the operand's interval, 1 if it is
+    the upper end.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -31,7 +32,7 @@ class Switches:
         self._next: dict[int, int] = {}
 
     def settle(self) -> bool:
-        """Set the results by the values of the operands; return whether one changed."""
+        """Set the results by the values of the operands; return whether a result changed."""
         for slot, is_floor, x in self._tape.operands_of_switches():
             level = x[0].to_integral_value() if is_floor else Decimal(0)
             if abs(x[0] - level) <= _ZERO * (1 + abs(x[0])):
@@ -75,7 +76,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened to resolve all operands, and to the first root."""
+        """Return the step (s), shortened to resolve all operands, and to end at the first root."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []
@@ -99,7 +100,7 @@ class Switches:
         return first.copy_sign(length)
 
     def step(self, is_whole: bool) -> None:
-        """Change the results at the end of a step, unless it was shortened."""
+        """Change the results at the end of a step, unless the step was shortened."""
         self._levels = {}
         if is_whole:
             for slot, level in self._next.items():

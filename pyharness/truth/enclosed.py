@@ -20,7 +20,7 @@ class Balls(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Balls that contain the solution of one scene at requested times; None if not requested.
+    """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
     derivatives of omega and of the (not normalised) quaternion by omega at time 0.
@@ -121,9 +121,9 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
-    They are the square roots of abs(A), abs(B) and abs(C) over the largest, but at least 0.01. If
-    none is 0.01, the logarithmic norm is 0 for rotations about the axes of the largest and smallest
-    moment.
+    They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
+    0.01. If none is 0.01, the logarithmic norm is 0 for rotations about the axes of the largest and
+    smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

@@ -40,9 +40,10 @@ def enclose(
 
     `times` (s) have one sign and lead away from 0; the first may be 0. A radius of omega is at most
     10**-digits rad/s, times the largest component of omega (for a closed form, of the initial one)
-    if that exceeds 1 rad/s. `velocity` (m/s) and `transition` request more; attitude and rotational
-    energy are included if the scene has attitude and moments. `progress` receives a percentage of
-    the time, 100, and the time as text. `effort` is a factor on the limit of steps.
+    if that exceeds 1 rad/s. `velocity` (m/s) and `transition` (the transition matrix) request
+    further balls. Those of the attitude and of the rotational energy are included if the scene has
+    an attitude, or moments. `progress` receives the percentage of the time that is done, 100, and
+    the time as text. `effort` is a factor on the limit of steps.
 
     Raise InputError if the times are not in order, python-flint is missing, the torque is opaque,
     the solution can't be enclosed up to the last time, or the limit is exceeded.

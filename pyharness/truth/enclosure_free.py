@@ -28,8 +28,8 @@ def enclose_free(
 ) -> list[Balls]:
     """Return balls that contain omega (rad/s) without torque at each of `times` (s).
 
-    With `attitude`, four more contain the unit quaternion from body to space, scalar first and
-    continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, times the largest
+    With `attitude`, four more balls contain the unit quaternion from body to space, scalar first
+    and continuous in time. Radii are at most 10**-`digits`; for omega in rad/s, times the largest
     initial component if that exceeds 1 rad/s. The motion must be bounded; an attitude needs
     moments. Raise InputError if 20 000 bits do not suffice.
     """

@@ -101,7 +101,7 @@ class Equations:
 
     The unknowns are omega (rad/s), the scene's quaternion, the velocity (m/s) and, with
     `transition`, the derivatives of omega and attitude by omega at time 0, row by row. `blocks` are
-    the slices of the present groups, `scales` the units of errors.
+    the slices of the groups that are present, `scales` the units of errors.
     """
 
     def __init__(self, scene: Scene, velocity: bool, transition: bool) -> None:
@@ -351,7 +351,7 @@ class _Proof:
         return [self.norm(bounds, block) for block in self.blocks]
 
     def _rests(self, rates: Rates, terms: list[list[Any]], h: Fraction, count: int) -> list[Any]:
-        """Return bounds on the rates' Taylor terms from number `count` on, summed, along p.
+        """Return bounds on the sums of the rates' Taylor terms from number `count` on, along p.
 
         If the rates are at most M on a disc whose radius is c steps, term number k is at most
         M c**-k at the end of the step (Cauchy's estimate). The bounds are geometric series.

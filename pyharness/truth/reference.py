@@ -76,9 +76,9 @@ def reference(
     Attitudes are always computed by the series.
 
     `effort` is a factor on a work limit of some ten seconds, forecast from the first steps; None
-    means 100 000 steps. A torque that depends on the state must be recorded; the rows end before it
-    is singular. Raise InputError if the times are not in order, a changing moment reaches 0, or the
-    series is impossible or too long.
+    means 100 000 steps. A torque that depends on the state must be recorded; the rows end before
+    the torque becomes singular. Raise InputError if the times are not in order, a changing moment
+    reaches 0, or the series is impossible or too long.
     """
     if scene.changing is not None:
         scene.changing.check(times)

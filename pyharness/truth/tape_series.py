@@ -1,7 +1,8 @@
 """Taylor coefficients, in decimal arithmetic, of a torque that is recorded on a tape.
 
-A tape is a list of operations, whose results are in numbered slots. The recurrences, order by order
-together with the solution, are those of Jorba and Zou 2005, Experimental Mathematics 14.
+A tape is a list of operations, whose results are in numbered slots. The coefficients are computed
+order by order, together with those of the solution, by the recurrences of Jorba and Zou 2005,
+Experimental Mathematics 14.
 """
 
 from bisect import bisect_left, bisect_right
@@ -18,7 +19,7 @@ _LARGEST_ANGLE = Decimal("1e308")
 _INVISIBLE = 400
 # Largest ratio of a step to the distance of a divisor's zero.
 _WITHIN_CIRCLE = Decimal("0.9")
-_MANY_FACTORS = 3  # products of so many factors are checked; those of two show in any series
+_MANY_FACTORS = 3  # products of this many factors are checked; those of two show in any series
 # The order is at least this multiple of the number of factors, up to _MOST_ORDER, so that a product
 # whose factors are 0 here shows in the series.
 _ORDER_A_FACTOR = 4
@@ -57,13 +58,13 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order at which the tape's powers are visible.
+    the lowest order at which all products of the tape show in the series.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations, with terms of sums changed by plus or minus `change` (relative).
+        """Store the operations; terms of sums are multiplied by 1 plus or minus `change`.
 
         `results` has the results of switches by slot, which the caller changes.
         """
@@ -184,7 +185,7 @@ class TapeSeries:
         return sine, cosine
 
     def _tangent(self, operand: int, found: Row, k: int) -> Decimal:
-        """Return coefficient k of the hyperbolic tangent of a slot; `found` has 0 to k - 1."""
+        """Return coefficient k of a slot's hyperbolic tangent; `found` has those up to k - 1."""
         if k == 0:
             x = self._slots[operand][0]
             small = (-2 * abs(x)).exp()
@@ -215,8 +216,9 @@ class TapeSeries:
 
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
         beginning of a step and large a little later. Its argument therefore changes by at most half
-        the order, unless the function remains negligible. The mean order of the terms of a product
-        is limited in the same way. A divisor has no zero in the circle around the beginning.
+        the order, unless the function remains negligible. The mean order of the terms of a product,
+        weighted by their magnitudes, is limited in the same way. A divisor has no zero in the
+        circle around the beginning whose radius is the step.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -235,7 +237,8 @@ class TapeSeries:
     def _is_hidden(self, power: _Power, length: Decimal) -> bool:
         """Return whether a product may matter in a step, although its computed terms do not.
 
-        The mean order of a product's terms is the sum of the mean orders of its factors.
+        The mean order of a product's terms, weighted by their magnitudes, is the sum of those of
+        its factors.
         """
         (factors, size, slots), order = power, Decimal(0)
         for slot, count in factors.items():
@@ -262,7 +265,10 @@ class TapeSeries:
         return max(Decimal(self._order) / 2, 2 * abs(x) - _INVISIBLE) / 2
 
     def next_change(self, time: Decimal, forward: bool) -> Decimal | None:
-        """Return the time (s) of a table's next change, or None; before `time` unless `forward`."""
+        """Return the time (s) of the next change of a table after `time`, or None.
+
+        Unless `forward`, it is the last change before `time`.
+        """
         place = (bisect_right if forward else bisect_left)(self._changes, time) - (not forward)
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
@@ -309,7 +315,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return by slot the divisors of quotients, and arguments of roots, that depend on it."""
+    """Return, by slot, the divisors of quotients and the arguments of roots that depend on it."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]
@@ -335,7 +341,7 @@ def _sum(linear: Linear | None, change: Decimal) -> _Sum:
 
 
 def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
-    """Return coefficients 0 to 3 of a table's piece after (or before) `time` (s)."""
+    """Return coefficients 0 to 3 of a table's piece after `time` (s) if `forward`, else before."""
     piece = max(0, (bisect_right if forward else bisect_left)(breaks, time) - 1)
     c0, c1, c2, c3 = map(Decimal, table.pieces[piece].tolist())
     s = time - breaks[piece]
@@ -343,7 +349,7 @@ def _expanded(table: Table, breaks: Row, time: Decimal, forward: bool) -> Row:
 
 
 def _root_coefficient(x: Row, root: Row, k: int) -> Decimal:
-    """Return Taylor coefficient k of the square root of x; `root` has 0 to k - 1.
+    """Return Taylor coefficient k of the square root of x; `root` has those up to k - 1.
 
     If x is 0 throughout, so is its root. Raise ArithmeticError where x is 0 and changes, because
     the root then has no Taylor series.

@@ -1,0 +1,57 @@
+module step_nodes
+  !! Polynomials at the nodes of a step, side by side.
+  use, intrinsic :: iso_c_binding, only: c_double, c_int
+  use kinds, only: dp
+  implicit none(type, external)
+  private
+
+  integer, parameter, public :: AT_ONCE = 24
+
+  interface
+    pure subroutine sum_at_nodes(terms, stride, order, parts, sums) &
+      bind(c, name="sum_at_nodes_level")
+      !! Compute the sums of terms from the first power on.
+      import :: AT_ONCE, c_double, c_int
+      implicit none(type, external)
+      integer(c_int), intent(in), value :: stride, order
+      real(c_double), intent(in) :: terms(stride, order) !! the first row of them
+      real(c_double), intent(in) :: parts(AT_ONCE)
+      real(c_double), intent(out) :: sums(AT_ONCE)
+    end subroutine sum_at_nodes
+  end interface
+
+  public :: parts_from, powers_of, sum_at_nodes
+
+contains
+
+  pure function parts_from(first, nodes) result(parts)
+    !! Return the nodes from number `first` on; the last is repeated.
+    integer, intent(in) :: first
+    real(dp), intent(in) :: nodes(:)
+    real(dp) :: parts(AT_ONCE)
+    integer :: i
+
+    do i = 1, AT_ONCE
+      parts(i) = nodes(min(first + i - 1, size(nodes)))
+    end do
+  end function parts_from
+
+  pure function powers_of(x, exponent) result(powers)
+    !! Return whole powers, each by the same products as a single one.
+    real(dp), intent(in) :: x(AT_ONCE)
+    integer, intent(in) :: exponent !! above 0
+    real(dp) :: powers(AT_ONCE), square(AT_ONCE)
+    integer :: left
+
+    powers = 1.0_dp
+    square = x
+    left = exponent
+    do
+      if (mod(left, 2) == 1) powers = powers*square
+      left = left/2
+      if (left == 0) exit
+      square = square*square
+    end do
+  end function powers_of
+
+end module step_nodes

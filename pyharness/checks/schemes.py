@@ -3,10 +3,10 @@
 Fortran and Python could share a fault too small to change the order. Each step of the corrected
 programs is therefore recomputed from the program's previous state; only rounding errors may differ.
 
-The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if a quotient
-exceeds the stop constant: the change of K (right-hand side) divided by the change of U (state)
-within a step. All quotients are recomputed too, and the program is run with constants just below
-and above each new maximum.
+The stop test of the Runge-Kutta program is equation 19 of the thesis. A run stops if within a step
+the change of K (right-hand side), divided by the change of U (state), exceeds the stop constant.
+These quotients are recomputed too, and the program is run with constants just below and above each
+new maximum.
 """
 
 from collections.abc import Callable, Iterator, Sequence

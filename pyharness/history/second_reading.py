@@ -40,9 +40,10 @@ def chapman(first: int, second: int, both: int) -> float:
 def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
-    For independent samples, the number of members in both has the hypergeometric distribution. For
-    a size in the interval, neither tail of the distribution from `both` on is below 0.025. Raise
-    ValueError if `both` is 0, because there is no upper limit then.
+    `first` and `second` are the sizes of two samples, `both` the number of their common members.
+    For independent samples, `both` has the hypergeometric distribution. For a size in the interval,
+    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, because there is no
+    upper limit then.
     """
     if both < 1:
         raise ValueError("both must be positive")
@@ -96,8 +97,8 @@ def misread_places(scan: str, reading: str) -> dict[int, str]:
 def recaptures() -> Table:
     """Return the table of estimates, with characters and with whole cards as units.
 
-    A machine repeats its misreading of a letter, so that characters are not independent units, but
-    cards are.
+    Characters are not independent units, because a machine repeats its misreading of a letter;
+    cards are independent.
     """
     places: tuple[set[tuple[str, int]], ...] = (set(), set())
     for each in read_cards():

@@ -1,4 +1,4 @@
-"""Axes of a sweep's grid: each varies one field of the scene or the solver."""
+"""Axes of a sweep's grid. Each axis varies one field of the scene or of the solver."""
 
 import math
 import zlib

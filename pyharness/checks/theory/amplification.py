@@ -1,10 +1,10 @@
 """Linear stability: the amplification matrix of a step of each program of the thesis.
 
-A perturbation x of a steady rotation, and the velocity during this rotation, obey x' = J x. A step
-of size h multiplies x by a matrix of polynomials in z, where z is h times an eigenvalue of J, or hJ
-itself. The coefficients are exact fractions. The matrix has m rows, one for each vector that a
-program propagates. The original Runge-Kutta program propagates two: the result, and U(1), at which
-the first stage is evaluated.
+A perturbation x of a steady rotation, and the velocity during this rotation, obey x' = J x, where J
+is the constant Jacobian of their equations. A step of size h multiplies x by a matrix of
+polynomials in z, where z is h times an eigenvalue of J, or hJ itself. The coefficients are exact
+fractions. The matrix has m rows, one for each vector that a program propagates. The original
+Runge-Kutta program propagates two: the result, and U(1), at which the first stage is evaluated.
 
 A program is linearly stable where the spectral radius is at most 1, a region in the plane of z.
 

@@ -2,8 +2,8 @@
 
 An error of omega at time s, multiplied by the state-transition matrix Phi(t, s) of the equations
 linearised along the solution, is the resulting error at time t. Under a torque that depends on
-omega or attitude, the matrix includes the attitude. Its derivative follows from the tape, the
-recorded operations of the equations.
+omega or attitude, the matrix includes the attitude. The derivative of the matrix follows from the
+tape, the recorded operations of the equations.
 """
 
 import math

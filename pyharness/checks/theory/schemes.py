@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
-is `Numbers`, or `Series` for power series in the step size, which yield each term of the truncation
-error. Schemes share no code with the methods.
+A scheme computes one step from `omega`, under constant torque (equations 16-18). The argument `on`
+of a scheme is `Numbers`, or `Series` for power series in the step size, which yield each term of
+the truncation error. Schemes share no code with the methods.
 """
 
 import math

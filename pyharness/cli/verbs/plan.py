@@ -1,4 +1,4 @@
-"""The verb `plan`: show which computations a scene requires, which are left out, and why."""
+"""The verb `plan`: show which computations a scene requires, which are omitted, and why."""
 
 import argparse
 

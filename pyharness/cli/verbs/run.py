@@ -1,4 +1,4 @@
-"""The verb `run`: compute one trajectory with a program of the appendix or with a method."""
+"""The verb `run`: compute one trajectory by a program of the thesis or another method."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""The verb `verify`: check programs and methods against each other and against the truth."""
+"""The verb `verify`: check programs and methods against each other and the true solution."""
 
 import argparse
 from pathlib import Path

@@ -114,7 +114,7 @@ def bounded_not_lipschitz(lab: Laboratory, decades: float, above: float) -> Judg
 def local_error(
     lab: Laboratory, cases: list[int], method: str, power: float, within: float
 ) -> Judged:
-    """Judge the claim that the error of one step decreases with a power of the step size."""
+    """Judge the claim that the error of one step is proportional to a `power` of the step size."""
     stepped = partial(_stepped, method=method)
     numbers = {f"case {n}: power of the step": _power(lab.scene(n), stepped) for n in cases}
     near = [abs(each - power) <= within for each in numbers.values()]

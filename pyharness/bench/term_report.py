@@ -101,7 +101,7 @@ def _summary(
 
 
 def _ratios(finding: Finding, load: Workload) -> list[float | None]:
-    """Return heyoka's run time divided by ours, or None, at each target error."""
+    """Return heyoka's run time divided by our methods, or None, at each target error."""
     times = {each.method: each.seconds for each in scores(finding, load, TARGETS)}
     nowhere = (None,) * len(TARGETS)
     pairs = zip(times.get(HEYOKA, nowhere), times.get(OURS, nowhere), strict=True)

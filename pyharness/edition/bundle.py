@@ -1,7 +1,7 @@
 """Bundling of JavaScript (ES) modules into one classic script.
 
 Browsers do not import modules into a page that is opened from a file. In the script, every module
-is a function that returns its exports, and stands after the modules that it imports. Only the forms
+is a function that returns its exports, and is after the modules that it imports. Only the forms
 of import and export that this project uses are supported.
 """
 

@@ -43,14 +43,13 @@ def taylor(
     is_tape = isinstance(scene.torque, StateTorque)
     kernel = "tape_rows" if is_tape else "taylor_rows"
     given = (kernel_tape(system_of(scene)),) if is_tape else normalized(scene)
-    work = np.array([effort, 0.0, -1.0, -1.0, 0.0])
+    work = np.array([effort, 0.0, -1.0, -1.0, 0.0, 0.0][: 5 + is_tape])
     most = MOST_STEPS if with_steps else 0
     ends = np.empty(most + 1)
     at_nodes = np.empty(((7 if n_attitudes else 3) + n_own, NODES, most + 1), order="F")
     room: dict[str, Any] = {"nodes": STEP_NODES, "n": len(at_nodes), "most": most, "ends": ends}
     room |= {"at_nodes": at_nodes, "n_nodes": NODES}
     if is_tape:
-        work = np.append(work, 0.0)
         own = np.zeros((n_own + 1, (len(times) if n_own else 0) + 1), order="F")
         own[:n_own, 0] = [each.start for each in scene.states]
         room |= {"own": own, "own_sizes": [*(each.scale for each in scene.states), 0.0]}

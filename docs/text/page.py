@@ -103,7 +103,7 @@ def _shared_table() -> str:
         ]
         for (one, other), count in shared_statements().items()
     ]  # fmt: skip
-    heads = "decks | shared statements | of these, by our names of the torques alone"
+    heads = "decks | shared statements | of these, shared only with our names of the torques"
     return table(f"{heads} | statements in each deck", counts)
 
 

@@ -40,9 +40,9 @@ class Contender:
 class SceneContender(Contender):
     """A contender that integrates omega of one scene and, where it can, the attitude."""
 
-    # Makes all preparations, including compilation.
+    # Prepares what does not depend on the end time and the setting.
     prepare: Callable[[Scene], Maker]
-    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
+    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` chooses numbers of steps
     order: int = 0  # order of convergence of a method with a fixed step
     attitude: bool = False
 

@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time; if large, their maxima over 16 rows."""
+    """Return error and amplification at the last time; if the latter is large, maxima over rows."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -49,8 +49,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    Raise InputError if there is no closed form, the work limit is exceeded, or the phase is above
-    1e15 rad.
+    Raise InputError if there is no closed form, the work limit is exceeded, or the phase of omega
+    is above 1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

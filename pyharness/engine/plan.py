@@ -1,4 +1,4 @@
-"""The choice of the method and of the computed quantities."""
+"""The choice of a scene's method, and of the quantities to compute."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -28,7 +28,10 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the zeros (s) before and after time 0, or infinities, of a polynomial above 0 at 0."""
+    """Return the last zero (s) before and the first after time 0 of a polynomial above 0 at time 0.
+
+    Where there is none, return infinity.
+    """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)

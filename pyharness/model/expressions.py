@@ -191,7 +191,7 @@ def _tree(text: str, place: str) -> ast.expr:
 def _operations(
     text: str, names: Mapping[str, Any], place: str
 ) -> list[tuple[ast.expr, Sequence[ast.expr], Callable[..., Any]]]:
-    """Return each node with its operands and a function of their values; check all nodes."""
+    """Return each node of a checked expression, its operands, and a function of their values."""
     found, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()

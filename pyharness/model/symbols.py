@@ -81,7 +81,7 @@ class Recorder:
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols, with its own `reason`."""
+        """Return the exception for a function that accepts no symbols; it states the `reason`."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"

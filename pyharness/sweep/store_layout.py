@@ -1,6 +1,6 @@
 """Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
 
-The command `sha256sum --check` can read a file of checksums. The first line names the version of
+The command `sha256sum --check` can read a file of checksums. Its first line names the version of
 pyharness, the sweep and the part of the store, so that a file from elsewhere is detected. Each
 further line has the SHA-256 and the path of a file. In all functions `folder` is the folder of the
 store, and `name` a path in this folder.
@@ -129,7 +129,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove the file, link or folder at a path, and a file in the place of a parent folder."""
+    """Remove the file, link or folder at `folder / name`, and a file where a parent should be."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -177,7 +177,7 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the readable identities in a store's metadata and in their checksums.
+    """Return the identities that can be read in a store's metadata and in their checksums.
 
     In an undamaged store there are two, which are equal.
     """

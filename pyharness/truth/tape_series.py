@@ -58,15 +58,15 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order at which all products of the tape show in the series.
+    the lowest order whose series show all products, also those whose factors are 0 at that time.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations; terms of sums are multiplied by 1 plus or minus `change`.
+        """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
 
-        `results` has the results of switches by slot, which the caller changes.
+        `results` has the results of switches by slot; the caller changes them.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -197,7 +197,7 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return coefficients 1 to k of a slot, each times its number."""
+        """Return coefficients 1 to k of a slot, each multiplied by its number."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
@@ -215,10 +215,10 @@ class TapeSeries:
         """Return the step (s), reduced so that the series of every operation converges.
 
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
-        beginning of a step and large a little later. Its argument therefore changes by at most half
-        the order, unless the function remains negligible. The mean order of the terms of a product,
-        weighted by their magnitudes, is limited in the same way. A divisor has no zero in the
-        circle around the beginning whose radius is the step.
+        beginning of a step and large a little later. Its argument may therefore change by at most
+        half the order, unless the function remains negligible. The mean order of the terms of a
+        product, weighted by their magnitudes, is limited in the same way. A divisor must have no
+        zero in the circle around the beginning whose radius is the step.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)

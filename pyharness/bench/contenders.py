@@ -66,7 +66,7 @@ def list_own_contenders() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError below 100 eps: SciPy replaces such tolerances by 100 eps, LSODA refuses."""
+    """Raise InputError for a tolerance below 100 eps, which SciPy replaces and LSODA refuses."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

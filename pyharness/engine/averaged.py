@@ -80,7 +80,7 @@ def estimates(
             angle = 0.0
         x, y, z = omega
         cosine, sine = np.cos([angle]), np.sin([angle])
-        # Derivatives of omega at the end by the point, and by the time at which it is reached.
+        # Derivatives of omega at the end with respect to the point, and to the time of the end.
         back = np.empty((3, 4))
         back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
         back[:, 3] = -a * y * z, -b * z * x, -c * x * y

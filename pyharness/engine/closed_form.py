@@ -34,7 +34,7 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time; if the latter is large, maxima over rows."""
+    """Return error and amplification at the last time; maxima over rows if it amplifies much."""
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

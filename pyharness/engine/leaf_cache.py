@@ -49,7 +49,7 @@ def size() -> int:
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the folder of compiled leaves, its size in bytes, and the compiler, or why not."""
+    """Return the folder of compiled leaves, its size in bytes, and the compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -106,7 +106,7 @@ def compiler() -> tuple[str, ...]:
 
 @cache
 def machine() -> str:
-    """Return the compiler, its version and the processor, on which compiled code depends."""
+    """Return a text that differs for different compilers, flags and processors."""
     import platform
 
     file = os.stat(os.path.realpath(compiler()[0]))

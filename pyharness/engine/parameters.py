@@ -182,7 +182,7 @@ def _equations(
         if attitude:
             rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
         tape = with_parameters(recorder.tape(rates), flat)
-    # The derivatives of one rate by all parameters are adjacent outputs.
+    # The derivatives of one rate with respect to all parameters are adjacent outputs.
     forcings, columns = [], {}
     parameter = first = 0
     for name, listed in values:

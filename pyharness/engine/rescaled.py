@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # The exponents of rescaled time are multiples of this number, so that nested square roots have
 # whole exponents.
 _MULTIPLE = 16
-_SAMPLES = 9  # times at which a torque of the state is evaluated
+_SAMPLES = 9  # times at which a torque that depends on the state is evaluated
 # Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
 

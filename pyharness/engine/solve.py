@@ -99,7 +99,7 @@ def solve(
         terminal event are removed. Functions that accept arrays are called with arrays.
     sensitivities : iterable of str
         Names of the parameters with respect to which omega and the quaternion are differentiated:
-        `omega` and `attitude` at time 0 (the latter by small rotations about the body axes, rad),
+        `omega` (at time 0), `attitude` (small initial rotations about the body axes, rad),
         `moments`, `coefficients`, `inertia` (columns I11, I22, I33, I12, I13, I23) or
         `torque.NAME`. NAME is a constant of a scene file's expressions, or a function's keyword
         argument with a number as default; for a TorqueLaw, `constant`, `rate`, `sines` or

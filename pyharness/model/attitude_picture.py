@@ -33,10 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw the paths in space of the body axes, with dots at their ends, and of omega's direction.
-
-    The latter ends with a cross.
-    """
+    """Draw the paths in space of the body axes, ending in dots, and of omega, ending in a cross."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)

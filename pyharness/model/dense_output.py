@@ -151,7 +151,7 @@ class DenseOutput:
         return self._at(t, lambda times, states: states)
 
     def derivative(self, t: Any) -> Array:
-        """Return the derivative of the state by the equations of motion.
+        """Return the time derivative of the state, from the equations of motion.
 
         Parameters
         ----------

@@ -70,7 +70,7 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
 
 
 def _bound(polynomial: Sequence[int]) -> int:
-    """Return log2 of a bound of positive zeros (Kioustelidis 1986, J. Comput. Appl. Math. 16)."""
+    """Return log2 of a bound on positive zeros (Kioustelidis 1986, J. Comput. Appl. Math. 16)."""
     degree, last = len(polynomial) - 1, polynomial[-1]
     return 1 + max(
         -((last.bit_length() - 1 - c.bit_length()) // (degree - n))

@@ -131,7 +131,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque as a function, and with components, about `axes` (columns).
+        """Return the torque with omega, attitude and components about new `axes` (columns).
 
         Raise InputError for an opaque torque.
         """

@@ -155,7 +155,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return the largest of the bounds in `found`, at least one."""
+    """Return the largest of the bounds in `found`, which must not be empty."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(

@@ -197,7 +197,7 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return coefficients 1 to k of a slot, each multiplied by its number."""
+        """Return coefficients 1 to k of a slot, times their numbers."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
@@ -273,10 +273,10 @@ class TapeSeries:
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
-        """Return whether a square root reaches 0 up to `offset` (s) from the expansion.
+        """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
 
-        Beyond a double zero the series is the negative of the root: the series of sqrt(x**2) is x
-        or -x.
+        Beyond a double zero its series is the negative of the root, as for sqrt(x**2), whose series
+        is x or -x.
         """
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":
@@ -315,7 +315,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return, by slot, the divisors of quotients and the arguments of roots that depend on it."""
+    """Return, by slot, the divisors of quotients and the arguments of roots in which it occurs."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]

@@ -20,7 +20,7 @@ _STYLES = {"prepared": "D-.", "closed-form": "o-", "taylor": "s--", "rk4": "^:"}
 
 @dataclass(frozen=True)
 class Ensembles:
-    """The speeds of all solvers; our methods' run times by number of bodies, and memory."""
+    """The speeds of all solvers; run times by number of bodies, and memory, of our methods."""
 
     rates: Rates
     sizes: Sequence[Size]

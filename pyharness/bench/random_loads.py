@@ -41,10 +41,10 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload of a seed and a number, from 1.
 
-    Successive numbers have different kinds of torque, in turn. A scene is drawn again if its error
-    amplification is `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300
-    revolutions. With `attitude`, the body is initially aligned with the axes of space, and the
-    workload has no `truth`, because `integer_series` propagates no attitude.
+    The kind of torque changes with the number. A scene is drawn again if its error amplification is
+    `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
+    `attitude`, the body is initially aligned with the axes of space, and the workload has no
+    `truth`, because `integer_series` propagates no attitude.
     """
     source = Random(f"bench/{seed}/{number}")
     place = number - 1

@@ -82,7 +82,7 @@ class Solution:
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return values, their `noise`, and the part of the noise that is due to rounding."""
+        """Return a function's values, their `noise`, and the noise that is due to rounding."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state

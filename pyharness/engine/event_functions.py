@@ -82,7 +82,7 @@ class EventFunction:
         return found
 
     def _of_arrays(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values for arrays, or None if the function does not accept arrays."""
+        """Return the values by one call with arrays, or None if the function accepts no arrays."""
         omega, attitude = states[:, :3].T.copy(), states[:, 3:].T.copy()
         rate = None if rates is None else rates.T
         try:

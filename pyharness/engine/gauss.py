@@ -1,4 +1,4 @@
-"""Methods with equal steps: Gauss collocation, and the methods of section III.2 of the thesis."""
+"""Methods with equal steps: Gauss collocation, and those of section III.2 of the thesis."""
 
 import math
 from collections.abc import Sequence

@@ -133,7 +133,7 @@ def _files() -> Iterator[tuple[Path, os.stat_result]]:
 
 
 def _found(place: Path, key: str) -> Path | None:
-    """Return the file of a key; None if there is none that may be loaded."""
+    """Return the file of the leaves with this key; None if none may be loaded."""
     try:
         info = place.lstat()
     except OSError:

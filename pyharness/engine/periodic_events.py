@@ -21,7 +21,7 @@ _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether all functions can be recorded and depend on omega and its rate alone."""
+    """Return whether all functions can be recorded, and depend on omega and its rate alone."""
     return all(map(_is_of_omega, functions))
 
 

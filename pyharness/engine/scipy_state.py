@@ -139,10 +139,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 
 
 def _refined(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
-    """Return states at `times` (s) whose estimated error is at most `tolerance`.
-
-    Raise InputError if none are found.
-    """
+    """Return states at `times` (s) whose estimated error meets `tolerance`, or raise InputError."""
     scale = run.expected_omega()
     if scale == 0.0:
         # The body is at rest, and no torque acts.
@@ -252,7 +249,7 @@ class _StateRun(Run):
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side that evaluates tables only inside the current span.
 
-        It raises InputError if an opaque function fails.
+        The right-hand side raises InputError if an opaque function fails.
         """
 
         def between(time: float, state: Sequence[float]) -> list[float]:

@@ -350,7 +350,7 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the rates of omega, attitude if computed, and held torque as a tape."""
+    """Return the rates of omega, attitude if computed, own states and held torque as a tape."""
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + len(scene.states) + 4)
     time, *unknowns = recorder.inputs()

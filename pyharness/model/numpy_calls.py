@@ -80,7 +80,7 @@ class _Replaced:
 
 
 class _Target(_Replaced):
-    """A replacement of a function that makes an array, to which symbols can be assigned."""
+    """A replacement of a function that makes an array; symbols can be assigned to the array."""
 
     def __init__(self, original: Callable[..., Any], value: float) -> None:
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))

@@ -300,7 +300,7 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments (kg m2) as exact fractions; None for coefficients.
+        """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
         Raise InputError for a full inertia matrix, or one that changes with time.
         """
@@ -322,8 +322,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest moment then exceeds the sum of the others by more than 2**-50 of itself, which
-        rounding may explain.
+        The largest moment then exceeds the sum of the others by over 2**-50 of itself; less may be
+        due to rounding.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:

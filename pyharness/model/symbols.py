@@ -482,7 +482,7 @@ def select(condition: Any, first: Any, second: Any) -> Any:
 
 
 def _line() -> str:
-    """Return the name and line of the user's function that is being recorded."""
+    """Return name and line of the user's function being recorded."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename.startswith(_LIBRARIES):
         frame = frame.f_back

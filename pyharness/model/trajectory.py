@@ -1,4 +1,4 @@
-"""Trajectories, the results for a scene; and the base class of results for many bodies."""
+"""Trajectories, the results for one scene; and the base class of results for many bodies."""
 
 import math
 import textwrap

@@ -94,7 +94,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on sample scenes or, if below 0.2 s, on whole chunks.
+    It is measured on sample scenes or, if these give less than 0.2 s, on whole chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)

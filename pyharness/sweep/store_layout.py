@@ -34,7 +34,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """A file of a store is damaged; the message names the file and the damage."""
+    """The exception for a damaged file of a store; its message names the file and the damage."""
 
 
 class Label(NamedTuple):
@@ -278,6 +278,6 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound of the size (bytes) of each file of a chunk."""
+    """Return an upper bound on the size (bytes) of each file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -63,7 +63,7 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
-    """Return the rate (1/s) of the elliptic functions, and omega's period (s) or None.
+    """Return the rate (1/s) of the elliptic functions, and omega's period (s).
 
     The period is None on the separatrix. Perturbations grow by at most some exp(rate * time).
     """

@@ -253,7 +253,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return the limit, or None, of the change of an operation's last operand in a step."""
+        """Return the limit of the change of an operation's last operand in a step, None if none."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]

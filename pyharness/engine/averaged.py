@@ -273,10 +273,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of nodes in psi for a squared elliptic modulus.
-
-        Raise TimedError if the modulus is near 1.
-        """
+        """Return the number of nodes in psi for a squared modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

@@ -34,7 +34,10 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time; maxima over rows if it amplifies much."""
+    """Return error and amplification at the last time.
+
+    If the amplification is 1000 or more, return the maxima over 16 rows.
+    """
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth

@@ -38,8 +38,7 @@ class Solution:
     """The solution of a scene whose events are searched.
 
     `pieces` are the polynomials of the dense output `sol`, or approximate a closed form that `sol`
-    evaluates directly. `tolerance` is that of omega, 0 for a fixed step. Own states are unknowns
-    that a user adds to omega and attitude.
+    evaluates directly. `tolerance` is that of omega, 0 for a fixed step.
     """
 
     pieces: Pieces
@@ -47,7 +46,7 @@ class Solution:
     tolerance: float
 
     def states(self, times: Array) -> Array:
-        """Return omega, attitude and own states at n `times` (s), shape (n, m)."""
+        """Return omega, attitude and unknowns added by the user at n `times` (s), shape (n, m)."""
         return self.sol.normalized(self.pieces(times))
 
     @cached_property

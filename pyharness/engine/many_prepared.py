@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    Single calls solve the bodies whose error can't be measured side by side; and all bodies if the
-    torque is neither recorded nor in space, or the inertia matrix is full.
+    Single calls solve bodies whose error the first way can't measure; and all bodies if the torque
+    is neither recorded nor in space, or the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:

@@ -37,7 +37,7 @@ class Method:
     name: str
     title: str
     source: str
-    finest: float  # smallest tolerance that the method accepts; 1 if it takes no tolerance
+    finest: float  # smallest tolerance that the method claims to meet; 1 if it takes no tolerance
     solve: Integrator  # called with checked times on one side of 0, in order away from 0
     # Default tolerance, 1e-9 or the smallest that the method meets in ordinary scenes within a
     # fraction of its work limit; 1 if the method takes no tolerance.

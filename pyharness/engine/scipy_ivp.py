@@ -59,7 +59,7 @@ _RADAU_SHARE = 2
 
 class _Ahead(NamedTuple):
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
-    # Phase: the integral of the largest coefficient times |omega|, plus limited phases of waves.
+    # Phase (rad): integral of the largest coefficient times |omega|, plus limited phases of waves.
     radians: float
     growth: float  # error amplification until the end, at least 1
     turned: float = 0.0  # rad by which the body rotates, if its attitude is requested

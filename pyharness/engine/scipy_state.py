@@ -87,8 +87,8 @@ def solve_state(
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
 
     The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
-    work limit, as a number of right-hand sides of a body without torque. Under an opaque torque and
-    with `with_steps`, `sol` of the result has the steps, by SciPy's interpolants.
+    work limit, as a number of right-hand sides of a body without torque. If the torque is opaque
+    and `with_steps` is true, `sol` of the result has the steps, by SciPy's interpolants.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
     if the Taylor series of a recorded torque, which checks the result, does not reach the end.

@@ -1,6 +1,6 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-The argument `coefficients` is A, B, C; in `_step` and `_size`, the Taylor coefficients of each
+The argument `coefficients` is A, B, C, but in functions of Taylor series the coefficients of each
 unknown.
 """
 

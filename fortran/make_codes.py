@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 def written(source: str) -> dict[str, str]:
-    """Return the text of each file, by its name, for the classes in pyharness/model/codes.py."""
+    """Return the texts of the files by name, for the classes in pyharness/model/codes.py."""
     classes = {
         name: {each: value for each, value in vars(codes).items() if each.isupper()}
         for name, codes in runpy.run_path(source).items()

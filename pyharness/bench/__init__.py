@@ -1,6 +1,6 @@
 """Benchmarks of run time against error, for methods, programs and other solvers.
 
 A contender is a solver that is measured; its setting is a tolerance or a number of steps. A maker
-turns an end time (s) and a setting into an integration that is ready to be timed. A workload is a
-scene with an end time; a load is a set of bodies that are solved at once.
+returns, for an end time (s) and a setting, an integration that is ready to be timed. A workload is
+a scene with an end time; a load is a set of bodies that are solved at once.
 """

@@ -40,9 +40,9 @@ class Contender:
 class SceneContender(Contender):
     """A contender that integrates omega of one scene and, where it can, the attitude."""
 
-    # Makes all preparations, including compilation.
+    # Prepares what does not depend on the end time and the setting.
     prepare: Callable[[Scene], Maker]
-    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` then chooses the steps
+    settings: tuple[float, ...] = ()  # empty for a fixed step: `ladder` chooses numbers of steps
     order: int = 0  # order of convergence of a method with a fixed step
     attitude: bool = False
 
@@ -66,7 +66,7 @@ def list_own_contenders() -> list[SceneContender]:
 
 
 def refuse_rounding(solver: str, setting: float) -> None:
-    """Raise InputError below 100 eps: SciPy replaces such tolerances by 100 eps, LSODA refuses."""
+    """Raise InputError for a tolerance below 100 eps, which SciPy replaces and LSODA refuses."""
     limit = 100 * 2.0**-52
     if setting < limit:
         raise InputError(f"{solver} takes no tolerance below 100 eps = {limit:.2g}")

@@ -45,7 +45,7 @@ class EnsembleLoad:
 
     @property
     def scene(self) -> Scene:
-        """Return the scene that the bodies share, at rest and without torque."""
+        """Return a scene with the shared moments, at rest and without torque."""
         return Scene(self.name, (0.0, 0.0, 0.0), MOMENTS)
 
     @property
@@ -90,13 +90,13 @@ EnsembleMaker = Callable[[EnsembleLoad, float, int], Callable[[], Array]]
 
 @dataclass(frozen=True)
 class EnsembleContender(Contender):
-    """A contender for omega of many bodies at `HORIZON`."""
+    """A contender that computes omega or attitude of many bodies at the end time."""
 
     prepare: EnsembleMaker  # the first call of the prepared function may compile code
     threads: tuple[int, ...] = (1, 2)  # numbers of threads to measure with
     torque_free: bool = False  # solves only bodies without torque
     attitude: bool = False
-    # Several ways to prepare the solver, by a describing note. All are timed; the fastest counts.
+    # Several ways to prepare the solver, by a note on each. All are timed; the fastest counts.
     variants: Mapping[str, EnsembleMaker] = field(default_factory=dict, kw_only=True)
 
     @property
@@ -106,7 +106,7 @@ class EnsembleContender(Contender):
 
 
 def draw(seed: str, n: int) -> list[EnsembleLoad]:
-    """Return two loads of n random bodies with equal omegas, without and with torques."""
+    """Return two loads of the same n random bodies: without and with torques."""
     source = text_generator(f"ensemble/{seed}")
     omega0 = source.uniform(-_FASTEST, _FASTEST, (n, 3))
     torque = source.uniform(-_HARDEST, _HARDEST, (n, 3)) * np.array(MOMENTS)

@@ -1,8 +1,8 @@
-"""Measurement of ensembles: speed at a target error, growth with the number of bodies, memory.
+"""Measurement of ensembles: speed at a target error, time per body against bodies, memory.
 
 Each contender uses the coarsest setting whose error on a sample is at most the target. Calls are
-interleaved in several rounds, and the shortest time counts, because other load can only lengthen
-it. Calls on one core are timed in processor time.
+interleaved in several rounds, and the shortest time counts, because other work of the machine can
+only lengthen it. Calls on one core are timed in processor time.
 """
 
 import subprocess
@@ -70,7 +70,7 @@ class Rate:
 
     @property
     def rate(self) -> float:
-        """Return bodies per second or, for prescribed steps, steps of all bodies per second."""
+        """Return bodies per second or, without a target error, steps of all bodies per second."""
         return self.bodies_a_second * (1 if self.target is not None else STEPS)
 
 
@@ -107,9 +107,10 @@ class _Task:
         return self.target is not None or each.setting == "steps"
 
     def error(self, omega: Array) -> float:
-        """Return the largest error of omega, relative to each body's largest omega at start or end.
+        """Return the largest error of omega, or of attitudes as an angle (rad), among the bodies.
 
-        For attitudes it is an angle (rad). It is infinite if a component is not finite.
+        That of omega is relative to the body's largest component at the start or the end. The
+        result is infinite if a component is not finite.
         """
         n = min(len(omega), len(self.ends))
         ends, starts = self.ends[:n], self.sample.omega0[:n]
@@ -245,8 +246,8 @@ class Memory:
 def sizes(seed: str, most: int, progress: Progress = no_progress) -> list[Size]:
     """Measure the run time per body for 1, 10, 100, ... up to `most` bodies.
 
-    All methods solve bodies with a torque, except the closed form. This is measured by `solve_many`
-    and, as "prepared", by a prepared solver.
+    The bodies have a torque, except for the closed form, which is measured by `solve_many` and, as
+    "prepared", by a prepared solver.
     """
     free, pushed = draw(seed, most)
     found: list[Size] = []

@@ -52,9 +52,9 @@ def ensemble_peers() -> list[EnsembleContender]:
 def heyoka_batch(
     load: EnsembleLoad, setting: float, threads: int, size: int = BATCHES[0]
 ) -> Callable[[], Array]:
-    """Return an integration by one heyoka batch integrator; `threads` has no effect.
+    """Return an integration by heyoka in batches of `size` bodies; `threads` has no effect.
 
-    A batch has `size` bodies. The result is attitudes, shape (n, 4), if the load requests them.
+    It returns attitudes, shape (n, 4), instead of omega if the load requests them.
     """
     of_state = isinstance(load.scene.torque, StateTorque)
     scene = load.scene if of_state else None

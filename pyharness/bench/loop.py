@@ -40,7 +40,7 @@ def timed(
     statistic: Callable[[Sequence[float]], float] = statistics.median,
     slow: float = SLOW,
 ) -> Iterator[_Row]:
-    """Yield the rows of the calls that `calls` prepares for each task.
+    """Yield a row for each call that `calls` prepares for each task, with its time.
 
     `length`, `rounds`, `statistic` and `slow` are as in `checks.compare.timing.seconds`.
     """

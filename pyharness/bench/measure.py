@@ -1,8 +1,8 @@
 """Run time against error, for our and third-party solvers, in one process.
 
 Every contender has settings from coarse to fine. A call with each setting is made once and compared
-with the reference. Batches of all calls are then timed in interleaved rounds, so that other load
-affects all alike; the median time counts.
+with the reference. Batches of all calls are then timed in interleaved rounds, so that other work of
+the machine affects all alike; the median time counts.
 """
 
 import math
@@ -62,8 +62,8 @@ class Workload:
     truth: Reference | None = None
     growth: float = 0.0
     turns: float = 0.0
-    # Errors are relative to this angular velocity (rad/s), or to the largest component of the true
-    # omega at T if that is larger.
+    # Errors are relative to this angular velocity (rad/s) or, if that is larger, to the largest
+    # component of the true omega at T.
     scale: float = 0.0
 
     @property
@@ -73,7 +73,7 @@ class Workload:
 
     @property
     def group(self) -> str:
-        """Return the name of the workload's group; ratios are averaged over groups.
+        """Return the name of the workload's group; mean ratios are those of a group.
 
         Groups differ in the end time; for 3 s, and with attitudes, also in whether there is a
         torque.
@@ -92,8 +92,8 @@ class Row:
     kind: str  # "tolerance", "steps" or "none"
     setting: float | None  # None if the contender has no setting
     seconds: float | None  # median, s; None if the call failed
-    # Error of omega at T, relative to the larger of the true omega's largest component and the
-    # workload's scale, or the error of the attitude (rad) if larger. None if the call failed.
+    # The larger of the errors of omega at T, relative as in `Workload.scale`, and of the attitude
+    # (rad). None if the call failed.
     error: float | None
     evaluations: int | None  # of the right-hand side in a call, if counted
     note: str = ""
@@ -120,9 +120,9 @@ class Finding:
     refused: list[Refusal]
     # Time (s) of all preparations, by (case number or label of a random scene, contender).
     preparation: dict[tuple[int | str, str], float]
-    # Error estimate of the reference, measured like `Row.error`, by label of the workload.
+    # Error estimate of the reference, relative as `Row.error`, by label of the workload.
     doubt: dict[str, float]
-    # A bound of this error, proved if possible.
+    # A bound on the reference's error, proved if possible.
     bounds: dict[str, ErrorBound] = field(default_factory=dict)
 
     @property
@@ -219,10 +219,9 @@ def error_of(end: End, truth: Reference, scale: float = 0.0) -> float | None:
 
 
 def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float | None:
-    """Return the error of omega divided by the largest component of `truth`.
+    """Return the error of omega, relative to the larger of `scale` (rad/s) and the true components.
 
-    The divisor is `scale` (rad/s) if that is larger. The result is None if the error is not finite,
-    or if the reference does not reach the end time.
+    The result is None if the error is not finite, or if the reference does not reach the end time.
     """
     if len(truth.omega) == 0:
         return None
@@ -239,8 +238,7 @@ def relative_error(omega: Array, truth: Reference, scale: float = 0.0) -> float 
 def ladder(contender: SceneContender, scene: Scene, horizon: float) -> Iterator[float]:
     """Yield a contender's settings, from coarse to fine.
 
-    Numbers of steps grow by the factors 3/2 and 4/3 in turn or, for orders up to 2, by the factor
-    2.
+    Numbers of steps grow alternately by the factors 3/2 and 4/3; for orders up to 2, by 2.
     """
     if contender.settings:
         yield from contender.settings
@@ -317,6 +315,6 @@ def _first_calls(
 
 
 def _at_rounding(errors: Sequence[float | None]) -> bool:
-    """Return whether `errors` no longer decrease, because of rounding."""
+    """Return whether `errors` no longer decrease because of rounding."""
     known = [error for error in errors if error is not None]
     return len(known) > 3 and min(known[-3:]) >= min(known[:-3]) and min(known) < 1e-10

@@ -62,9 +62,10 @@ def peers() -> list[SceneContender]:
 def heyoka_maker(
     scene: Scene, formula: Formula | None = None, *, variational: bool = False
 ) -> Maker:
-    """Return a maker of heyoka integrations, which has one integrator for each tolerance.
+    """Return a maker of heyoka integrations, with one compiled integrator for each tolerance.
 
-    Each run first resets time and state. `formula` is as in `heyoka_equations`.
+    `formula` is as in `heyoka_equations`; `variational` adds the derivatives of the solution with
+    respect to the initial state.
     """
     import heyoka
 
@@ -103,9 +104,9 @@ def heyoka_maker(
 
 
 def _problem(scene: Scene) -> tuple[RightHandSide, Sequence[float], Any]:
-    """Return right-hand side, start, and the ratio of absolute to relative tolerance.
+    """Return right-hand side, initial state, and the ratio of absolute to relative tolerance.
 
-    The ratio is a number, or an array with a number for each unknown.
+    The ratio is a number, or an array with one for each unknown.
     """
     is_free, largest = scene.attitude is None, max(map(abs, scene.omega)) or 1.0
     if isinstance(scene.torque, StateTorque):
@@ -219,7 +220,7 @@ def heyoka_functions() -> Functions[Any]:
 
 
 def numba_fixed(method: str, scene: Scene) -> Maker:
-    """Return a maker of a numba kernel for "rk4", or "dop8" (the method of order 8 in DOP853)."""
+    """Return a maker of numba integrations by "rk4" or "dop8" (the method of order 8 in DOP853)."""
     import numba
 
     formula: Tableau = RK4

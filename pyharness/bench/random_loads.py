@@ -1,8 +1,8 @@
 """Random scenes of several kinds, on which no method was tuned.
 
 Torques and frequencies scale with the initial angular velocity, so that they affect slow and fast
-bodies alike. A seed and a number determine a scene. It is accepted or drawn again depending on its
-motion, computed by the second reference (`integer_series`).
+bodies alike. A seed and a number determine a scene. The second reference (`integer_series`)
+computes its motion, on which it depends whether the scene is accepted or drawn again.
 """
 
 import math
@@ -33,7 +33,7 @@ BODIES: dict[str, Callable[[Random], list[float]]] = {
     "needle-like": lambda x: [low := x.uniform(0.01, 0.1), 1.0, 1.0 + low * x.uniform(0.0, 1.0)],
     "nearly symmetric": lambda x: [1.0, 1.0 + _log(x, 1e-6, 1e-2), x.uniform(0.2, 1.9)],
 }
-MOST_GROWTH = 1e3  # error amplification from which on a scene is not accepted
+MOST_GROWTH = 1e3  # scenes with this error amplification or more are not accepted
 _LENGTHS = {"1 to 10 turns": 10.0, "10 to 100 turns": 100.0, "100 to 300 turns": MOST_TURNS}
 KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 
@@ -41,7 +41,7 @@ KINDS = ("all", *LAWS, *SPEEDS, *BODIES, *_LENGTHS)
 def random_load(seed: str, number: int, attitude: bool = False) -> Workload:
     """Return the workload of a seed and a number, from 1.
 
-    Kinds of torque alternate with the number. A scene is drawn again if its error amplification is
+    The kind of torque changes with the number. A scene is drawn again if its error amplification is
     `MOST_GROWTH` or more, or if the body makes less than 1 or more than 300 revolutions. With
     `attitude`, the body is initially aligned with the axes of space, and the workload has no
     `truth`, because `integer_series` propagates no attitude.

@@ -1,6 +1,6 @@
 """The reports of `bench`: tables, notes, command and machine.
 
-A ratio is the run time of the baseline solver divided by that of another, at equal error.
+A ratio is the run time of the baseline solver divided by that of another solver, at equal error.
 """
 
 import math
@@ -40,10 +40,10 @@ _DRIFT = (
 def measured_report(
     title: str, worth: str, found: Report, packages: Iterable[str], command: str
 ) -> Report:
-    """Return the report of a benchmark with its page, machine and build.
+    """Return the report `found` of a benchmark, with machine and build added, and a Markdown page.
 
-    `title` is a Markdown heading, `worth` a sentence on how comparable the numbers are. The text of
-    `found` has titled tables followed by the notes. The versions of `packages` are listed;
+    `title` is the heading of the page, `worth` a sentence on how comparable the numbers are. The
+    text of `found` has titled tables followed by the notes. The versions of `packages` are listed;
     `command` repeats the benchmark.
     """
     here, built = machine(packages), build()
@@ -63,7 +63,7 @@ def measured_report(
 
 
 def grouped(reasons: Iterable[tuple[str, str, str]], most: int | None = None) -> list[str]:
-    """Return one line for each reason in `reasons`, tuples of contender, reason and task.
+    """Return lines on missing results from tuples of contender, reason and task.
 
     A line lists at most `most` tasks. Contenders with the same reason and tasks share a line.
     """

@@ -37,7 +37,7 @@ class Saving:
 def savings(t_end: float = 3.0, tolerance: float = 1e-9) -> list[Saving]:
     """Return the run times with and without each part that can be omitted.
 
-    The parts are the integration (replaced by a closed form), the torque as a function of time,
+    The parts are the integration (replaced by a closed form), the time dependence of the torque,
     dense output, the velocity, and the imports of SciPy and of the reference.
     """
     constant = case_scene(5)

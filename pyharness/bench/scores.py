@@ -1,4 +1,4 @@
-"""Scores: times to reach target errors, and ratios of the baseline's time to a contender's."""
+"""Scores: times to reach target errors, and ratios of the time of a baseline contender to them."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Score:
     # For each target error, the time (s) of the fastest setting that reaches it, or None.
     seconds: tuple[float | None, ...]
     best: float | None  # the smallest error of any setting
-    # Baseline's time divided by `seconds`: above 1 if this contender is faster.
+    # The baseline's times divided by `seconds`; above 1 where this contender is faster.
     ratios: tuple[float | None, ...]
 
 
@@ -31,10 +31,10 @@ class Spread:
 
     method: str
     kind: str
-    target: float  # as in `Row.error`
+    target: float  # error, as in `Row.error`
     scenes: int
     reached: int  # number of scenes where contender and baseline reach the error
-    mean: float | None  # geometric, over the scenes reached
+    mean: float | None  # geometric mean over these scenes
     smallest: float | None
     quartiles: tuple[float | None, float | None, float | None]
 

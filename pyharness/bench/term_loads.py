@@ -55,9 +55,9 @@ _PUSH = (0.05, 0.02, 0.1)
 
 @dataclass(frozen=True)
 class TermScene:
-    """A scene of the `kind` READY (ready-made torque) or EXPRESSION (recorded Python function).
+    """A scene whose torque is of the `kind` READY (ready-made) or EXPRESSION (recorded function).
 
-    `formula` is an independent implementation of a ready torque; None for an expression.
+    `formula` is an independent implementation of a ready-made torque; None for an expression.
     """
 
     kind: str
@@ -227,7 +227,7 @@ def term_methods(compiled: bool = False) -> list[SceneContender]:
 
 
 def term_peers(scenes: Sequence[TermScene]) -> list[SceneContender]:
-    """Return heyoka, also with variational equations, and DOP853, installed or not.
+    """Return heyoka, heyoka with variational equations, and DOP853, installed or not.
 
     heyoka computes a ready-made torque by its formula, and an expression from its tape.
     """

@@ -56,20 +56,20 @@ _LARGEST_PHASE = 1e15  # rad
 
 
 class Done(NamedTuple):
-    """A completed macro-step; its points are those of `Coordinates`."""
+    """A completed macro-step; a point is (p1, p2, p3, t), as in `Coordinates`."""
 
     start: Array  # shape (4,); the point at the start of the step
-    by_omega: Array  # shape (8, 3, 3); derivatives of the start by omega, at eight psi
+    by_omega: Array  # shape (8, 3, 3); d(p1, p2, p3)/d(omega) at the start, for eight angles psi
     error: Array  # shape (4,); error of the point at the end
-    transition: Array  # shape (4, 4); derivatives of the point at the end by that at the start
+    transition: Array  # shape (4, 4); d(point at the end)/d(point at the start)
 
 
 def estimates(
     coordinates: Coordinates, coefficients: Triple, done: Sequence[Done], omega: Array, angle: float
 ) -> tuple[float, float]:
-    """Return the largest error of omega (rad/s) and error amplification at the ends of macro-steps.
+    """Return the largest error of omega (rad/s), and the largest error amplification.
 
-    They are computed at the end of the last step and of up to four earlier ones.
+    Both are computed at the end of the last macro-step and of up to four earlier ones.
     """
     a, b, c = coefficients
     error, growth, count = 0.0, 1.0, len(done)
@@ -80,7 +80,7 @@ def estimates(
             angle = 0.0
         x, y, z = omega
         cosine, sine = np.cos([angle]), np.sin([angle])
-        # Derivatives of omega at the end by the point, and by the time at which it is reached.
+        # Derivatives of omega at the end with respect to the point, and to the time of the end.
         back = np.empty((3, 4))
         back[:, :3] = np.linalg.inv(coordinates.by_omega(omega[:, None], cosine, sine)[0])
         back[:, 3] = -a * y * z, -b * z * x, -c * x * y
@@ -99,12 +99,12 @@ def averaged(
 ) -> Trajectory:
     """Return the trajectory of a scene with a weak torque at `times` (s), by averaging.
 
-    In the result, `steps` counts macro-steps, and `error` is measured by a solution with more nodes
-    and a higher order of averaging. Raise InputError if the torque is opaque, depends on the
-    attitude, is not weak, or may be in resonance; if omega without torque would not circle a
+    In the result, `steps` counts macro-steps, and `error` is the difference from a solution with
+    more nodes and a higher order of averaging. Raise InputError if the torque is opaque, depends on
+    the attitude, is not weak, or may be in resonance; if omega without torque would not circle a
     principal axis, as for a sphere, or is near the separatrix; and if the work limit is exceeded. A
-    recorded torque must be a polynomial in omega and time, times waves, because a macro-step might
-    miss changes of another torque.
+    recorded torque must be a sum of polynomials in omega and time multiplied by sines and cosines
+    of time, because a macro-step might miss changes of another torque.
     """
     # The next macro-step refuses a point that is not finite.
     with np.errstate(all="ignore"):
@@ -273,7 +273,7 @@ class _Run:
         )
 
     def _angles(self, modulus: float) -> int:
-        """Return the number of angles for a squared elliptic modulus; raise TimedError near 1."""
+        """Return the number of nodes in psi for a squared modulus; raise TimedError near 1."""
         # The oscillation is analytic up to this distance from the real axis of the angle.
         width = math.acosh(1.0 / math.sqrt(min(1.0, max(modulus, 1e-4))))
         if width * _MOST_ANGLES < _DIGITS:

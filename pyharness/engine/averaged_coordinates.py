@@ -4,13 +4,13 @@ The body rotates about principal axis a; b and c are the next axes in cyclic ord
 equations are w_b' = P w_c w_a + n_b, w_c' = Q w_a w_b + n_c and so on, where n is the torque over
 the moment (rad/s2). The coefficients P and Q have opposite signs. Let x = |Q|^(1/2) w_b, y =
 +-|P|^(1/2) w_c, u = w_a^2, and let psi be the angle with psi' = |PQ|^(1/2) |w_a|. Without torque
-the motion is exactly 2 pi-periodic in psi:
+the motion is exactly 2 pi-periodic in psi, with a suitable sign of y:
 
     dx/dpsi = -y,  dy/dpsi = x,  du/dpsi = 2 k x y,  with a constant k.
 
 Therefore x + i y = (p1 + i p2) exp(i psi) and u = p3 + k y^2 with constant p1, p2 and p3, which a
 torque changes slowly. These coordinates need no elliptic function, and are regular at a rotation
-about axis a. They end at the separatrix, where w_a reaches 0.
+about axis a. They are not defined on the separatrix, where w_a reaches 0.
 """
 
 import math
@@ -89,7 +89,7 @@ class Coordinates(NamedTuple):
         return np.array([size, size, size * size, 1.0 / (self.rate * size)])
 
     def largest(self, point: Array) -> float:
-        """Return a bound of the components of omega (rad/s) without torque from the points on."""
+        """Return a bound on the components of omega (rad/s) in torque-free motion from points."""
         square = point[0] * point[0] + point[1] * point[1]
         on_axis = np.maximum(point[2], point[2] + self.bend * square).max()
         on_others = square.max() / min(abs(self.on_b), abs(self.on_c)) ** 2
@@ -176,11 +176,10 @@ class _Slot(NamedTuple):
 
 
 def fastest_of(torque: TorqueLaw | StateTorque) -> float:
-    """Return the highest frequency of the waves of a torque (rad/s).
+    """Return the highest frequency of the waves (sines and cosines of time) of a torque (rad/s).
 
-    Raise InputError unless a recorded torque is a polynomial, of degree 8 at most, times waves,
-    because a macro-step may miss other torques, such as a pulse, or an effect in a narrow range of
-    omega.
+    Raise InputError unless a recorded torque is a sum of polynomials, of degree 8 at most, times
+    waves: a macro-step may miss a pulse, or an effect in a narrow range of omega.
     """
     if isinstance(torque, TorqueLaw):
         return max((abs(f) for a, f in torque.sines + torque.cosines if any(a)), default=0.0)

@@ -1,7 +1,8 @@
 """One macro-step of the method `averaged`: the two-scale solution over very many revolutions.
 
-The unknowns v, the coordinates p1, p2, p3 and the time, depend on the fast angle psi, with period 2
-pi, and on the slow variable s = psi/length, from 0 to 1. The equation dv/dpsi = F(v, psi) becomes
+The unknowns v, the p1, p2, p3 of `averaged_coordinates` and the time, depend on the fast angle psi,
+with period 2 pi, and on the slow variable s = psi/length, from 0 to 1, where `length` (rad) is the
+angle of the step. The equation dv/dpsi = F(v, psi) becomes
 
     dv/dpsi + (1/length) dv/ds = F(v, psi).
 
@@ -9,11 +10,11 @@ Let V(s) be v at psi = 0, the stroboscopic solution, W = v - V the oscillation, 
 over psi. The equation is equivalent to
 
     V + <W> = V(0) + <W>(0) + length (integral of <F> over s from 0),
-    W = integral over psi, from 0, of F - (1/length) dW/ds, without their mean.
+    W = integral of G - <G> over psi from 0, where G = F - (1/length) dW/ds.
 
-Each sweep inserts V and W into the right-hand sides, and raises the order of averaging by one.
-Newton's method solves the first equation at all Chebyshev points (nodes) together. Two sweeps with
-more nodes and angles measure the error.
+A sweep inserts V and W into the right-hand sides, and raises the order of averaging by one. In it,
+Newton's method solves the first equation at all Chebyshev points (nodes) of s together. Two more
+sweeps, with more nodes and angles, measure the error.
 """
 
 from functools import lru_cache
@@ -122,9 +123,9 @@ class NotResolvedError(Exception):
 class MacroStep:
     """The solution over one macro-step.
 
-    `stroboscopic`, shape (4, nodes), has the points at psi = 0; their times are without the part
-    that is proportional to psi. `error` is the measured error of these points, and `modulus` their
-    largest squared elliptic modulus.
+    `stroboscopic`, shape (4, nodes), has V at the nodes; its times lack the part that is
+    proportional to psi. `error` is the measured error of V, and `modulus` the largest squared
+    elliptic modulus.
     """
 
     def __init__(
@@ -198,7 +199,7 @@ class MacroStep:
         )
 
     def _residual(self, mean: Array, waves: Array, slow: Slow, fast: Fast) -> tuple[Array, Array]:
-        """Return the residual of the equation for V, and the next W."""
+        """Return the residual of the first equation of the module, and the next W."""
         slopes = self._slopes(mean[..., None] + waves, fast, slow)
         right = self._start + (slopes @ fast.mean) @ (self.length * slow.integral.T)
         waves = (slopes - (slow.slope / self.length) @ waves) @ fast.integral
@@ -206,7 +207,7 @@ class MacroStep:
         return right + (offset[:, :1] - offset) - mean, waves
 
     def _linearise(self, mean: Array, few: Fast) -> Array:
-        """Set the matrices of Newton's method, and return the mean derivatives, (4, nodes)."""
+        """Set the matrices of Newton's method, and return the mean of F over psi, (4, nodes)."""
         n, count = self._n_unknowns, self._sizes[0]
         shift = _DIFFERENCE * self.scale[:n, None]
         shifted = np.repeat(mean[:, None], n + 1, axis=1)
@@ -231,7 +232,7 @@ class MacroStep:
         return found
 
     def _measured(self) -> Array:
-        """Return the error of V at the nodes, measured by two finer sweeps."""
+        """Return the error of V at the nodes, measured by two sweeps with more nodes and angles."""
         count, angles = self._sizes
         nodes, turns, back = _finer(count, angles)
         slow, fast = slow_nodes(count + _MORE_NODES), fast_nodes(angles + _MORE_ANGLES)
@@ -242,10 +243,7 @@ class MacroStep:
         return self._newton(residual @ back.T)
 
     def propagated(self, angle: float) -> tuple[Array, Array]:
-        """Return the error of V at an angle (rad), (4,), and the transition matrix.
-
-        The matrix, shape (4, 4), has the derivatives of V there by V at the start.
-        """
+        """Return, at an angle (rad), the error of V, (4,), and dV/dV(0), (4, 4)."""
         at = between_nodes(self._sizes[0], np.array([angle / self.length]))[0]
         found, n, count = np.eye(4), self._n_unknowns, self._sizes[0]
         responses = self._inverse.reshape(n, count, n, count).sum(axis=-1)

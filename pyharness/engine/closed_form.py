@@ -23,7 +23,7 @@ _MOST_ROWS = 16  # rows at which a larger amplification is computed
 
 
 def period_of(scene: Scene) -> float:
-    """Return the period of omega (s); 0 without one, under a torque or with a changing inertia."""
+    """Return the period of omega (s), or 0: without one, under a torque, for a changing inertia."""
     if scene.changing is not None or not scene.torque.is_zero:
         return 0.0
     bare = principal(scene)[0]
@@ -34,7 +34,10 @@ def period_of(scene: Scene) -> float:
 def _largest_estimate(
     scene: Scene, times: Sequence[float], noise: float
 ) -> tuple[float | None, float | None]:
-    """Return error and amplification at the last time; if large, their maxima over 16 rows."""
+    """Return error and amplification at the last time.
+
+    If the amplification is 1000 or more, return the maxima over 16 rows.
+    """
     error, growth = closed_form_estimate(scene, scene.omega, times[-1], noise)
     if error is None or growth is None or growth < _CALM:
         return error, growth
@@ -49,8 +52,8 @@ def known_solution(
 ) -> Trajectory:
     """Return the trajectory of a scene at `times` (s) from its closed form.
 
-    Raise InputError if there is no closed form, the work limit is exceeded, or the phase is above
-    1e15 rad.
+    Raise InputError if there is no closed form, the work limit is exceeded, or the phase of omega
+    is above 1e15 rad.
     """
     work = np.array([effort, 0.0])
     attitudes = None

@@ -58,7 +58,7 @@ def get_include() -> str:
 def check_call(
     scene: Scene, with_attitude: bool, omega0: object, t_end: object, third: object
 ) -> tuple[tuple[float, ...], float]:
-    """Return the initial state and `t_end` (s) from arguments that C does not accept."""
+    """Return the initial state and `t_end` (s) of a call whose arguments the C code refused."""
     start, time = three_floats("omega", omega0), number("t_end", t_end)
     if scene.changing is not None and math.isfinite(time):
         scene.changing.check([time])

@@ -22,9 +22,9 @@ from pyharness.model.trajectory import Trajectory
 def solution_of(
     scene: Scene, found: Trajectory, rows: dense.Rows, method: str, tolerance: float
 ) -> DenseOutput:
-    """Return the solution as a function of time, from time 0 to the rows of `found`.
+    """Return the solution as a function of time, from time 0 to the last row of `found`.
 
-    `rows` computes further rows by the same method.
+    `rows` computes the states at other times by the same method.
     """
     is_closed = not found.evaluations and method != "reference"
     return dense.dense_output(scene, found, rows, tolerance, METHODS[method].finest, is_closed)
@@ -42,7 +42,7 @@ def with_events(
 ) -> Trajectory:
     """Return a trajectory with its events, and without rows beyond a terminal event.
 
-    `ends` are the first and last requested times (s); `rows` computes further rows.
+    `ends` are the first and last requested times (s); `rows` is as in `solution_of`.
     """
     events = no_events(len(functions), len(found.y))
     if sol.t_min < sol.t_max:
@@ -76,7 +76,7 @@ def with_events(
 def _first_periods(
     found: Trajectory, rows: dense.Rows, tolerance: float, period: float
 ) -> Trajectory:
-    """Return the trajectory; beside time 0, more than six periods (s) are shortened to three."""
+    """Return the trajectory; if a side of time 0 has over six periods (s), only the first three."""
     ends = found.time[[0, -1]]
     last = PERIODS * period
     # For little more than three periods, repetition would save nothing.

@@ -1,7 +1,7 @@
-"""Dense output by Chebyshev polynomials through a method's results at their nodes.
+"""Dense output by polynomials through a method's results at Chebyshev points (nodes).
 
-Intervals are divided until the last coefficients are far below the tolerance. A closed form is
-evaluated directly instead.
+Intervals are divided until the last Chebyshev coefficients are far below the tolerance. A closed
+form is evaluated directly instead.
 """
 
 import itertools
@@ -55,7 +55,7 @@ class _Open:
 
     low: float
     high: float
-    tail: float = math.inf  # last coefficients of the polynomial on the longer interval
+    tail: float = math.inf  # size of the last coefficients of the polynomial on the longer interval
     whole: Pieces | None = None  # this polynomial
 
     def is_rough(
@@ -88,10 +88,10 @@ class _Solved:
 def dense_output(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float, is_closed: bool
 ) -> DenseOutput:
-    """Return the solution as a function of time from time 0 to the rows of `found`.
+    """Return the solution as a function of time from time 0 to the last row of `found`.
 
-    `rows` computes further rows, `finest` is the smallest tolerance of the method, and the
-    tolerance 1 means fixed steps. Raise InputError if more than 200 000 polynomials are needed.
+    `rows` computes the states at other times, `finest` is the smallest tolerance of the method, and
+    the tolerance 1 means fixed steps. Raise InputError if over 200 000 polynomials are needed.
     """
     ends = sorted({0.0, *found.time[[0, -1]].tolist()}) if len(found.time) else [0.0]
     states: Callable[[Array], Array]
@@ -105,10 +105,7 @@ def dense_output(
 def state_pieces(
     scene: Scene, found: Trajectory, rows: Rows, tolerance: float, finest: float
 ) -> Pieces:
-    """Return the solution as polynomials of time, from time 0 to the rows of `found`.
-
-    The arguments are as in `dense_output`.
-    """
+    """Return the solution as polynomials of time; the arguments are as in `dense_output`."""
     ends = sorted({0.0, *found.time[[0, -1]].tolist()})
     if tolerance == 1.0:
         return _of_fixed_steps(scene, ends, rows, partial(rates, scene))
@@ -154,7 +151,7 @@ def _first_edges(
 def _fitted(
     edges: list[float], rows: Rows, tolerance: float, own: list[float], rough: float, n_own: int
 ) -> Pieces:
-    """Return polynomials through the rows of a method on intervals that are divided as needed."""
+    """Return polynomials through a method's results; divide intervals where they are inaccurate."""
     # `own` are the tolerances of the rows, and `rough` is their largest error that is not smooth.
     open_pieces = [_Open(low, high) for low, high in itertools.pairwise(edges)]
     done: dict[float, tuple[float, Array]] = {}

@@ -37,8 +37,8 @@ _REFINED = Pieces(np.array([-1.0, 1.0]), np.eye(dense_output.NODES)[None])(POINT
 class Solution:
     """The solution of a scene whose events are searched.
 
-    `pieces` are its polynomials, `sol` its dense output, and `tolerance` is that of omega, 0 for a
-    fixed step.
+    `pieces` are the polynomials of the dense output `sol`, or approximate a closed form that `sol`
+    evaluates directly. `tolerance` is that of omega, 0 for a fixed step.
     """
 
     pieces: Pieces
@@ -46,7 +46,7 @@ class Solution:
     tolerance: float
 
     def states(self, times: Array) -> Array:
-        """Return omega, attitude and own states at n `times` (s), shape (n, m)."""
+        """Return omega, attitude and unknowns added by the user at n `times` (s), shape (n, m)."""
         return self.sol.normalized(self.pieces(times))
 
     @cached_property
@@ -57,7 +57,7 @@ class Solution:
 
     @cached_property
     def at_ends(self) -> tuple[Array, Array]:
-        """The times (s) of the ends, including 0, and the states."""
+        """The first and last time and time 0 (s), and the states at these times."""
         edges, (_, states) = self.pieces.edges, self.at_nodes
         times = np.array(sorted({edges[0], 0.0, edges[-1]}))
         # Time 0 is an edge.
@@ -71,17 +71,17 @@ class Solution:
         return g(times, states, rates)
 
     def exact_values(self, g: EventFunction, times: Array) -> Array:
-        """Return the values from the dense output, not the polynomials."""
+        """Return the values of an event's function for the states of `sol` instead of `pieces`."""
         return self.values(g, times, self.sol.normalized(self.sol.states(times)))
 
     def noise(self, g: EventFunction, times: Array) -> Array:
-        """Return the errors of a function due to errors of time, omega, attitude and rates."""
+        """Return the errors of a function's values due to errors of time, state and rates."""
         return self.values_and_noise(g, times)[1]
 
     def values_and_noise(
         self, g: EventFunction, times: Array, states: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Return values, their `noise`, and the part of the noise that is due to rounding."""
+        """Return a function's values, their `noise`, and the noise that is due to rounding."""
         states = self.states(times) if states is None else states
         n, width = states.shape
         # One call with all arguments: the state at a later time, the state itself, and the state
@@ -106,12 +106,15 @@ class Solution:
 
     @property
     def state_error(self) -> float:
-        """The error of the state, relative to its size, limited so that pairs of roots are seen."""
+        """The error of the state, relative to its size.
+
+        It is at most 1e-10, because a larger error would hide pairs of close roots.
+        """
         return max(ROUNDING, min(self.tolerance, _COARSEST))
 
     @cached_property
     def _sizes(self) -> Array:
-        """The sizes of the unknowns, by `sizes_of`, from time 0 to the end of each polynomial."""
+        """The sizes of the unknowns, by `sizes_of`, between time 0 and the end of a polynomial."""
         largest = np.abs(self.pieces.values).max(axis=1)
         count = np.searchsorted(self.pieces.edges[:-1], 0.0)
         for side in (largest[:count][::-1], largest[count:]):
@@ -120,7 +123,7 @@ class Solution:
 
 
 def fitted(g: EventFunction, solution: Solution) -> tuple[Fits, Roots]:
-    """Return polynomials through a function's values; where they do not converge, sign changes."""
+    """Return polynomials through a function's values, and sign changes where none converges."""
     edges = solution.pieces.edges
     low, high = edges[:-1], edges[1:]
     times, inner = solution.at_nodes
@@ -172,7 +175,7 @@ def _noise_of(g: EventFunction, solution: Solution, low: Array, high: Array) -> 
 def with_noise(
     g: EventFunction, solution: Solution, fits: Fits, needed: Index
 ) -> tuple[Fits, Roots]:
-    """Return the polynomials, with noise where they may be 0, and roots at ends of the solution."""
+    """Return `fits`, with the noise where a value may be 0, and roots at ends of the solution."""
     sizes, largest = fits.sizes, fits.sizes.max(initial=0.0)
     which = np.flatnonzero(needed | (sizes <= largest / _SUDDEN) | (sizes == largest))
     ends, states = solution.at_ends
@@ -205,8 +208,9 @@ def _sign_changes(times: Array, values: Array, first: Array) -> Roots:
 class ZeroIntervals:
     """The zero intervals of a function, from `low` to `high` (s), ascending.
 
-    Beside an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
-    the signs of the function on the two sides; 0 where it decays, and at the ends of the solution.
+    Near an interval, values below `noise` can't be distinguished from 0. `before` and `after` are
+    the signs of the function on its two sides: 0 if it decays to 0 there, and at an end of the
+    solution.
     """
 
     low: Array
@@ -218,7 +222,7 @@ class ZeroIntervals:
     def roots(self, counts_touches: bool) -> Roots:
         """Return a root for each interval, at the end that the integration from 0 reaches first.
 
-        Without `counts_touches`, only intervals with opposite signs on both sides have a root.
+        Without `counts_touches`, intervals with equal signs on both sides have no root.
         """
         is_before = self.high < 0.0
         is_first = (self.low <= 0.0) & ~is_before

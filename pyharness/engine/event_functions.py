@@ -36,9 +36,9 @@ _MORE_ARGUMENTS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 class Event:
     """An event of `pyharness.events`.
 
-    `function` takes time, omega, attitude (perhaps followed by own states) and the derivative of
-    omega. `terminal` and `direction` are as in `crosses`. With `counts_touches`, roots without a
-    sign change are events.
+    `function` takes time, omega, attitude (followed by the scene's own states, if any) and the
+    derivative of omega. `terminal` and `direction` are as in `crosses`. With `counts_touches`,
+    roots without a sign change are events.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Event:
 class EventFunction:
     """A checked event.
 
-    The event of number `limit` ends the integration; if `limit` is infinite, no event does.
+    The event with the number `limit`, from 1, ends the integration; infinity means that none does.
     `is_vectorized` is true if the function accepts arrays, None if that is not yet known.
     """
 
@@ -82,7 +82,7 @@ class EventFunction:
         return found
 
     def _of_arrays(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values for arrays, or None if the function does not accept arrays."""
+        """Return the values by one call with arrays, or None if the function accepts no arrays."""
         omega, attitude = states[:, :3].T.copy(), states[:, 3:].T.copy()
         rate = None if rates is None else rates.T
         try:
@@ -103,7 +103,7 @@ class EventFunction:
         return found
 
     def _is_confirmed(self, found: Array, times: Array, states: Array, rates: Array | None) -> bool:
-        """Return whether values agree with those of single calls at a few times."""
+        """Return whether `found` agrees with calls for single times, at nine times at most."""
         some = sorted({k * (len(times) - 1) // (_CHECKED - 1) for k in range(_CHECKED)})
         each = self._of_each(times[some], states[some], None if rates is None else rates[some])
         scale = _AGREEMENT * max(map(abs, each))
@@ -113,7 +113,7 @@ class EventFunction:
         )
 
     def _of_tape(self, times: Array, states: Array, rates: Array | None) -> Array | None:
-        """Return the values by a record of the function; None if it can't be recorded."""
+        """Return the values by a tape (recorded operations) of the function; None without one."""
         is_new = not self._tapes
         if is_new:
             self._tapes.append(self._recorded(states.shape[1]))

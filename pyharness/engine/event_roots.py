@@ -32,7 +32,7 @@ FIT_ERROR = 4e-13
 
 
 def _transforms() -> tuple[Array, Array, Array]:
-    """Return matrices for the coefficients of the derivative, of the left and of the right half."""
+    """Return matrices from coefficients to those of the derivative, and of both halves."""
     slope = np.zeros((NODES, NODES))
     slope[:-1] = chebyshev.chebder(np.eye(NODES))
     left = TO_COEFFICIENTS @ chebyshev.chebvander(0.5 * (POINTS - 1.0), NODES - 1)
@@ -65,10 +65,10 @@ def together(parts: list[C], order: str) -> C:
 
 @dataclass(frozen=True, eq=False)
 class Fits(_Columns):
-    """Polynomials on p intervals from `low` to `high` (s), with `coefficients`, (p, NODES).
+    """Chebyshev `coefficients`, (p, NODES), of a function on p intervals from `low` to `high` (s).
 
-    `first` and `last` are the function's values at `low` and `high`, equal at common ends of
-    intervals. Below the magnitude `noise`, the function can't be distinguished from 0.
+    `first` and `last` are the function's values at `low` and `high`; adjacent intervals have the
+    same value at their common end. Values below `noise` can't be distinguished from 0.
     """
 
     low: Array
@@ -89,10 +89,10 @@ class Fits(_Columns):
 class Roots(_Columns):
     """Candidates for roots at n times (s).
 
-    `change` is 1 for a sign change to positive in the order of time, -1 to negative, 0 for a touch.
-    `slope` and `curvature` are the first and second derivatives of the polynomial by time (s).
-    Values of the function below `noise`, and of the polynomial below `near`, can't be distinguished
-    from 0. The function remains 0 for `lasting` (s), negative before time 0.
+    With increasing time, `change` is 1 for a sign change to positive, -1 to negative, 0 for none.
+    `slope` and `curvature` are the first and second time derivatives of the polynomial. Values of
+    the function below `noise`, and of the polynomial below `near`, can't be distinguished from 0.
+    The function remains 0 for `lasting` (s), negative before time 0.
     """
 
     time: Array
@@ -105,7 +105,7 @@ class Roots(_Columns):
 
     @classmethod
     def bare(cls, time: Array, change: Index, noise: Any = 0.0, lasting: Any = 0.0) -> "Roots":
-        """Return roots with 0 in place of derivatives."""
+        """Return roots without derivatives, which are 0."""
         zeros = np.zeros(len(time))
         return cls(
             time, zeros.astype(int) + change, zeros, zeros, zeros + noise, zeros, zeros + lasting
@@ -230,7 +230,7 @@ def _bracketed(c: Array, low: Array, high: Array, sign: Array) -> Array:
 def _bent(
     rows: Index, *given: Array
 ) -> tuple[Array, Index, list[tuple[Array, Array, Index, Index]]]:
-    """Return extrema that are roots, their rows, and parts with one root."""
+    """Return the extrema that are roots, their rows, and the parts of intervals with one root."""
     c, first, last, slopes, near = (each[rows] for each in given)
     count = len(c)
     low, high = np.full(count, -1.0), np.ones(count)

@@ -45,7 +45,7 @@ def event_roots(g: EventFunction, solution: Solution) -> Roots:
 
 
 def _distinct(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
-    """Return the roots with the noise at their times, without extrema that are not near 0."""
+    """Return the roots, each with the noise at its time, without extrema that differ from 0."""
     if not roots.time.size:
         return roots
     value, noise, _ = solution.values_and_noise(g, roots.time)
@@ -75,7 +75,7 @@ def _polished(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _bisected(g: EventFunction, solution: Solution, times: Array, changes: Index) -> Array:
-    """Return the times of roots; inexact times of sign changes are refined by bisection."""
+    """Return the times (s) of roots; bisection refines the inexact times of sign changes."""
     # Near a root of odd multiplicity above 1, polynomials are inexact, but signs are not.
     edges = solution.pieces.edges
     bounds = np.concatenate([edges[:1], 0.5 * times[:-1] + 0.5 * times[1:], edges[-1:]])
@@ -114,7 +114,7 @@ def _merged(g: EventFunction, solution: Solution, roots: Roots) -> Roots:
 
 
 def _are_same(g: EventFunction, solution: Solution, roots: Roots) -> Index:
-    """Return which adjacent roots may be the same root."""
+    """Return which pairs of adjacent roots may be one root."""
     time = roots.time
     noise = np.maximum(roots.noise[:-1], roots.noise[1:])
     gap = np.diff(time)
@@ -150,7 +150,7 @@ def _grouped(roots: Roots, is_same: Index, ends: tuple[float, ...]) -> Roots:
 
 
 def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise: Array) -> Index:
-    """Return which adjacent roots are around an extremum that is 0 to within noise."""
+    """Return which pairs of adjacent roots enclose an extremum that is 0 to within noise."""
     found: Index = np.zeros(len(noise), dtype=bool)
     widest = np.sqrt(8.0 * roots.near / np.abs(roots.curvature))
     # A distant root belongs to another extremum, however flat the function is here.
@@ -167,7 +167,7 @@ def _have_one_extremum(g: EventFunction, solution: Solution, roots: Roots, noise
 def _with_extrema(
     g: EventFunction, solution: Solution, roots: Roots, ends: tuple[float, ...]
 ) -> Roots:
-    """Return the roots, with double roots moved to the extremum."""
+    """Return the roots, with each double root at the extremum of the polynomial."""
     if roots.change.all():
         return roots
     is_double = (roots.change == 0) & ~np.isin(roots.time, ends)
@@ -182,7 +182,7 @@ def _with_extrema(
 
 
 def _chosen(roots: Roots, group: Index, change: int, ends: tuple[float, ...]) -> int:
-    """Return the index of the root that replaces a group: at an end, or else in the middle."""
+    """Return the index of the root that replaces a group: one at an end, or else in the middle."""
     at_end = group[np.isin(roots.time[group], ends)]
     if at_end.size:
         return int(at_end[0])
@@ -218,7 +218,7 @@ def side_events(g: EventFunction, solution: Solution, roots: Roots, side: int) -
 def _repeated(
     g: EventFunction, solution: Solution, times: Array, side: int, period: float
 ) -> Array:
-    """Return the times of all events on one side of 0, repeated beyond the polynomials."""
+    """Return the times (s) of all events on one side of 0; those beyond the polynomials repeat."""
     last, end = solution.pieces.edges[-1], solution.sol.t_max
     if side < 0:
         last, end = solution.pieces.edges[0], solution.sol.t_min
@@ -254,7 +254,7 @@ def found_events(
 ) -> FoundEvents:
     """Return the events of several functions, without those beyond a terminal event.
 
-    With a period (s), events beyond the polynomials are repeated from those within.
+    If the motion has a `period` (s), the events beyond the polynomials repeat those within.
     """
     roots = [event_roots(g, solution) for g in functions]
     sides: dict[int, list[Array]] = {}

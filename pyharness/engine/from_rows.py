@@ -18,8 +18,8 @@ _MORE, _LESS = 0.25 + math.sqrt(3.0) / 6.0, 0.25 - math.sqrt(3.0) / 6.0
 def attitude_from_rows(scene: Scene, time: Array, omega: Array) -> Array:
     """Return the attitudes, shape (n, 4), at the times (s) of a table of omega (rad/s).
 
-    From row to row, there is one commutator-free step of order 4 (Celledoni, Marthinsen and Owren
-    2003), with omega at the Gauss points by cubic Hermite interpolation. After a rotation that
+    A commutator-free step of order 4 (Celledoni, Marthinsen and Owren 2003) leads from each row to
+    the next, with omega at the Gauss points by cubic Hermite interpolation. After a rotation that
     overflows, all attitudes are NaN.
     """
     times = np.concatenate([[0.0], time])

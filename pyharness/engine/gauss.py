@@ -1,4 +1,4 @@
-"""Methods with equal steps: Gauss collocation, and the methods of section III.2 of the thesis."""
+"""Methods with equal steps: Gauss collocation, and those of section III.2 of the thesis."""
 
 import math
 from collections.abc import Sequence
@@ -37,12 +37,12 @@ class _Solution(NamedTuple):
 def gauss(
     stages: int, scene: Scene, times: Sequence[float], tolerance: float, effort: float = 1.0
 ) -> Trajectory:
-    """Return the trajectory by Gauss collocation with 1 to 8 `stages`, halving steps as needed.
+    """Return the trajectory by Gauss collocation with 1 to 8 `stages`.
 
-    The order is twice the number of stages. The estimated error of the finer of two solutions is
-    2 d / (r**p - 1), with a safety factor of 2. Here d is their largest difference of omega, r <= 2
-    the ratio of their steps, and p the order, but at most 8: with the long steps of higher orders,
-    the error does not yet fall at the full order.
+    Steps are halved until the estimated error meets the tolerance. The estimate for the finer of
+    two solutions is 2 d / (r**p - 1), where 2 is a safety factor, d the largest difference of
+    omega, and r <= 2 the ratio of the steps. The exponent p is the order, twice the number of
+    stages, but at most 8, because long steps at higher orders do not show the full order yet.
     """
     given, most = normalized(scene), effort * _MOST_EVALUATIONS / (1.0 + 0.5 * waves(scene))
     if times[-1] == 0.0:
@@ -126,9 +126,10 @@ def gauss(
 def _blows_up(finer: _Solution, coarser: _Solution, start: float) -> bool:
     """Return whether two solutions end because omega grows without bound.
 
-    Both then end before the last time, nearly together. Let m be |omega| at the end. Either m
-    exceeds 1e300 rad/s in both; or the finer m exceeds 1.5 times the coarser, and this product
-    exceeds 1000 times `start` (rad/s) and every |omega| at a requested time.
+    Both then end before the last time, nearly together. Let m and n be the largest components of
+    omega at the end of the finer and the coarser solution. Either both exceed 1e300 rad/s; or m
+    exceeds 1.5 n, and 1.5 n exceeds 1000 times `start` (rad/s) and every component at a requested
+    time.
     """
     if COMPLETE in (finer.status, coarser.status):
         return False

@@ -49,7 +49,7 @@ def size() -> int:
 
 
 def about_leaves() -> dict[str, str | int]:
-    """Return the folder of compiled leaves, its size in bytes, and the compiler, or why not."""
+    """Return the folder of compiled leaves, its size in bytes, and the compiler or an error."""
     try:
         return {"folder": str(folder()), "bytes": size(), "compiler": " ".join(compiler())}
     except _FAILURES as error:
@@ -57,7 +57,7 @@ def about_leaves() -> dict[str, str | int]:
 
 
 def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
-    """Return the address of the scene's compiled leaves, or 0, and the text of `Solver.leaves`."""
+    """Return the address of the compiled leaves, 0 without any, and the text of `Solver.leaves`."""
     tape = system_of(with_constant_body(scene))
     if has_ready_leaves(tape):
         return 0, "built"
@@ -65,9 +65,9 @@ def leaves_for(scene: Scene, compiled: bool) -> tuple[int, str]:
 
 
 def leaves_of(tape: Tape) -> tuple[int, str]:
-    """Return the address of the compiled leaves of a tape and ``compiled``, or 0 and the reason.
+    """Return the address of a tape's compiled leaves and ``compiled``, or 0 and the reason.
 
-    If the folder has no leaves for this tape, they are compiled.
+    The leaves are compiled unless the folder has them.
     """
     shape = structure(listing(tape))
     if shape is None:
@@ -106,7 +106,7 @@ def compiler() -> tuple[str, ...]:
 
 @cache
 def machine() -> str:
-    """Return the compiler, its version and the processor, on which compiled code depends."""
+    """Return a text that differs for different compilers, flags and processors."""
     import platform
 
     file = os.stat(os.path.realpath(compiler()[0]))
@@ -123,7 +123,6 @@ def _key(text: str) -> str:
 
 
 def _is_safe(info: os.stat_result) -> bool:
-    """Return whether a file or folder is the user's, and nobody else may write it."""
     return info.st_uid == os.geteuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
@@ -134,7 +133,7 @@ def _files() -> Iterator[tuple[Path, os.stat_result]]:
 
 
 def _found(place: Path, key: str) -> Path | None:
-    """Return the file of a key; None if there is none that may be loaded."""
+    """Return the file of the leaves with this key; None if none may be loaded."""
     try:
         info = place.lstat()
     except OSError:
@@ -152,7 +151,7 @@ def _found(place: Path, key: str) -> Path | None:
 
 
 def compiled_file(place: Path, text: str) -> Path:
-    """Compile leaves, and return their file, which is moved to the folder when complete."""
+    """Compile leaves, and return their file, which enters the folder only when complete."""
     from tempfile import TemporaryDirectory
 
     place.mkdir(mode=0o700, parents=True, exist_ok=True)

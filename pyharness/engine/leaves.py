@@ -1,7 +1,7 @@
 """Compiled leaves: C code for the Taylor series and the Jacobian of a tape (recorded operations).
 
-They replace the interpreter, fortran/modern/tape_terms.c. Numbers are read from memory, so that
-tapes of one structure share their leaves.
+They replace the interpreter, fortran/modern/tape_terms.c. Numerical coefficients are read from
+memory, so that tapes that differ only in them share their leaves.
 """
 
 import re
@@ -169,7 +169,6 @@ def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str
 
 
 def _terms(tape: Structure, number: int) -> Iterator[tuple[int, int]]:
-    """Yield the index of the coefficient, and the slot, of each term."""
     begin = sum(map(len, tape.combinations[: number - 1]))
     yield from enumerate(tape.combinations[number - 1], begin)
 
@@ -252,7 +251,7 @@ def _kept(unknowns: range, k: str) -> Iterator[str]:
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the derivatives of the rates at the nodes."""
+    """Yield the function that computes the Jacobian of the rates at the nodes."""
     # By slot: the names of its derivatives, by unknown.
     by = {slot: {slot: "one"} for slot in _unknowns(tape)}
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"
@@ -308,7 +307,7 @@ def _slopes_of_combination(
 def _products(
     slopes: Iterable[tuple[int, str]], operation: _Listed, by: dict[int, dict[int, str]]
 ) -> dict[int, str]:
-    """Return derivatives of an operation by unknowns, from its slopes by the operands."""
+    """Return the derivatives of an operation with respect to the unknowns, by the chain rule."""
     parts = [
         (unknown, f"({_written(slope, operation)})*{name}")
         for slot, slope in slopes

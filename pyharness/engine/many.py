@@ -118,11 +118,11 @@ def solve_many(
         else the Taylor series.
     tolerance : float
         Largest allowed error of a component of omega, relative to the largest |omega| from time 0
-        to the end, and of the attitude, as an angle (rad). The default depends on the method.
+        to the end; and of the attitude, as an angle (rad). The default depends on the method.
     step : float, optional
         Step size of Gauss collocation and fixed-step methods, s. The default is the scene's.
     effort : float
-        Factor on the work limit of a body, beyond which its status is `gave up`.
+        Factor on the work limit of a body. Beyond the limit its status is `gave up`.
     estimates : bool
         Whether to return estimated errors and error amplifications.
     events : callable, Event, or list of these
@@ -325,7 +325,6 @@ def _solve_groups(
 
 
 def _choose_kernel(method: str, tolerance: Number | None) -> tuple[int, float]:
-    """Return the kernel's code of a method and the tolerance, or raise InputError."""
     finest = max(FINEST, REGISTRY[method].finest if method == "quick" else 0.0)
     asked = requested_tolerance(method, tolerance)
     if not finest <= asked <= 1.0:

@@ -1,7 +1,7 @@
 """Solution of bodies one by one: events, sensitivities, and scenes that the vector kernel refuses.
 
-The vector kernel can't solve scenes with a torque of the state or about the axes of space, or with
-a changing inertia.
+These scenes have a torque that depends on the state or is about the axes of space, or a changing
+inertia.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -150,7 +150,7 @@ def _lanes(
 ) -> tuple[Array, Array] | None:
     """Return packed equations and parameters of bodies, or None if one kernel call can't solve all.
 
-    Parameters of an invalid body are NaN, which the kernel refuses.
+    The parameters of an invalid body are NaN, so that the kernel refuses this body.
     """
     names = [name for name in rows if name.startswith(PARAMETER)]
     kind = next((name for name in ("moments", "coefficients") if name in rows), None)

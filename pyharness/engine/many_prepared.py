@@ -63,7 +63,7 @@ def many_starts(
 
 
 def times_within(scene: Scene, times: Array) -> Array:
-    """Return times (s); those after a changing moment reached 0 are NaN, which kernels refuse."""
+    """Return times (s), with NaN, which kernels refuse, beyond a time at which a moment is 0."""
     if scene.changing is None:
         return times
     first, last = scene.changing.span
@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    Single calls are for bodies whose error can't be measured; and for all bodies if the torque is
-    neither recorded nor in space, or if the inertia matrix is full.
+    Single calls solve bodies whose error the first way can't measure; and all bodies if the torque
+    is neither recorded nor in space, or the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:
@@ -142,9 +142,9 @@ def solve_lanes(
     packed: Array, parameters: Array, starts: Array, times: Array, turns: Array | None,
     found: Ensemble, piece: slice, given_up: NDArray[np.int32],
 ) -> list[int]:  # fmt: skip
-    """Solve bodies whose equations are a tape with `parameters`, (n, k) or (1, k), side by side.
+    """Solve bodies side by side, and return the indices of those that remain unsolved.
 
-    Return the indices of bodies that remain unsolved.
+    Their equations are a tape (recorded operations) with `parameters`, (n, k) or (1, k).
     """
     n = piece.stop - piece.start
     sets = parameters if len(parameters) < 2 else parameters[piece]

@@ -51,9 +51,9 @@ _SHAPES: dict[str, tuple[int, ...]] = {
 def about_principal(given: Mapping[str, Any]) -> tuple[dict[str, Any], Array, Array | None]:
     """Return the arrays of bodies with inertia matrices about principal axes, and these axes.
 
-    The arrays have A, B, C, because rounded moments would be less accurate; these are NaN if a
-    matrix is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3), and
-    also quaternions, (n, 4), if there are attitudes.
+    The arrays have A, B, C instead of moments, whose rounding would lose accuracy; A, B, C are NaN
+    if a matrix is not symmetric and positive definite. The axes are columns of matrices, (n, 3, 3),
+    and also quaternions, (n, 4), if there are attitudes.
     """
     rows = checked_rows({name: given[name] for name in given if name not in BODIES})
     own = {"inertia": rows_of("inertia", given["inertia"], 3, 3)}
@@ -143,9 +143,9 @@ def keep_with(scene: Scene, key: tuple[Any, ...], make: Callable[[], Any]) -> An
 
 
 def rows_of_scene(scene: Scene) -> dict[str, Any]:
-    """Return the shared, read-only `checked_rows` of a scene, with its `merged` torque.
+    """Return the cached `checked_rows` of a scene with its `merged` torque; callers only read them.
 
-    They are cached, because for few bodies their conversion takes longer than the solution.
+    For few bodies the conversion would take longer than the solution.
     """
 
     def convert() -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Sensitivities: the derivatives of a solution with respect to parameters, by Taylor series.
 
-For scenes whose rates jump, or that have states of their own, they are central differences with
-decreasing steps, extrapolated (Ridders 1982). A perturbation then moves the time of a switch, which
-linearised equations leave out.
+For scenes whose rates jump at a switch, or that have states of their own, they are extrapolated
+from central differences with decreasing steps (Ridders 1982): linearised equations would leave out
+that a parameter moves the time of a switch.
 """
 
 import itertools
@@ -105,9 +105,9 @@ def sensitivities_at(
 ) -> dict[str, Array]:
     """Return the derivatives with respect to each parameter, (n, k, m) for k unknowns, m values.
 
-    `states` returns the unknowns of a changed scene at the times. The tolerance is relative to the
-    largest derivative in a column so far. Raise InputError if the work limit is exceeded, or a
-    derivative overflows.
+    `states` returns the unknowns of a changed scene at the n times of `found`. The tolerance is
+    relative to the largest derivative, so far, with respect to the same value. Raise InputError if
+    the work limit is exceeded, or a derivative overflows.
     """
     if not names:
         return {}
@@ -140,7 +140,7 @@ def _by_series(
     scene: Scene, names: Sequence[str], attitude: bool, times: Array, tolerance: float,
     effort: float,
 ) -> tuple[dict[str, slice], Array, Array]:  # fmt: skip
-    """Return the columns by name, the derivatives, (n, 3 or 7, m), and their values at time 0."""
+    """Return columns by parameter, the derivatives, (n, 3 or 7, m), and their values at time 0."""
     equations = varied_equations(scene, names, attitude)
     state, starts = initial_state(scene, equations)
     packed = kernel_tape(equations.tape, len(state))
@@ -186,7 +186,7 @@ def _slope(scene: Scene) -> Array:
 def _by_periods(
     scene: Scene, names: Sequence[str], times: Array, period: float, tolerance: float, effort: float
 ) -> tuple[dict[str, slice], Array]:
-    """Return the columns by name, and the derivatives of a periodic omega, (n, 3, m)."""
+    """Return columns by parameter, and the derivatives of a periodic omega, (n, 3, m)."""
     # A perturbation of the initial omega changes the period, and thus grows by the same multiple of
     # the slope of omega in every period. Therefore the state-transition matrix of one period is M =
     # I + N, where N has rank 1 and N N = 0, and that of k periods M^k = I + k N (Floquet). The part
@@ -215,7 +215,7 @@ def _by_periods(
 
 
 def _extrapolate(name: str, moved: Callable[[float], Scene], size: float, states: States) -> Array:
-    """Return the derivative of the states by one number, (n, m), by Ridders' method."""
+    """Return d(states)/d(number), (n, m), by Ridders' method; `moved` changes the number."""
     best, least, largest = np.zeros((0, 0)), np.inf, 0.0
     row: list[Array] = []
     for level in range(_LEVELS):

@@ -1,4 +1,4 @@
-"""Parameters of a scene, and partial derivatives of its equations of motion by them."""
+"""Parameters of a scene, and the derivatives of its equations of motion with respect to them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -36,9 +36,9 @@ class VariedEquations(NamedTuple):
     """The equations of motion of a scene, and how they depend on parameters.
 
     The outputs of `tape` are the partial derivatives of the rates, then the rates. Each value of a
-    parameter has a column; `columns` has the columns by name. `forcings`, shape (n, m), has for
-    each of n rates and m columns the number, from 1, of the output with this partial derivative, or
-    0 if the derivative is 0.
+    parameter has a column; `columns` has a parameter's columns by its name. An element of
+    `forcings`, for n rates and m columns, is the number, from 1, of the output with the partial
+    derivative of the rate with respect to the value, or 0 if the derivative is 0.
     """
 
     tape: Tape
@@ -65,7 +65,7 @@ def parameters_of(scene: Scene) -> dict[str, list[float] | None]:
 
 
 def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> VariedEquations:
-    """Return the equations of motion with their derivatives by the named parameters."""
+    """Return the equations of motion, and their derivatives with respect to the parameters."""
     body = scene.moments, scene.coefficients, scene.inertia, scene.changing
     known = parameters_of(scene)
     values = tuple((name, tuple(known.get(name) or ())) for name in names)
@@ -73,7 +73,7 @@ def varied_equations(scene: Scene, names: Sequence[str], attitude: bool) -> Vari
 
 
 def check_values(scene: Scene, names: Iterable[str]) -> None:
-    """Raise InputError unless each of `names` is a parameter of the torque that is one number."""
+    """Raise InputError unless each of `names` is a parameter of the torque with a single value."""
     known = {
         name.removeprefix(TORQUE): values
         for name, values in parameters_of(scene).items()
@@ -121,8 +121,8 @@ def tape_of_bodies(
 ) -> Tape:  # fmt: skip
     """Return one tape of the equations of motion for bodies that differ in parameters.
 
-    The parameters are further inputs: A, B, C and the reciprocal moments, unless `body` has them
-    for all bodies, and the torque's parameters `names`.
+    Further inputs of the tape are A, B, C and the reciprocal moments, unless `body` has them for
+    all bodies; and the torque's parameters `names`.
     """
     n_body = 0 if body else 6
     recorder = Recorder(n_inputs=N_INPUTS + n_body + len(names))
@@ -143,7 +143,7 @@ def tape_of_bodies(
 
 
 def initial_state(scene: Scene, equations: VariedEquations) -> tuple[Array, Array]:
-    """Return the state at time 0, (n,), and its derivatives by m parameters, (n, m)."""
+    """Return the state at time 0, (n,), and its derivatives with respect to m values, (n, m)."""
     n, m = equations.forcings.shape
     start = scene.attitude or IDENTITY
     state = np.array([*scene.omega, *start])[:n]
@@ -182,7 +182,7 @@ def _equations(
         if attitude:
             rates += quaternion_rates((omega[0], omega[1], omega[2]), q)
         tape = with_parameters(recorder.tape(rates), flat)
-    # The derivatives of one rate by all parameters are adjacent outputs.
+    # The derivatives of one rate with respect to all parameters are adjacent outputs.
     forcings, columns = [], {}
     parameter = first = 0
     for name, listed in values:

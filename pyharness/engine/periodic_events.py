@@ -21,7 +21,7 @@ _MARGIN = 1e-6
 
 
 def are_of_omega(functions: Sequence[EventFunction]) -> bool:
-    """Return whether all functions can be recorded and depend on omega and its rate alone."""
+    """Return whether all functions can be recorded, and depend on omega and its rate alone."""
     return all(map(_is_of_omega, functions))
 
 
@@ -37,10 +37,10 @@ def _is_of_omega(g: EventFunction) -> bool:
 
 
 def repeated(times: Array, period: float, end: float, where: str) -> tuple[Array, int]:
-    """Return the times of events until `end` (s), and how many are not repetitions.
+    """Return the times (s) of events until `end`, and how many of them are not repetitions.
 
-    `times` (s) are the events of the first PERIODS periods. Raise InputError for more than
-    5 000 000 events.
+    `times` (s) are the events of the first PERIODS periods. Raise InputError, which begins with
+    `where`, for more than 5 000 000 events.
     """
     # An event at the end of a period may be found on either side of it.
     margin = _MARGIN * period

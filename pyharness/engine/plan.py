@@ -1,4 +1,4 @@
-"""The choice of the method and of the computed quantities."""
+"""The choice of a scene's method, and of the quantities to compute."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -85,7 +85,7 @@ def plan(
 def chosen_method(
     scene: Scene, form: str | None, tolerance: float, rows: bool
 ) -> tuple[str, str | None]:
-    """Return the method for a scene with a closed form or None, and its fallback."""
+    """Return the method for a scene, and its fallback; `form` is the kind of its closed form."""
     # A perturbation of a rotation about the middle axis may be so small that its square, which
     # the closed form needs, underflows. The Taylor series can propagate it.
     if form:

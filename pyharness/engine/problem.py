@@ -1,7 +1,7 @@
 """Conversion of scenes to arguments of the Fortran kernels, and of their results.
 
-A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines, whose
-columns are three amplitudes (rad/s2) and the frequency (rad/s).
+A torque over moments is four arrays: constant (rad/s2), rate (rad/s3), sines and cosines; a column
+of the last two has three amplitudes (rad/s2) and a frequency (rad/s).
 """
 
 import math

@@ -67,10 +67,10 @@ def outputs_at(tape: Tape, times: Array, state: Array) -> Array:
 def system_of(scene: Scene, attitude: bool | None = None) -> Tape:
     """Return the equations of motion of a scene with principal axes as a tape.
 
-    The outputs are the rates of omega by equations 16-18 of the thesis; if `attitude`, the rates of
-    the quaternion, q' = q (0, omega)/2; and the rates of the scene's own states. `attitude` is by
-    default true if the scene has an attitude. The inputs are the time and the unknowns in this
-    order. Raise InputError for an opaque torque.
+    The outputs are the rates of omega by equations 16-18 of the thesis; if `attitude` (by default:
+    if the scene has one), those of the quaternion, q' = q (0, omega)/2; and those of the scene's
+    own states. The inputs are the time and the unknowns in this order. Raise InputError for an
+    opaque torque.
     """
     torque = scene.torque
     if not isinstance(torque, StateTorque) or torque.tape is None:
@@ -113,9 +113,10 @@ def is_recorded(scene: Scene) -> bool:
 
 
 def slopes_of(scene: Scene) -> Callable[[float, Sequence[float]], list[float]]:
-    """Return the right-hand side f(t, state) under a torque of the state; NaN where singular.
+    """Return the right-hand side f(t, state) for a torque that depends on the state.
 
-    The state is omega (rad/s), with or without the quaternion.
+    The state is omega (rad/s), with or without the quaternion. The values of f are NaN where the
+    torque is singular.
     """
     torque = scene.torque
     assert isinstance(torque, StateTorque)
@@ -253,8 +254,8 @@ def packed_scene(
 ) -> Array:
     """Return a scene and its method's settings as one array, in the order of `Places`.
 
-    `leaves` is the address of a tape's compiled leaves; 0 if they were built with the package, or
-    there are none.
+    `leaves` is the address of the code compiled for a tape; 0 if this code was built with the
+    package, or there is none.
     """
     packed = _settings(code, scene.step_size, tolerance, effort)
     if code == Methods.TAPE:
@@ -294,8 +295,8 @@ def _settings(code: int, step_size: float, tolerance: float, effort: float) -> A
 class Step(NamedTuple):
     """A step of length `h`, 0 if no step is short enough.
 
-    `terms`, shape (order + 1, n), include powers of `h`; `state`, shape (n,), is their sum.
-    `expansions` is the number of series computed.
+    `terms`, shape (order + 1, n), are Taylor coefficients times powers of `h`; `state`, shape (n,),
+    is their sum. `expansions` is the number of series computed.
     """
 
     h: float
@@ -315,9 +316,9 @@ def taylor_step(
 ) -> Step:
     """Return a step of the equation y' = tape(t, y) from the time `t` and the state, shape (n,).
 
-    `tolerances`, shape (n,), are the largest errors of the components; the relative tolerance
-    determines the order. `trial` is a guess of the step, with the sign of the `longest` step. Raise
-    InputError where a switch would change back and forth without end.
+    `tolerances`, shape (n,), are the largest errors of the components; `relative`, a relative
+    tolerance, determines the order. `trial` is a guess of the step, with the sign of the `longest`
+    step. Raise InputError where a switch would change back and forth without end.
     """
     h, terms, end, order, expansions, status = extension().tape_step(
         tape, t, state, tolerances, relative, trial, longest, Storage.PERTURBATION_LENGTH

@@ -152,7 +152,7 @@ def _picture(title: str, trajectory: Trajectory, numbers: Table) -> Picture:
 
 
 def mark_end(axes: "Axes", trajectory: Trajectory, row: int) -> None:
-    """Draw a cross at the last omega of a component, or at the edge of the axes if outside."""
+    """Draw a cross at a component's last omega, or at the edge of the diagram if that is beyond."""
     bottom, top = axes.get_ylim()
     axes.plot(trajectory.time[-1:], np.clip(trajectory.omega[-1:, row], bottom, top), **_END)
     axes.set_ylim(bottom, top)
@@ -178,7 +178,10 @@ def plan_report(scene: Scene, plan: "Plan") -> Report:
 
 
 def trajectory_bound(scene: Scene, found: Trajectory, effort: float = 1.0) -> "ErrorBound | None":
-    """Return the proved or estimated error of a trajectory by `reference`; None if not finite."""
+    """Return a bound on the error of a trajectory by `reference`, proved or estimated.
+
+    It is None if not finite.
+    """
     from pyharness.truth.bounded import error_bound
 
     start = None if found.attitude is None else scene.attitude or IDENTITY

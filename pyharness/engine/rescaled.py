@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # The exponents of rescaled time are multiples of this number, so that nested square roots have
 # whole exponents.
 _MULTIPLE = 16
-_SAMPLES = 9  # times at which a torque of the state is evaluated
+_SAMPLES = 9  # times at which a torque that depends on the state is evaluated
 # Omega (rad/s) up to which, and above whose inverse, products of components keep their digits.
 _LARGE = 2.0**300
 
@@ -96,9 +96,9 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    It allows for the omega that the torque may cause until `time` (s); this omega is a bound, or an
-    estimate for a torque of the state. The factor is 1 if no rescaling is needed or possible, as
-    for an opaque torque.
+    Omega is the larger of the initial one and of that which the torque may cause until `time` (s):
+    a bound, or for a torque that depends on the state an estimate. The factor is 1 if no rescaling
+    is needed or, as for an opaque torque, possible.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -127,7 +127,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound of omega (rad/s) from rest until `time` (s), without gyroscopic torques."""
+    """Return a bound on omega (rad/s) from rest until `time` (s), without gyroscopic torques."""
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:
@@ -148,7 +148,7 @@ def omega_by_torque(scene: Scene, time: float) -> float:
 
 
 def _omega_by_state_torque(scene: Scene, time: float) -> float:
-    """Return an estimate of |omega| (rad/s) by a torque of the state until `time` (s)."""
+    """Return an estimate of the |omega| (rad/s) that the torque causes until `time` (s)."""
     torque, moments = scene.torque, scene.moments or (1.0, 1.0, 1.0)
     assert isinstance(torque, StateTorque)
     if torque.tape is None:

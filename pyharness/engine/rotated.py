@@ -18,9 +18,9 @@ from pyharness.model.trajectory import Array
 def rotated(scene: Scene, turn: Callable[[Triple], Triple], body: bool) -> Scene:
     """Return the scene with the function `turn` applied to omega and to all vectors of the torque.
 
-    If `body` is true, `turn` is applied to the moments too. Attitude, and a torque about the axes
-    of space, are kept. For a torque of the state, `turn` must be a rotation. Raise InputError if
-    the inertia changes with time.
+    If `body` is true, `turn` is applied to the moments too. The attitude, and a torque about the
+    axes of space, are kept. If the torque depends on the state, `turn` must be a rotation. Raise
+    InputError if the inertia changes with time.
     """
 
     def waves(each: tuple[Wave, ...]) -> tuple[Wave, ...]:
@@ -75,8 +75,8 @@ def restarted_at(
 ) -> Scene:
     """Return the scene whose time 0 is the time `by` (s) of `scene`.
 
-    `omega` (rad/s) and `attitude`, by default the initial one, are the state at that time. Raise
-    InputError if the torque is opaque, or needs an attitude and `attitude` is None.
+    `omega` (rad/s) and `attitude` are the state at that time; without `attitude`, the initial one
+    is kept. Raise InputError if the torque is opaque, or needs an attitude and `attitude` is None.
     """
     first, second, third = (float(w) for w in omega)
     torque = scene.torque

@@ -1,7 +1,7 @@
 """The methods of `scipy.integrate.solve_ivp`; SciPy is imported when one of them is first used.
 
-SciPy controls the local error of a step; our tolerance limits the error at the requested times.
-Local errors add up in proportion to the phase. The local tolerance therefore follows from the
+SciPy controls the local error of a step; our tolerance limits the error at the requested times, to
+which local errors add up in proportion to the phase. The local tolerance therefore follows from the
 largest |omega|, the error amplification and the phase of a preliminary integration with few digits.
 """
 
@@ -59,14 +59,17 @@ _RADAU_SHARE = 2
 
 class _Ahead(NamedTuple):
     largest: float  # largest abs(omega) of any component from 0 to the end, rad/s
-    # Integral of the largest coefficient times |omega| over time, plus limited phases of waves
-    radians: float  # rad
+    # Phase (rad): integral of the largest coefficient times |omega|, plus limited phases of waves.
+    radians: float
     growth: float  # error amplification until the end, at least 1
-    turned: float = 0.0  # radians by which the body rotates, if its attitude is requested
+    turned: float = 0.0  # rad by which the body rotates, if its attitude is requested
 
 
 def steps_sum(name: str, radians: float, growth: float, turned: float = 0.0) -> float:
-    """Return a bound of the ratio of the error at the end to the local error; angles in rad."""
+    """Return a bound on the ratio of the error at the end to the local error.
+
+    The arguments are those of `_Ahead`.
+    """
     found = _SUM[name] + _SUM_A_RADIAN[name] * radians * min(growth, _SENSITIVE)
     return found + _SUM_A_TURN[name] * turned * min(growth, _SENSITIVE)
 
@@ -164,7 +167,6 @@ def with_attitude(slopes: RightHandSide) -> RightHandSide:
 
 
 def _most(name: str, effort: float) -> float:
-    """Return the work limit, in right-hand sides, for a torque without waves."""
     return effort * _MOST_EVALUATIONS / (_RADAU_SHARE if name == "Radau" else 1)
 
 
@@ -176,13 +178,13 @@ class _Run(Run):
         super().__init__(scene.omega, scene.right_hand_side(), rate, end, name, effort, most)
 
     def _scale_by_torque(self) -> float:
-        """Return a bound of |omega| (rad/s) by the torque alone; 1 if not finite."""
+        """Return a bound on the |omega| (rad/s) that the torque alone causes; 1 if not finite."""
         bound = omega_by_torque(self.scene, self.end)
         return bound if math.isfinite(bound) else 1.0
 
     @np.errstate(over="ignore", invalid="ignore")
     def ahead(self) -> _Ahead:
-        """Integrate with few digits, and return the quantities that set the local tolerance."""
+        """Integrate with few digits; return the quantities that determine the local tolerance."""
         # The absolute tolerance is relative to an estimate of the largest |omega|, which may be far
         # too large for a body at rest.
         scale = max(map(abs, self.scene.omega)) or self._scale_by_torque()

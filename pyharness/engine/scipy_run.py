@@ -56,8 +56,8 @@ class NoNumberError(Exception):
 class Run:
     """The integrations of one problem from 0 to `end` (s) by `solve_ivp`, with one work limit.
 
-    The limit is `most` right-hand sides. The state begins with omega (rad/s). The phase (rad) is
-    the largest Euler coefficient, `rate`, times omega and time.
+    The limit is `most` right-hand sides. The first components of the state are omega (rad/s). The
+    phase (rad) is `rate`, the largest Euler coefficient, times omega and time.
     """
 
     def __init__(
@@ -93,8 +93,8 @@ class Run:
     ) -> Any:
         """Return SciPy's result by its method `name`.
 
-        It has dense output if `with_steps`, or without `times`. The times in the result are in
-        units of `self.unit` seconds, those in the arguments in s. Raise NoNumberError if Radau's
+        The result has dense output if `with_steps` is true or `times` are None. Its times are in
+        units of `self.unit` seconds, those of the arguments in s. Raise NoNumberError if Radau's
         linear algebra refuses a number, or the time is NaN.
         """
         from scipy.integrate import solve_ivp
@@ -168,7 +168,10 @@ class Run:
 def rows_of(
     times: Sequence[float], rows: Array, evaluations: int, steps: int, ended: str
 ) -> Trajectory:
-    """Return a trajectory from omega, (n, 3), or with an attitude of any norm, (n, 7)."""
+    """Return a trajectory from rows of omega, (n, 3), or omega and a quaternion, (n, 7).
+
+    Quaternions are normalised.
+    """
     attitude = None
     if rows.shape[1] > 3:
         attitude = rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
@@ -183,14 +186,14 @@ class Span(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """The rows of a Taylor series, and spans with limits on SciPy's steps."""
+    """The results of the Taylor series, and the limits that they set on SciPy's steps."""
 
     rows: Array  # shape (n, 3) or (n, 7)
     spans: list[Span]
 
 
 def bounds_of(scene: Scene, end: float) -> list[float]:
-    """Return the times (s) between 0 and `end` at which a table or switch changes, and `end`.
+    """Return `end`, and the times (s) between 0 and `end` at which a table or switch changes.
 
     Raise InputError where a switch would change back and forth without end.
     """

@@ -87,13 +87,13 @@ def solve_state(
     """Return the trajectory of a scene whose torque depends on the state, by SciPy's method `name`.
 
     The error at `times` (s), estimated from two integrations, is at most `tolerance`. `most` is the
-    work limit in right-hand sides of a body without torque. With `with_steps`, and under an opaque
-    torque, `sol` of the result has the steps, by SciPy's interpolants.
+    work limit, as a number of right-hand sides of a body without torque. If the torque is opaque
+    and `with_steps` is true, `sol` of the result has the steps, by SciPy's interpolants.
 
     The ending is ``overflow`` if omega grows without bound or the torque is singular, ``unchecked``
-    if the series of a recorded torque does not reach the end. Raise InputError if an opaque
-    function fails, the attitude is missing, the tolerance can't be met, or the work limit is
-    exceeded.
+    if the Taylor series of a recorded torque, which checks the result, does not reach the end.
+    Raise InputError if an opaque function fails, the attitude is missing, the tolerance can't be
+    met, or the work limit is exceeded.
     """
     run = _StateRun(scene, times[-1], name, effort, most)
     run.with_steps = with_steps and not run.is_smooth
@@ -124,7 +124,10 @@ def solve_state(
 
 
 def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
-    """Return the estimated smallest tolerance until `time` (s); 0 if `time` is not reached."""
+    """Return an estimate of the smallest tolerance that can be met until `time` (s).
+
+    It is 0 if the integration does not reach `time`.
+    """
     run = _StateRun(scene, time, name, 1.0, most)
     scale = 0.0 if run.is_singular() else run.expected_omega()
     if scale == 0.0:
@@ -136,7 +139,7 @@ def finest_of_state(name: str, scene: Scene, time: float, most: float) -> float:
 
 
 def _refined(run: "_StateRun", times: Sequence[float], tolerance: float) -> _Rows:
-    """Return rows whose estimated error is at most `tolerance`, or raise InputError."""
+    """Return states at `times` (s) whose estimated error meets `tolerance`, or raise InputError."""
     scale = run.expected_omega()
     if scale == 0.0:
         # The body is at rest, and no torque acts.
@@ -246,7 +249,7 @@ class _StateRun(Run):
     def _guarded(self, slopes: RightHandSide) -> RightHandSide:
         """Return a right-hand side that evaluates tables only inside the current span.
 
-        It raises InputError if an opaque function fails.
+        The right-hand side raises InputError if an opaque function fails.
         """
 
         def between(time: float, state: Sequence[float]) -> list[float]:
@@ -279,7 +282,6 @@ class _StateRun(Run):
             return np.array(self.slopes(time, state))
 
     def _check_memory(self) -> None:
-        """Raise InputError if an opaque function returns different values for the same state."""
         self._undefined = None
         first = self._rates(0.0, self.start)
         self._rates(0.5 * self.end, [1.5 * each for each in self.start])
@@ -299,7 +301,7 @@ class _StateRun(Run):
 
     @np.errstate(all="ignore")
     def _jumps(self) -> bool:
-        """Return whether the rates jump near the last state."""
+        """Return whether the right-hand side jumps near the last state."""
         time, low = self._last[0] * self.unit, self._last[1]
         first = self._rates(time, low.tolist())
         high = low + _AHEAD * abs(self.end) * first
@@ -324,7 +326,7 @@ class _StateRun(Run):
             )
 
     def after_step(self, time: float, state: Sequence[float]) -> None:
-        """Record the step; raise NoNumberError if too many steps do not change the time (s)."""
+        """Record the step; raise NoNumberError if 50 steps in succession do not change the time."""
         self._stuck = self._stuck + 1 if time == self._reached else 0
         if self._stuck > _MOST_STUCK:
             raise NoNumberError
@@ -341,7 +343,7 @@ class _StateRun(Run):
         return not np.isfinite(self._rates(0.0, self.start)).all()
 
     def expected_omega(self) -> float:
-        """Return the largest |omega| (rad/s) to few digits, or a guess if rows are missing."""
+        """Return the largest |omega| (rad/s) to few digits; a guess if the end is not reached."""
         scale = max(map(abs, self.start[:3])) or self._pushed()
         for _ in range(_MOST_GUESSES):
             found = self.rows([self.end], _COARSE, scale)

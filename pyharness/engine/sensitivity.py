@@ -32,7 +32,10 @@ _LITTLE_WORK = 5e-3
 
 
 def is_sensitive(growth: float | None, tolerance: float, noise: float = 0.0) -> bool:
-    """Return whether unit roundoff times `growth` times (1 + `noise`) exceeds 0.3 tolerances."""
+    """Return whether 2**-53 times `growth` times (1 + `noise`) exceeds 0.3 times the tolerance.
+
+    `growth` is the error amplification, `noise` the result of `torque_noise`.
+    """
     return growth is not None and ROUNDING * growth * (1.0 + noise) > _SHARE * tolerance
 
 
@@ -41,9 +44,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    It is the omega that each term would cause alone until `t_end` (s), with rounding in each of
-    `steps` steps, over `scale` (rad/s): by default the initial |omega|, or the omega that the whole
-    torque causes. It is 0 if terms do not nearly cancel, or depend on the state.
+    It is the omega that each term alone would cause until `t_end` (s), with rounding in each of
+    `steps` steps, over `scale` (rad/s). By default, the scale is the initial |omega| or the omega
+    that the whole torque causes. The result is 0 if no terms nearly cancel, or if the torque
+    depends on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0
@@ -55,7 +59,7 @@ def torque_noise(
 
 
 def growth_of_rounding(scene: Scene, growth: float | None) -> float | None:
-    """Return the factor by which rounding affects a closed form with this error amplification."""
+    """Return the factor by which a closed form with this error amplification amplifies rounding."""
     if growth is None or growth >= _NEGLIGIBLE_TO or isinstance(scene, PrincipalScene):
         return growth
     return 1.0
@@ -66,8 +70,8 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
 
-    The error is that of omega, relative to the largest |omega| so far, or of the attitude (rad) if
-    larger. Both results are None if unknown.
+    The error is the larger of those of omega, relative to the largest |omega| so far, and of the
+    attitude (rad). Both results are None if unknown.
     """
     growth: float | None = 1.0
     # A sphere does not amplify perturbations.
@@ -107,9 +111,9 @@ def motion_growth(scene: Scene, t_end: float) -> float | None:
 def judge_ending(
     scene: Scene, kind: str, tolerance: float, ending: Any
 ) -> tuple[str, float | None, float | None]:
-    """Return status, error and error amplification of a prepared solver's call.
+    """Return the status, error and error amplification of a call of a prepared solver.
 
-    `kind` is ``closed`` for a closed form, which takes no steps, and ``gauss`` for collocation.
+    `kind` is ``closed`` for a closed form, and ``gauss`` for collocation.
     """
     number, steps, of_kernel, grown, omega0, t_end = ending
     status = ENDS[number]

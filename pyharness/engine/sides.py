@@ -24,7 +24,7 @@ def in_reverse(found: Trajectory) -> Trajectory:
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return two trajectories as one: before time 0, in ascending order, and after it.
+    """Return the trajectories before and after time 0, both in ascending order, as one.
 
     The result has the sums of steps and evaluations, and the worse error, amplification and ending.
     """

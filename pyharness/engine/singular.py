@@ -21,7 +21,7 @@ class SingularError(TimedError):
     """The exception for a time beyond which no step can be taken."""
 
     def __init__(self, what: str | None, time: float) -> None:
-        """Store the undefined operation, None if omega or torque is infinite, and `time` (s)."""
+        """Store the text `what` of the undefined operation, None if omega or torque is infinite."""
         where = "at t = {time} s"
         message = f"omega or its torque becomes infinite {where}; allowed: an earlier time"
         super().__init__(f"the torque is not defined {where}: {what}" if what else message, time)
@@ -35,11 +35,11 @@ class SingularError(TimedError):
 def undefined_operation(
     tape: Tape, begin: Sequence[float], before: Sequence[float], end: Sequence[float]
 ) -> str | None:
-    """Return which operation is undefined at the end of an integration, and what to write instead.
+    """Return a text: the operation undefined at the end of an integration, and a replacement.
 
     `begin`, `before` and `end` are the inputs of the tape at the beginning of the integration, at
-    the beginning of the last step, and at the end. The result is None if omega or a quotient
-    becomes infinite.
+    the beginning of the last step, and at the end. The result is None if instead omega or a
+    quotient becomes infinite.
     """
     first, last = (max(abs(inputs[slot]) for slot in OMEGA) for inputs in (begin, end))
     if last > _UNBOUNDED * (first or 1.0):

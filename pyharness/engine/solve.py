@@ -1,6 +1,6 @@
 """The function `solve`, which computes the trajectory of a scene by any method.
 
-It integrates from time 0 in both directions, and rescales time, so that products of two components
+It integrates from time 0 in both directions. It rescales time, so that products of two components
 of omega neither overflow nor underflow.
 """
 
@@ -98,12 +98,13 @@ def solve(
         may have the attributes `terminal` and `direction`, as in SciPy's `solve_ivp`; rows after a
         terminal event are removed. Functions that accept arrays are called with arrays.
     sensitivities : iterable of str
-        Names of the parameters by which omega and the quaternion are differentiated: `omega`,
-        `attitude` (small initial rotations about the body axes, rad), `moments`, `coefficients`,
-        `inertia` (columns I11, I22, I33, I12, I13, I23) or `torque.NAME`. NAME is a constant of a
-        scene file's expressions, or a function's keyword argument with a number as default; for a
-        TorqueLaw, `constant`, `rate`, `sines` or `cosines` (four columns per wave: three
-        amplitudes, frequency). The method must be `auto`, `taylor` or `closed-form`.
+        Names of the parameters with respect to which omega and the quaternion are differentiated:
+        `omega` (at time 0), `attitude` (small initial rotations about the body axes, rad),
+        `moments`, `coefficients`, `inertia` (columns I11, I22, I33, I12, I13, I23) or
+        `torque.NAME`. NAME is a constant of a scene file's expressions, or a function's keyword
+        argument with a number as default; for a TorqueLaw, `constant`, `rate`, `sines` or
+        `cosines` (four columns per wave: three amplitudes, frequency). The method must be `auto`,
+        `taylor` or `closed-form`.
 
     Returns
     -------
@@ -225,7 +226,7 @@ def _more_rows(
 
 
 def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene) -> Array:
-    """Return the unknowns, shape (n, m), of a scene in which a parameter was changed."""
+    """Return the states at n times (s), shape (n, m), of a scene with a changed parameter."""
     found = solve(scene, times, "taylor", _OF_DIFFERENCES, effort=effort, attitude=attitude)
     if len(found.time) < len(times):
         raise InputError(
@@ -238,8 +239,8 @@ def _states_of_changed(times: Array, effort: float, attitude: bool, scene: Scene
 def finest(method: str, scene: Scene, time: float) -> float:
     """Return the smallest tolerance that a method of the registry can meet from 0 to `time` (s).
 
-    For SciPy's methods, whose local errors are at least some 2e-14, it grows with the phase and the
-    error amplification.
+    For SciPy's methods, whose local errors are at least some 2e-14, the tolerance grows with the
+    phase and the error amplification.
     """
     claimed = METHODS[method].finest
     if method not in SCIPY_METHODS or time == 0.0:

@@ -212,10 +212,10 @@ class Solver(BoundKernel[Result]):
     def status(self) -> str:
         """Return how the last call ended; ``complete`` before the first call.
 
-        It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left, and
-        ``refused`` if the method does not apply. It is ``sensitive`` if amplified rounding errors
-        exceed the tolerance. Testing this takes microseconds for a closed form, milliseconds for
-        Gauss collocation.
+        It is ``gave up`` if the work limit was exceeded or the phase has no correct digit left,
+        ``refused`` if the method does not apply, and ``sensitive`` if amplified rounding errors
+        exceed the tolerance. The test for ``sensitive`` takes microseconds for a closed form,
+        milliseconds for Gauss collocation.
         """
         return self._judge()[0]
 
@@ -226,17 +226,17 @@ class Solver(BoundKernel[Result]):
 
     @property
     def growth(self) -> float | None:
-        """Return the error amplification of the last motion, or None, as in `Trajectory`."""
+        """Return the error amplification of the last motion; None where `Trajectory` has None."""
         return self._judge()[2]
 
     @property
     def digits(self) -> float | None:
-        """Return the number of correct decimal digits of the last result, or None."""
+        """Return the number of correct decimal digits of the last result; None if unknown."""
         return digits_left(self.error)
 
     @property
     def steps(self) -> int:
-        """Return the steps of the last call; for Gauss collocation, the right-hand sides."""
+        """Return the steps of the last call; for Gauss collocation, its right-hand sides."""
         return 0 if self._ending is None else abs(self._ending[1])
 
     def _judge(self) -> tuple[str, float | None, float | None]:

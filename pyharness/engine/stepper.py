@@ -33,8 +33,8 @@ class Stepper:
     """A motion that is computed step by step by Taylor series.
 
     Use it if something happens between the steps: a controller changes its torque, a mass is
-    released, an impact changes omega. Otherwise `pyharness.solve` is faster, and estimates its
-    error.
+    released, an impact changes omega. Otherwise `pyharness.solve` is faster, and estimates the
+    error of its result.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ class Stepper:
     states : dict of str to float
         The scene's own states. Another dict, of some or all names, may be set.
     held_torque : ndarray, shape (3,)
-        A torque about the body axes that is added to the scene's: in N m, or for a body given by
-        coefficients, as torque over moment, in rad/s2. It is 0 at first, and applies until it is
-        set again, even if another scene is set.
+        A torque about the body axes that is added to the scene's torque, in N m; for a body given
+        by coefficients it is torque over moment, in rad/s2. It is 0 at first, and applies until it
+        is set again, even if another scene is set.
     scene : Scene
         The scene. If another scene is set, time, omega, attitude and states are kept.
     steps : int
@@ -198,11 +198,11 @@ class Stepper:
         self._set(slice(-3, None), _check_three("held_torque", values))
 
     def step(self, longest: float = math.inf) -> float:
-        """Take one step, as long as the tolerance allows, and return the new time (s).
+        """Take the longest step that the tolerance allows, and return the new time (s).
 
-        `longest` is the longest step (s), negative for a step to an earlier time. A step ends where
-        a table of the torque changes. Raise InputError if `longest` is no number or too small to
-        change the time, and if the motion or its torque is singular.
+        `longest` limits the step (s); it is negative for a step to an earlier time. A step ends
+        where a table of the torque changes. Raise InputError if `longest` is no number or too small
+        to change the time, or if the motion or its torque is singular.
         """
         longest = number("longest", longest)
         end = self._time + longest
@@ -280,7 +280,7 @@ class Stepper:
                 self._time = end
 
     def at(self, times: float | Sequence[float] | Array) -> Array:
-        """Return the state at times (s) within the last step, without later changes by the user.
+        """Return the state at times (s) within the last step, as before later changes by the user.
 
         The state is omega (rad/s), the quaternion if computed, and own states, with shape (m,), or
         (m, n) for n times. Raise InputError for a time outside the step.
@@ -311,7 +311,7 @@ def steps_to(
 ) -> Iterator[tuple[float, Stepper]]:
     """Yield the beginning (s) of each step from 0 to `end` (s), and the stepper after the step.
 
-    The steps end before a singularity, and after `most` steps.
+    No step follows a singularity or `most` steps.
     """
     stepper = Stepper(with_constant_body(scene), max(tolerance, _FINEST), attitude=attitude)
     with suppress(SingularError):
@@ -324,7 +324,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return the lengths (s) of steps to `end` (s) by their ends (s), without ends in `bounds`."""
+    """Return lengths (s) of the steps from 0 to `end` (s) by their ends, unless in `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)
@@ -334,7 +334,7 @@ def step_lengths(
 
 
 def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory that ends early, as ``singular`` if its torque becomes undefined."""
+    """Return `found`, which ends early; with the ending ``singular`` if its torque is undefined."""
     if not is_recorded(scene):
         return found
     try:
@@ -350,7 +350,7 @@ def with_reason(scene: Scene, found: Trajectory, end: float) -> Trajectory:
 
 
 def _equations(scene: Scene, torque: Tape, attitude: bool) -> Tape:
-    """Return the rates of omega, attitude if computed, and held torque as a tape."""
+    """Return the rates of omega, attitude if computed, own states and held torque as a tape."""
     n = 7 if attitude else 3
     recorder = Recorder(2 * MOST_OPERATIONS, n + len(scene.states) + 4)
     time, *unknowns = recorder.inputs()
@@ -386,5 +386,4 @@ def _copy_fixed(values: Array) -> Array:
 
 
 def _normalised(q: Array) -> Array:
-    """Return quaternions of norm 1, (4,) or (4, n), or an empty array."""
     return q / np.sqrt(np.sum(q * q, axis=0)) if len(q) else q

@@ -1,4 +1,4 @@
-"""The steps of an integration as dense output, and their transformations."""
+"""Dense output from the steps of an integration, and its transformations."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -62,9 +62,9 @@ def steps_output(scene: Scene, pieces: Pieces) -> DenseOutput:
 def transformed_steps(
     sol: DenseOutput | None, states: Callable[[Array], Array], factor: float = 1.0
 ) -> DenseOutput | None:
-    """Return steps in a unit of time that is `factor` times shorter, or about other axes.
+    """Return steps in a unit of time that is `factor` times shorter, and with transformed states.
 
-    `states` transforms rows of the state.
+    `states` transforms rows of the state, for example to other axes.
     """
     if sol is None or not isinstance(sol.states, Pieces):
         return None

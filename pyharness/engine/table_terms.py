@@ -148,7 +148,6 @@ def _as_array(values: Any) -> Any:
 
 
 def _rows(where: str, values: Any, count: int, allowed: str) -> list[Triple]:
-    """Return a user's rows of three numbers, or raise InputError for another count."""
     given = list(islice(number_list(where, values, allowed), count + 1))
     if len(given) != count:
         raise _other_number(where, "rows", len(given), count)
@@ -165,8 +164,8 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     starts : iterable of numbers, shape (n,)
         The times (s) at which the pulses begin, in any order, 1 to 10 000.
     durations : iterable of numbers, shape (n,)
-        The durations (s), above 0. A pulse may begin when another ends, not before. The impulse of
-        a pulse is torque times duration, even if its end is rounded.
+        The durations (s), above 0. A pulse may begin when another ends, not before. The impulse is
+        torque times duration, even if the end of the pulse is rounded.
     torque : three numbers, or iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) of all pulses, or one for each pulse.
 
@@ -283,7 +282,7 @@ def _before(first: float, second: float) -> float:
 
 
 def _piecewise(times: Array, values: Array, interpolation: str, where: str) -> Table:
-    """Return the table of a function with these values, constant before and after."""
+    """Return the table of a function with these values, constant beyond the first and the last."""
     is_held = interpolation == "held"
     pieces = np.zeros((len(values) - (not is_held), 4))
     pieces[:, 0] = values[: len(pieces)]

@@ -55,8 +55,8 @@ class Taylor(OdeSolver):  # type: ignore[misc]
     t_bound : float
         The final time, before or after `t0`.
     max_step : float, optional
-        The longest step. Default is inf. Shorter steps separate two roots of an event, which
-        `solve_ivp` misses within one step.
+        The longest step. Default is inf. `solve_ivp` misses two roots of an event within one step;
+        shorter steps separate them.
     rtol, atol : float or array_like, shape (n,), optional
         The local error of component k of y is below ``atol[k] + rtol[k] * abs(y[k])``. If `atol` is
         0, the error of a component that is 0 is relative to the largest component. Defaults are
@@ -200,7 +200,7 @@ class _Series(DenseOutput):  # type: ignore[misc]
 
 
 def recorded_equation(fun: Callable[..., Any], n: int) -> Tape:
-    """Return ``fun(t, y)``, with n components, as a tape; raise InputError if impossible."""
+    """Return ``fun(t, y)``, with n components, as recorded operations, or raise InputError."""
 
     def record(recorder: Recorder) -> Tape:
         time, *state = recorder.inputs()

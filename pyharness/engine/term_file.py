@@ -103,6 +103,5 @@ def _argument(where: str, value: object, key: str, frame: str | None) -> object:
 
 
 def _placed(error: InputError, where: str) -> InputError:
-    """Return the error with the place of the term in its message."""
     message = str(error).removeprefix("[torque]").lstrip(": ")
     return InputError(f"{where}, {message}")

@@ -17,7 +17,7 @@ from pyharness.model.values import converted, finite, number_list, three
 
 
 def ready_term(kind: str, function: Function, **arguments: Any) -> StateTorque:
-    """Return a function, recorded, as a ready term with its kind and checked arguments."""
+    """Return the ready term that records `function`, with its kind and checked arguments."""
     pairs = ((key, _file_value(value)) for key, value in arguments.items())
     return replace(replayed(function), terms=((("kind", kind), *pairs),))
 

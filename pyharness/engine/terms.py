@@ -163,8 +163,9 @@ def attitude_control(
 
     For the attitude q, the error quaternion (e0, e) is target* q, with the conjugate target*. A
     quaternion and its negative have the same torque, so that the body does not rotate the long way
-    round (unwinding). For a number k, the first term is -k sin(angle) about the axis of the error,
-    with the potential k (1 - cos(angle)); the equilibrium at 180 degrees is unstable.
+    round (unwinding). If k is a number, the first term is -k sin(a) about the axis of the error,
+    with the angle a of the error; its potential is k (1 - cos(a)), and the equilibrium at a = 180
+    degrees is unstable.
 
     Parameters
     ----------

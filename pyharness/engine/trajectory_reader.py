@@ -38,8 +38,8 @@ _CHANGING = {each.place: each for each in (ChangingMoments, ChangingInertia)}
 def load(path: str | os.PathLike[str]) -> Trajectory:
     """Return the trajectory that `Trajectory.save` wrote to a file.
 
-    All numbers, and the results of methods, are bit-for-bit the same. A torque that scene files
-    can't describe becomes a recorded torque.
+    All numbers are bit-for-bit the same, and so are the results of calls of the trajectory's
+    methods. A torque that scene files can't describe becomes a recorded torque.
 
     Parameters
     ----------
@@ -191,6 +191,6 @@ def _check_array(array: Any, kind: str, *shape: int) -> None:
 
 
 def _require(holds: object) -> None:
-    """Raise an error, for which `load` has a message, unless a condition holds."""
+    """Raise ValueError, which `load` converts to a message, unless a condition holds."""
     if not holds:
         raise ValueError("a damaged value")

@@ -73,8 +73,8 @@ def read_archive(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays and the header of an archive, or raise InputError, beginning with `where`.
 
-    `kinds` are the kind in the header and its noun in messages, `known` are the allowed arrays, and
-    `written` describes a valid file.
+    `kinds` are the kind as the header and as messages name it, `known` are the names of allowed
+    arrays, and `written` describes a valid file.
     """
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     content = read_input(name, where, memory // 4, written)

@@ -143,7 +143,7 @@ def rows_within(rows: Array, piece: slice) -> Array:
 
 
 def unit_quaternions(rows: Array) -> Array:
-    """Return quaternions, (n, 4), divided by their norms; NaN where that fails."""
+    """Return quaternions, (n, 4), divided by their norms; NaN if a norm is 0 or not finite."""
     with np.errstate(all="ignore"):
         found = rows / np.abs(rows).max(axis=1, keepdims=True)
         units: Array = found / np.sqrt((found * found).sum(axis=1, keepdims=True))

@@ -91,7 +91,7 @@ def _record(each: dict[str, Any], what: str) -> dict[str, Any]:
 
 
 def legend(runs: Sequence[tuple[Scene, Iterable[Listing]]]) -> list[str]:
-    """Return the line that explains the marks of runs; an empty list if there are none."""
+    """Return a list of the line that explains the marks of runs, empty without marks."""
     every = {scene.case for scene, _ in runs}
     told = []
     for each in assumption_records(runs):

@@ -59,7 +59,7 @@ def unit_quaternion(where: str, values: object) -> tuple[Quaternion, float]:
 
 
 def of_angles(where: str, angles_deg: object, sequence: object) -> Quaternion:
-    """Return the attitude after rotations by three angles (degrees) about body axes.
+    """Return the attitude after rotations by three angles (degrees) about the body axes `sequence`.
 
     Raise InputError unless `sequence` is in `SEQUENCES`, as "3-1-3", and the angles are finite.
     """
@@ -100,8 +100,9 @@ def quaternion_rates(omega: Iterable[Any], q: Iterable[Any]) -> list[Any]:
 def angles(attitude: Array, sequence: str) -> Array:
     """Return n attitudes, (n, 4), as angles (degrees) of three successive rotations, (n, 3).
 
-    Where the first and last axes are parallel, only the sum or difference of their angles is
-    determined; the last angle is then 0. Arc tangents of half angles are accurate even nearby.
+    Where the axes of the first and last rotation are parallel, only the sum or difference of their
+    angles is determined; the last angle is then 0. Arc tangents of half angles are accurate even
+    near such an attitude.
     """
     q0, q1, q2, q3 = attitude.T
     if sequence == "3-1-3":
@@ -150,13 +151,13 @@ def angle_between(attitude: Array, other: Array) -> Array:
 
 
 def quaternion_of_axes(axes: Array) -> Quaternion:
-    """Return the attitude of a right-handed frame, the columns of a 3 x 3 array."""
+    """Return the attitude of a right-handed frame, whose unit vectors are columns of `axes`."""
     w, x, y, z = quaternions_of_axes(axes[None])[0].tolist()
     return w, x, y, z
 
 
 def quaternions_of_axes(axes: Array) -> Array:
-    """Return the attitudes of n right-handed frames, the columns of arrays, shape (n, 3, 3)."""
+    """Return the attitudes of n right-handed frames, whose axes are columns, shape (n, 3, 3)."""
     # Imported only here, because only a full inertia matrix needs SciPy.
     from scipy.spatial.transform import Rotation
 
@@ -166,7 +167,7 @@ def quaternions_of_axes(axes: Array) -> Array:
 
 
 def rotated(vectors: Array, matrix: Array) -> Array:
-    """Return the products of one or n matrices, (3, 3), and vectors, (3,) or (n, 3)."""
+    """Return the products of one or n matrices (3, 3) with one or n vectors (3,)."""
     # In this order, the sums have the same bits for any n, and as in C.
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack(
@@ -176,7 +177,7 @@ def rotated(vectors: Array, matrix: Array) -> Array:
 
 
 def turned_back(attitudes: Array, turn: Any) -> Array:
-    """Return attitudes, (4,) or (n, 4), of principal axes as those of the axes before `turn`."""
+    """Return attitudes of a body's own axes, from those of axes rotated by `turn` against them."""
     w, x, y, z = np.moveaxis(np.asarray(turn), -1, 0)
     first, *rest = np.moveaxis(attitudes, -1, 0)
     parts: Any = product((first, rest[0], rest[1], rest[2]), (w, -x, -y, -z))

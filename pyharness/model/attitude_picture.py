@@ -33,7 +33,7 @@ _EDGES = [
 
 
 def draw_sphere(axes: Any, found: "Trajectory") -> None:
-    """Draw the paths in space of the body axes (to dots) and of omega's direction (to a cross)."""
+    """Draw the paths in space of the body axes, ending in dots, and of omega, ending in a cross."""
     assert found.attitude is not None
     _frame(axes)
     turned = matrices(found.attitude)
@@ -135,7 +135,6 @@ def _animation(found: "Trajectory", form: str) -> bytes:
 
 
 def _ends(found: "Trajectory") -> tuple[float, float]:
-    """Return the first and the last time (s), in the order of the rows."""
     ends = found.time[[0, -1]].tolist() if len(found.time) else [0.0, 0.0]
     if found.sol is not None:
         # If the rows are all before 0, the motion runs backward from 0.

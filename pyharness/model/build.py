@@ -105,7 +105,7 @@ def _installer() -> str:
 
 
 def _ask_kernels() -> dict[str, str | None]:
-    """Return the best instruction set of build and processor, and the faults of arithmetic."""
+    """Return the best instruction set that build and processor share, and faults of arithmetic."""
     try:
         from pyharness._kernels import arithmetic_faults, choose_instructions
     except ImportError:

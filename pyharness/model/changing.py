@@ -37,7 +37,7 @@ class Changing:
 
     @property
     def is_diagonal(self) -> bool:
-        """Whether the principal axes are those of the body."""
+        """Whether the body axes are principal axes."""
         return self.place == "moments"
 
     @property
@@ -83,7 +83,7 @@ class Changing:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """The times (s) around 0 between which the inertia is positive definite, or infinities."""
+        """The times (s) around 0, or infinities, between which the inertia is positive definite."""
         # Imported only here, because the programs need no exact numbers.
         from pyharness.model.exact_zeros import determinant, first_zeros
 
@@ -118,14 +118,14 @@ class ChangingMoments(Changing):
     Parameters
     ----------
     polynomials : three lists of numbers
-        For each moment at most ten coefficients in ascending powers of time (s), in kg m2, kg m2/s,
+        For each moment, one to ten coefficients of ascending powers of time (s), in kg m2, kg m2/s,
         and so on.
 
     Raises
     ------
     InputError
         If `polynomials` are not three lists of finite numbers, a moment is not above 0 at time 0,
-        or the lists are the rows of a symmetric matrix.
+        or the lists are the rows of a symmetric matrix, which belongs to `inertia`.
 
     Examples
     --------
@@ -188,7 +188,7 @@ class ChangingInertia(Changing):
     Parameters
     ----------
     matrices : one to ten matrices, each of three rows of three numbers
-        The symmetric coefficient matrices in ascending powers of time (s), in kg m2, kg m2/s, and
+        The symmetric matrices, coefficients of ascending powers of time (s), in kg m2, kg m2/s, and
         so on.
 
     Raises

@@ -11,10 +11,10 @@ from pyharness.model.torque_law import TorqueLaw
 
 
 def with_constant_body(scene: Scene) -> Scene:
-    """Return a scene with the same solution, a constant body and a torque about its axes.
+    """Return a scene with the same solution, a constant inertia and a torque about the body axes.
 
-    If the inertia I changes, the result has A = B = C = 0 and the torque omega', which follows from
-    I omega' = N - I' omega - omega x (I omega) with the torque N.
+    If the inertia I changes, the result has the coefficients A = B = C = 0 and the torque omega',
+    which follows from I omega' = N - I' omega - omega x (I omega) with the scene's torque N.
     """
     changing, torque = scene.changing, scene.torque
     if changing is None:

@@ -50,9 +50,9 @@ class _Quantity(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Conversions:
-    """A base class of trajectories: fields, mechanical quantities and conversions.
+    """The base class of trajectories: fields, mechanical quantities and conversions.
 
-    A changing inertia is evaluated at the time of each row.
+    In each row, an inertia that changes has its value at the row's time.
     """
 
     time: Array
@@ -181,10 +181,10 @@ class Conversions:
     def work(self) -> Array:
         """Return the work of the torque on the body from time 0 to each row.
 
-        It is the change of the kinetic energy, computed as (omega - omega0) . I (omega + omega0)/2,
-        which loses no digits where omega has changed little. The error of the work is the error of
-        omega times the angular momentum. The work that the motors of `pyharness.torques.wheels` do
-        on the wheels is not included.
+        It is the change of the kinetic energy, computed from the inertia I and the initial omega0
+        as (omega - omega0) . I (omega + omega0)/2, which loses no digits where omega has changed
+        little. The error of the work is the error of omega times the angular momentum. The work
+        that the motors of `pyharness.torques.wheels` do on the wheels is not included.
 
         Returns
         -------
@@ -396,9 +396,9 @@ class Conversions:
         """Write the trajectory with its scene to a file, from which `pyharness.load` restores it.
 
         The restored numbers are bit-for-bit the same. The file is written completely or not at all,
-        in the format of `numpy.savez`, with an array for each attribute. The array `scene` is the
-        text of a scene file; `header` has other attributes, and the operations of a recorded
-        torque, in JSON.
+        in the format of `numpy.savez`, with an array for each attribute that is an array. The array
+        `scene` is the text of a scene file; `header`, in JSON, has the other attributes and the
+        operations of a recorded torque.
 
         Parameters
         ----------
@@ -409,8 +409,8 @@ class Conversions:
         Raises
         ------
         InputError
-            If the file can't be written, the torque is opaque, or a program did not run in
-            binary64.
+            If the file can't be written, the torque is opaque, or the trajectory is that of a
+            program in another arithmetic than binary64.
 
         Examples
         --------

@@ -52,9 +52,9 @@ _WEIGHTS[[0, -1]] /= 2.0
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A function of time, a polynomial on each of p intervals between ascending `edges` (s).
+    """A function of time that is a polynomial on each of p intervals between ascending `edges` (s).
 
-    `values`, (p, NODES, m), are its m components at Chebyshev points.
+    `values`, (p, NODES, m), are its m components at the Chebyshev points of each interval.
     """
 
     edges: Array
@@ -87,8 +87,9 @@ class Pieces:
 def sizes_of(largest: Array, n_own: int) -> Array:
     """Return the sizes to which errors are relative, from the largest values of m unknowns.
 
-    The size of each component of omega is the largest of the three values, that of the quaternion
-    is 1, and that of an own state is its value; 1 replaces 0. Shapes are (..., m).
+    The size of a component of omega is the largest of the three values, of the quaternion 1, of
+    one of the last `n_own` unknowns, the own states, its value. A size of 0 becomes 1. Shapes are
+    (..., m).
     """
     sizes = np.ones_like(largest)
     sizes[..., :3] = largest[..., :3].max(axis=-1, keepdims=True)
@@ -106,9 +107,9 @@ class DenseOutput:
     t_min, t_max : float
         The times (s) between which it can be evaluated.
     states, rates : callable
-        A function of times (s) that returns the states in rows (omega in rad/s, the attitude if
-        requested, and the scene's own states); and a function of times and states that returns the
-        derivatives of the states.
+        `states` is a function of times (s) that returns the states in rows: omega in rad/s, the
+        attitude if requested, and the scene's own states. `rates` is a function of times and states
+        that returns the time derivatives of the states.
     n_own : int
         The number of own states.
 
@@ -150,7 +151,7 @@ class DenseOutput:
         return self._at(t, lambda times, states: states)
 
     def derivative(self, t: Any) -> Array:
-        """Return the derivative of the state by the equations of motion.
+        """Return the time derivative of the state, from the equations of motion.
 
         Parameters
         ----------
@@ -161,7 +162,7 @@ class DenseOutput:
         Returns
         -------
         ndarray, shape (m,) or (m, n)
-            The derivatives: of omega in rad/s2, of the quaternion in 1/s.
+            The derivatives: of omega in rad/s2, of the quaternion in 1/s, and of own states.
 
         Raises
         ------

@@ -24,7 +24,7 @@ def install_command(extra: str) -> str:
 
 
 def check_package(name: str, what: str, command: str) -> None:
-    """Raise InputError if a package that `what` needs is not installed."""
+    """Raise InputError if package `name`, which `what` needs and `command` installs, is missing."""
     from importlib import import_module
 
     try:
@@ -34,7 +34,7 @@ def check_package(name: str, what: str, command: str) -> None:
 
 
 def checked_axes(ax: object) -> "Axes":
-    """Return a diagram of matplotlib, a new one for None; or raise InputError."""
+    """Return `ax`, or a new diagram of matplotlib if None; raise InputError for anything else."""
     check_package("matplotlib", "plot", install_command("plots"))
     from matplotlib.axes import Axes
 

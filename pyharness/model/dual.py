@@ -21,7 +21,7 @@ class Dual:
         self.value, self.slopes = value, slopes
 
     def chained(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, from its value and its derivative (chain rule)."""
+        """Return a function of this number, whose `value` and derivative `slope` are given."""
         return Dual(value, [slope * each for each in self.slopes])
 
     def __add__(self, other: Any) -> "Dual":
@@ -67,12 +67,12 @@ class Dual:
 
 
 def dual(value: Any, count: int) -> Dual:
-    """Return a number as a dual number; a plain one has `count` derivatives of 0."""
+    """Return `value` as a dual number, with `count` derivatives of 0 if it is a plain number."""
     return value if isinstance(value, Dual) else Dual(value, [0.0] * count)
 
 
 def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
-    """Return a tape of the outputs, then the derivatives of each by the inputs in `slots`."""
+    """Return a tape of the outputs, then of their derivatives with respect to inputs `slots`."""
     recorder = Recorder(_MORE * MOST_OPERATIONS)
     inputs = [
         Dual(symbol, [float(slot == each) for each in slots])
@@ -83,7 +83,7 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of the derivatives of each output by m parameters, then of the outputs.
+    """Return a tape of each output's derivatives with respect to m parameters, then of outputs.
 
     The parameters are the last inputs of `tape`; the result has these `values` in their place.
     """
@@ -103,9 +103,9 @@ def of_duals(
     slope: Callable[[Any, Any], Any],
     symbolic: Callable[[Any], Any] | None = None,
 ) -> Callable[[Any], Any]:
-    """Return a function of numbers and dual numbers, from its derivative `slope`(argument, value).
+    """Return `function` for numbers and dual numbers; its derivative is ``slope(argument, value)``.
 
-    For the values of dual numbers, `symbolic` replaces `function` if not None.
+    Unless it is None, `symbolic` computes the values of dual numbers.
     """
 
     def called(x: Any) -> Any:

@@ -62,7 +62,7 @@ def waves(scene: Scene) -> int:
 def check_steps(scene: Scene, program: str, implementation: str, effort: float) -> None:
     """Raise InputError if a program exceeds the work limit of an `implementation`.
 
-    The work is the number of steps, increased for each wave of the torque.
+    The work is the number of steps, times a factor that increases with the number of torque waves.
     """
     if implementation not in _LIMITS:
         raise unknown("implementation", implementation, _LIMITS)
@@ -74,7 +74,7 @@ def check_steps(scene: Scene, program: str, implementation: str, effort: float) 
 def check_bodies(scene: Scene, program: str, bodies: int, effort: Number) -> None:
     """Raise InputError if a compiled program on many bodies exceeds the work limit.
 
-    The work is `bodies` times steps times one plus the number of waves.
+    The work is the product of bodies, steps, and the number of waves of the torque plus 1.
     """
     cost = 1.0 + _LIMITS["fortran"][1] * waves(scene)
     needed = bodies * scene.steps * cost / _MOST_STEPS_OF_ALL

@@ -31,7 +31,7 @@ class Ensemble(BatchResult):
         apply), 4 `gave up` (work limit exceeded, or no correct digit of the phase left), 6
         `sensitive` (amplified rounding errors exceed the tolerance).
     attitude : ndarray, shape (n, 4), or None
-        Unit quaternions from body to space, scalar first. This field and the following ones are
+        Unit quaternions from body to space, scalar first. This attribute and the following ones are
         None if they were not requested.
     estimates : ndarray, shape (n, 2), or None
         The estimated errors and the error amplifications, as columns.
@@ -39,8 +39,8 @@ class Ensemble(BatchResult):
         Times (s) and states of events, indexed by function, then by body. For k events, the shapes
         are (k,), and (k, 3) or (k, 7); None for a body without a result.
     sensitivities : dict of ndarray, or None
-        By name, the derivatives of the final states with respect to a parameter with m values,
-        shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
+        By name of a parameter with m values, the derivatives of the final states with respect to
+        it, shape (n, 3, m) or (n, 7, m); NaN for a body without a result.
     refusals : dict of str, or None
         The reasons for missing events and sensitivities, by index of the body.
     own, names : ndarray, shape (n, k), or None, and tuple of str
@@ -86,7 +86,7 @@ class Ensemble(BatchResult):
 
     @property
     def growth(self) -> Array | None:
-        """The error amplifications, or upper bounds, shape (n,); NaN where unknown."""
+        """The error amplifications, or upper bounds on them, shape (n,); NaN where unknown."""
         return None if self.estimates is None else self.estimates[..., 1]
 
     def angular_momentum(
@@ -184,7 +184,7 @@ class Ensemble(BatchResult):
         return frame
 
     def _columns(self) -> list[tuple[str, tuple[str, ...], Array]]:
-        """Return unit, names and values (last axis: names) of each attribute that is not None."""
+        """Return unit, names of columns, and values of each attribute that is not None."""
         given = (
             ("rad/s", ("omega1", "omega2", "omega3"), self.omega),
             ("1", ("q0", "q1", "q2", "q3"), self.attitude),

@@ -1,4 +1,4 @@
-"""Files of ensembles: archives with an array for each attribute, events one after the other."""
+"""Files of ensembles: archives with an array for each attribute; events are concatenated."""
 
 import json
 import os

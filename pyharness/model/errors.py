@@ -40,7 +40,7 @@ SLIDING = (
 
 
 class TimedError(InputError):
-    """An InputError with a time (s), which `slower` converts from rescaled time."""
+    """An InputError whose message names a time (s), which `slower` converts from rescaled time."""
 
     def __init__(self, message: str, time: float) -> None:
         """Store the message, with `time` in place of ``{time}``."""
@@ -112,7 +112,7 @@ def known(what: str, name: object, allowed: Iterable[str]) -> str:
 
 
 def unknown(what: str, name: object, allowed: Iterable[str], where: str = "") -> InputError:
-    """Return the InputError for a name that is not `allowed`, which suggests a similar one.
+    """Return the InputError for a name that is not `allowed`; its message suggests a similar name.
 
     `what` is the kind of name, such as "case"; `where`, such as "--fix", begins the message.
     """

@@ -28,7 +28,10 @@ def determinant(elements: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]
 
 
 def first_zeros(polynomial: Iterable[float | Fraction]) -> tuple[float, float]:
-    """Return the zeros (s) before and after time 0, or infinities, of a polynomial above 0 at 0."""
+    """Return the last zero (s) before and the first after time 0 of a polynomial above 0 at time 0.
+
+    Where there is none, return infinity.
+    """
     exact = [Fraction(c) for c in polynomial]
     backward = [-c if n % 2 else c for n, c in enumerate(exact)]
     return -_first_zero(backward), _first_zero(exact)
@@ -67,7 +70,7 @@ def _first_zero(polynomial: Sequence[Fraction]) -> float:
 
 
 def _bound(polynomial: Sequence[int]) -> int:
-    """Return log2 of a bound of positive zeros (Kioustelidis 1986, J. Comput. Appl. Math. 16)."""
+    """Return log2 of a bound on positive zeros (Kioustelidis 1986, J. Comput. Appl. Math. 16)."""
     degree, last = len(polynomial) - 1, polynomial[-1]
     return 1 + max(
         -((last.bit_length() - 1 - c.bit_length()) // (degree - n))

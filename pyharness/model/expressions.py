@@ -60,8 +60,8 @@ def parsed(
 ) -> StateTorque | TorqueLaw:
     """Return the torque of three expressions about the body axes, as a torque law if possible.
 
-    Names are t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and own
-    states, whose `rates` are expressions too. Values are in N m, or in rad/s2 for a body with
+    They may contain t (s), w1, w2, w3 (rad/s), the quaternion q0, q1, q2, q3, pi, `constants`, and
+    own states, whose `rates` are expressions too. Values are in N m, or in rad/s2 for a body with
     coefficients. Raise InputError for an invalid expression.
     """
     values = _checked_constants(constants)
@@ -191,7 +191,7 @@ def _tree(text: str, place: str) -> ast.expr:
 def _operations(
     text: str, names: Mapping[str, Any], place: str
 ) -> list[tuple[ast.expr, Sequence[ast.expr], Callable[..., Any]]]:
-    """Return each node with its operands and a function of their values; check all nodes."""
+    """Return each node of a checked expression, its operands, and a function of their values."""
     found, waiting = [], [(_tree(text, place), 1)]
     while waiting:
         node, depth = waiting.pop()

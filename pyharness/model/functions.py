@@ -1,6 +1,7 @@
-"""Elementary functions of floats, by the C library, and of the numbers of `pyharness.thesis.word`.
+"""Elementary functions of floats and of the numbers of `pyharness.thesis.word`.
 
-These numbers have other formats than binary64, and their methods round correctly.
+Those of floats are the C library's. The other numbers have other formats than binary64; their
+methods round correctly.
 """
 
 import math

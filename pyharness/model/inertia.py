@@ -2,8 +2,8 @@
 
 Symmetric matrices are diagonalised in integers, because in binary64 a small eigenvalue would have
 few correct digits. The elements are integer multiples of a power of 2, the unit. The absolute
-determinant of a regular matrix is therefore at least the cube of the unit. This bounds its smallest
-absolute eigenvalue from below, and so determines the number of bits.
+determinant of a regular matrix is therefore at least the cube of the unit. This bounds the smallest
+absolute eigenvalue from below, which determines how many bits are enough.
 """
 
 import math
@@ -32,7 +32,7 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments (kg m2) and axes of a body, rounded, and with at least 30 digits.
+    """The principal moments (kg m2) and axes of a body, both rounded and with at least 30 digits.
 
     The columns of `axes` form a right-handed frame, each near the body's own axis of the same
     number. `moments_low` is the exact minus the rounded moments.
@@ -65,7 +65,7 @@ def checked_inertia(where: str, values: object) -> Matrix:
 
 
 def symmetric_matrix(where: str, values: object) -> Matrix:
-    """Return a user's symmetric matrix, or raise InputError; moments are not checked."""
+    """Return a user's symmetric matrix, or raise InputError; it may be not positive definite."""
     allowed = "allowed: three rows of three finite numbers, kg m2"
     rows = list(number_list(where, values, allowed))
     if any(isinstance(converted(row), float) for row in rows):
@@ -153,7 +153,7 @@ def diagonalised(
 
 
 def _rotate(a: list[list[int]], vectors: list[list[int]], p: int, q: int, bits: int) -> None:
-    """Make a[p][q] 0 in place by the smaller Jacobi rotation (Rutishauser 1966); unit 2**-bits."""
+    """Make a[p][q] 0 in place by Jacobi's smaller rotation (Rutishauser 1966); unit 2**-bits."""
     r = 3 - p - q
     gap, twice = a[q][q] - a[p][p], 2 * a[p][q]
     root = math.isqrt(gap * gap + twice * twice)

@@ -20,7 +20,7 @@ _FIELDS = {"defect": "defects", "reading": "readings", "conjecture": "conjecture
 
 @dataclass(frozen=True)
 class Listing:
-    """A program of the thesis as printed, as corrected, or with any other choice of its defects.
+    """A program of the thesis: as printed, as corrected, or with any other choice of its defects.
 
     Attributes
     ----------

@@ -1,8 +1,9 @@
 """NumPy's functions for arrays of symbols, while a user's function is recorded.
 
-Symbols can't overload NumPy's choices, comparisons and linear algebra, nor can they be assigned to
-the result of numpy.zeros. During recording these functions are therefore replaced in the modules
-numpy, numpy.linalg and math. Calls from other threads, and without symbols, reach the originals.
+Symbols can't overload NumPy's choices (such as where), comparisons and linear algebra, nor can they
+be assigned to elements of numpy.zeros. During recording these functions are therefore replaced in
+the modules numpy, numpy.linalg and math. Calls from other threads or without symbols reach the
+originals.
 """
 
 import math
@@ -30,7 +31,7 @@ _originals: list[tuple[Any, str, Any]] = []
 
 @contextmanager
 def replaced_functions(with_targets: bool) -> Iterator[None]:
-    """Replace NumPy's functions in this thread; `with_targets`, also those that make arrays."""
+    """Replace NumPy's functions in this thread; if `with_targets`, also those that make arrays."""
     global _installed
     before = getattr(_here, "targets", None)
     with _lock:
@@ -79,7 +80,7 @@ class _Replaced:
 
 
 class _Target(_Replaced):
-    """A replacement of a function that makes an array, to which symbols can be assigned."""
+    """A replacement of a function that makes an array; symbols can be assigned to the array."""
 
     def __init__(self, original: Callable[..., Any], value: float) -> None:
         super().__init__(original, lambda shape, *_, **__: symbol_array(np.full(shape, value)))
@@ -134,7 +135,6 @@ def symbol_array(values: Any) -> Any:
 
 
 def _wrapped(original: Callable[..., Any]) -> _Replaced:
-    """Return a function whose result is a `SymbolArray`."""
     return _Replaced(original, lambda *given, **named: _viewed(original(*given, **named)))
 
 
@@ -144,7 +144,7 @@ def _viewed(found: Any) -> Any:
 
 
 def _by_element(function: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Return a function that acts on the elements of arrays; of scalars, it is no array."""
+    """Return a function of arrays that acts on their elements; for scalars it returns no array."""
     loop = np.frompyfunc(function, count, 1)
 
     def called(*given: Any) -> Any:

@@ -82,7 +82,7 @@ def write_files(contents: dict[str, bytes], option: str) -> None:
 
 
 class DeferredInterrupt:
-    """A context that defers Ctrl-C, which could leave temporary files behind."""
+    """A context that defers Ctrl-C, which might otherwise leave temporary files behind."""
 
     def __enter__(self) -> Self:
         """Install a handler that only records an interrupt."""

@@ -16,7 +16,7 @@ def read_input(path: str | os.PathLike[str], where: str, limit: int, what: str) 
     """Return the content of a file or pipe that a user named.
 
     Raise InputError, beginning with `where`, for an unreadable path, a folder, a device, more than
-    `limit` bytes, or a pipe without data for 10 s; `what` is the expected content.
+    `limit` bytes, or a pipe without data for 10 s; the message names the expected content, `what`.
     """
     try:
         content = _read(os.fspath(path), limit)

@@ -58,8 +58,8 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Returns
     -------
     scene : Scene
-        The same problem with `moments`; an attitude is that of the principal axes. A torque about
-        the axes of space is unchanged, and the result then always has an attitude.
+        The same problem with `moments`; its attitude, if any, is that of the principal axes. A
+        torque about the axes of space is unchanged, and the result then always has an attitude.
     axes : ndarray, shape (3, 3)
         The principal axes, in columns of components about the body's own axes. They form a
         right-handed frame; each axis is near the body's own axis of the same number.
@@ -67,7 +67,7 @@ def principal(scene: Scene) -> tuple[Scene, Array]:
     Raises
     ------
     InputError
-        If the amplitudes of one frequency have a sum beyond the range of binary64.
+        If the sum of the torque's amplitudes of one frequency is beyond the range of binary64.
 
     Examples
     --------

@@ -14,7 +14,7 @@ from pyharness.model.values import boolean
 Progress = Callable[[int, int, str], None]
 """The type of a function that is called whenever a part of a computation is completed.
 
-Its arguments are the numbers of completed parts and of all, and the name of the next part.
+Its arguments are the number of completed parts, the number of all, and the name of the next part.
 """
 
 _PIECE = 1 << 18  # most bodies in a piece: some milliseconds, until Python checks for a signal
@@ -84,7 +84,7 @@ def for_each_piece(
 ) -> None:
     """Call ``work(piece, given_up)`` in threads for ranges of n bodies, by default of equal size.
 
-    After an exception, as by Ctrl-C, `given_up[0]` is 1; kernels poll it and return.
+    After an exception, for example Ctrl-C, `given_up[0]` is 1; kernels poll it, and then return.
     """
     if not n:
         return

@@ -1,7 +1,7 @@
 """Reports: the results of a subcommand as data, which `pyharness.views` renders.
 
-Every start of the program creates these types; as dataclasses, they would take five times as long
-to create as named tuples.
+The types are named tuples, because every start of the program creates them, and the creation of
+dataclasses would take five times as long.
 """
 
 import math
@@ -73,7 +73,7 @@ def format_bytes(number: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column of a table: its head and format for rounded numbers, and those for CSV."""
+    """A column of a table, with a head and a format for rounded numbers, and others for CSV."""
 
     head: str
     write: Callable[[Any], str] = plain
@@ -148,7 +148,8 @@ class Report(NamedTuple):
     title: str  # the subcommand
     text: Sequence[Section]  # for the terminal; empty sections are skipped
     record: Callable[[], dict[str, Any]]  # for JSON
-    data: Table | None = None  # for CSV, in full
+    data: Table | None = None  # for CSV, which has all digits
     page: Sequence[Section] | None = None  # for Markdown; if None, `data` is written
     cases: Sequence[Case] = ()  # for JUnit
+    # By name, functions that draw the pictures; None if the subcommand has no picture.
     pictures: Mapping[str, Callable[[], Picture]] | None = None

@@ -99,7 +99,7 @@ class Scene:
     omega : three numbers
         The angular velocity about the body axes at time 0 (rad/s).
     moments : three numbers, ChangingMoments, or function of t, optional
-        The principal moments of inertia (kg m2). A function of the time (s) is recorded, and must
+        The principal moments of inertia (kg m2). A function of the time t (s) is recorded, and must
         not jump; `inertia_table` makes one from a table. If the moments change, the attribute
         `moments` is None, and `changing` has them.
     coefficients : three numbers, optional
@@ -117,10 +117,10 @@ class Scene:
     changing : ChangingMoments, ChangingInertia, or a recorded function, optional
         An inertia that changes with time.
     states : dict of str to float, or to pair of floats, optional
-        States of the user's own, at most eight, in any unit: their values at time 0, by name. The
-        torque is then a function of ``(t, omega, states)`` or ``(t, omega, attitude, states)`` that
-        returns the torque and a dict of the states' rates. Errors of a state are relative to its
-        largest absolute value so far, or to the second number of a pair if that is larger.
+        Own states: at most eight further unknowns, in any unit, with their values at time 0 by
+        name. The torque is then a function of ``(t, omega, states)`` or ``(t, omega, attitude,
+        states)`` that returns the torque and a dict of the states' rates. Errors of a state are
+        relative to its largest absolute value so far, or to the second number of a pair if larger.
     step_size : float
         The step size (s) of methods with a fixed step, and of the programs of 1982. The following
         arguments are for these programs.
@@ -300,7 +300,7 @@ class Scene:
 
     @property
     def exact_moments(self) -> "Exact | None":
-        """The principal moments (kg m2) as exact fractions; None for coefficients.
+        """The principal moments (kg m2) as exact fractions; None for a body with coefficients.
 
         Raise InputError for a full inertia matrix, or one that changes with time.
         """
@@ -322,8 +322,8 @@ class Scene:
     def is_impossible(self) -> bool:
         """Whether no rigid body has the moments of inertia at time 0.
 
-        The largest moment then exceeds the sum of the others by more than rounding may: 2**-50 of
-        itself.
+        The largest moment then exceeds the sum of the others by over 2**-50 of itself; less may be
+        due to rounding.
         """
         moments, inertia = self.moments, self.inertia
         if self.changing is not None:
@@ -337,9 +337,9 @@ class Scene:
 
     @property
     def law(self) -> TorqueLaw:
-        """The torque law, for code that supports no other torque.
+        """The torque as a torque law.
 
-        Raise InputError if the torque depends on the state, or the inertia changes.
+        Raise InputError if it depends on the state, or the inertia changes.
         """
         if self.changing is not None:
             raise InputError(CHANGING)
@@ -389,7 +389,7 @@ def breaks_triangle(moments: Iterable[Any]) -> bool:
 
 
 def _warn_of_impossible(scene: Scene) -> None:
-    """Warn, at the line of user code, of impossible moments."""
+    """Warn of impossible moments, at the line of the user's code."""
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_globals.get("__name__") in _BETWEEN:
         frame, level = frame.f_back, level + 1
@@ -403,7 +403,7 @@ def _warn_of_impossible(scene: Scene) -> None:
 
 
 def most_steps() -> int:
-    """Return how many steps fit in half of the memory and in the programs' 32-bit counters."""
+    """Return the number of steps that half of the memory and 32-bit counters allow."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(memory // 2 // _BYTES_PER_STEP, _COUNTABLE_STEPS)
 

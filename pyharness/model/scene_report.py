@@ -20,7 +20,7 @@ _LONGEST_TEXT = 60
 
 
 def heading(scene: Scene, listings: Iterable[Listing] = ()) -> list[str]:
-    """Return lines that describe a scene, with marks on what runs of `listings` assume."""
+    """Return lines that describe a scene, with marks on values that runs of `listings` assume."""
     if scene.inertia is not None:
         body = f"I = {', '.join(map(_tuple, scene.inertia))} kg m2"
     elif isinstance(scene.changing, InertiaFunction):

@@ -38,17 +38,17 @@ class StateTorque:
     Attributes
     ----------
     tape : Tape or None
-        The recorded function; None if opaque.
+        The recorded function; None for an opaque torque.
     function : callable or None
-        The opaque function, else None.
+        The function that an opaque torque calls, else None.
     needs_attitude : bool
         Whether the torque depends on the attitude.
     expression, constants : tuple
         The three expressions of a scene file, if the torque was recorded from them, and pairs of
         name and value of their constants.
     terms : tuple
-        The other summands in a scene file: at most one `TorqueLaw`, and ready terms (torques of
-        `pyharness.torques`) as pairs of keys and values.
+        The torque's other summands in a scene file: at most one `TorqueLaw`, and ready terms
+        (torques of `pyharness.torques`) as pairs of keys and values.
     parameters : tuple of pairs
         Names and values of the recorded function's keyword arguments with numbers as defaults.
     varied : Tape or None
@@ -61,7 +61,7 @@ class StateTorque:
     parts : tuple
         The torques and torque laws of a sum.
     is_zero, varies, in_space : bool
-        False, True and False; for code that also takes a `TorqueLaw`.
+        Always False, True and False; for code that also takes a `TorqueLaw`.
     """
 
     tape: Tape | None
@@ -131,7 +131,7 @@ class StateTorque:
     __radd__ = __add__
 
     def rotated(self, axes: Array) -> "StateTorque":
-        """Return the torque with omega, attitude and components about `axes` (columns).
+        """Return the torque with omega, attitude and components about new `axes` (columns).
 
         Raise InputError for an opaque torque.
         """
@@ -177,7 +177,7 @@ def of_law(law: TorqueLaw) -> StateTorque:
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     """Return the torque that a user's function computes, recorded with symbols.
 
-    A scene records its function itself; this function is for sums.
+    Use it for summands; a scene records a function as its only torque itself.
 
     Parameters
     ----------
@@ -196,8 +196,8 @@ def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:
     Raises
     ------
     InputError
-        If the function can't be recorded, does not return three numbers, or differs between two
-        calls, as with memory or random numbers.
+        If the function can't be recorded, does not return three numbers, or returns different
+        results in two calls, as with memory or random numbers.
 
     Examples
     --------
@@ -377,7 +377,7 @@ def law_of(torque: StateTorque) -> TorqueLaw | None:
 
 
 def _with_parameters(torque: StateTorque, function: Function, called: Function) -> StateTorque:
-    """Return a torque whose parameters are its function's recordable numeric keywords."""
+    """Return a torque whose parameters are the numeric keywords that its function can record."""
     values = {
         each.name: value
         for each in signature(function).parameters.values()
@@ -417,7 +417,7 @@ def _list_summands(torque: StateTorque | TorqueLaw) -> "tuple[StateTorque | Torq
 
 
 def _sum(parts: "Sequence[StateTorque | TorqueLaw]") -> StateTorque:
-    """Return a sum in the order of a scene file, whose text then gives the same tape."""
+    """Return the sum in the order of a scene file, so that reading the file gives the same tape."""
     torques = [each for each in parts if isinstance(each, StateTorque)]
     torques.sort(key=lambda each: bool(each.expression))
     tapes = [each.tape for each in torques if each.tape is not None]

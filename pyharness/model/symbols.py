@@ -75,13 +75,13 @@ class Recorder:
         return [Symbol(self, 0.0, {slot: 1.0}) for slot in range(self._n_inputs)]
 
     def refusal(self, what: str, write: str = _ALLOWED) -> InputError:
-        """Return the exception for an operation that can't be recorded; `write` is allowed."""
+        """Return the exception for an operation that can't be recorded; it suggests `write`."""
         allowed = f"allowed: {write}, or {self._instead}"
         where = _line() if self._has_lines else ""
         return InputError(f"{self.place}: {what} can't be recorded{where}; {allowed}")
 
     def refusal_of_numbers(self, reason: str) -> InputError:
-        """Return the exception for a function that accepts no symbols, with its own `reason`."""
+        """Return the exception for a function that accepts no symbols; it states the `reason`."""
         return InputError(
             f"{self.place}: the function accepts numbers only, not the symbols that record it "
             f"({reason}); allowed: a formula of {_ALLOWED}, or {self._instead}"
@@ -342,7 +342,7 @@ class Symbol:
         return self._root()
 
     def arctan2(self, x: Any) -> "Symbol":
-        """Return the angle (rad) of the point (x, self); not defined where x < 0 and self = 0."""
+        """Return the angle (rad) of the point (x, self); undefined where x < 0 and self = 0."""
         # Half the angle, because a quotient by x would not be defined where x is 0.
         half: Symbol = self / ((self * self + x * x).sqrt() + x)
         return 2.0 * half.arctan()
@@ -482,7 +482,7 @@ def select(condition: Any, first: Any, second: Any) -> Any:
 
 
 def _line() -> str:
-    """Return the name and line of the calling user's function."""
+    """Return name and line of the user's function being recorded."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename.startswith(_LIBRARIES):
         frame = frame.f_back

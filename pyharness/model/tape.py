@@ -31,7 +31,7 @@ WITH_DERIVATIVE = ("log", "atan", "asin")
 
 
 class Linear(NamedTuple):
-    """A constant plus a linear combination; `terms` are pairs of slot and coefficient, by slot."""
+    """A constant plus a linear combination: `terms` are pairs of slot and coefficient, by slot."""
 
     constant: float
     terms: tuple[tuple[int, float], ...]
@@ -68,7 +68,7 @@ class Operation(NamedTuple):
 
     "log", "atan" and "asin" have the slot of their derivative as second operand. "switch" is 1
     where its operand is positive, else 0. "select" is its second operand where its first operand is
-    1, and its third where that is 0.
+    1, and its third where the first is 0.
     """
 
     kind: str
@@ -202,8 +202,8 @@ def live_slots(
     """Compute the operations on which the outputs depend, operands first, and return their slots.
 
     Of a "select" only the chosen operand is computed; the other may be singular. `compute` is
-    called for each slot, `is_true` for a computed condition. Derivatives of `WITH_DERIVATIVE` are
-    computed only if `for_series`.
+    called for each slot, `is_true` for the slot of a computed condition. The derivatives of
+    `WITH_DERIVATIVE` are computed only if `for_series`.
     """
     known = set(range(tape.n_inputs))
     wanted = [slot for output in tape.outputs for slot, _ in output.terms]
@@ -292,7 +292,7 @@ _UNSEEN = 2.0**-150
 def float_outputs(tape: Tape, inputs: Sequence[float]) -> list[float]:
     """Return the outputs of a tape in floats; division by 0 raises ZeroDivisionError.
 
-    If a large exponential overflows, as in sinh(x)/cosh(x), it is replaced by another large number,
+    An exponential that overflows, as in sinh(x)/cosh(x), is replaced by another large number,
     unless the outputs depend on this number.
     """
     found: list[float] = []
@@ -337,7 +337,7 @@ def _without_branches(tape: Tape, inputs: Sequence[float]) -> Tape:
 
 
 def _saturated(kind: str, x: float) -> float:
-    """Return exp(x), or its replacement beyond 210; powers of 2 scale without rounding errors."""
+    """Return exp(x), or its replacement, a number of this `kind`, for abs(x) above 210."""
     if x < -_LARGE_ARGUMENT and kind in _SMALL:
         return _SMALL[kind]
     if not x > _LARGE_ARGUMENT:

@@ -35,7 +35,7 @@ class TorqueLaw:
     rate : three numbers
         The factor of time, in the unit of N per second.
     sines, cosines : iterable of waves
-        Pairs of an amplitude, three numbers in the unit of N, and a frequency (rad/s).
+        A wave is a pair of an amplitude, three numbers in the unit of N, and a frequency (rad/s).
     frame : {"body", "space"}
         The axes of the components.
 
@@ -128,7 +128,7 @@ class TorqueLaw:
         return self.frame == "space" and not self.is_zero
 
     def at(self, time: float) -> Triple:
-        """Return the torque N at `time` (s), with a fixed order of summation."""
+        """Return the torque N at `time` (s); the order of summation is fixed."""
         torque = list(self.constant)
         if self.varies:
             for axis in range(3):
@@ -193,7 +193,7 @@ def law_derivative(law: TorqueLaw) -> TorqueLaw:
 def to_body(vector: Any, attitude: Any) -> Array:
     """Return the components about the body axes of a vector about the axes of space.
 
-    Written with the matrix, so that terms of one torque share its products.
+    The rotation matrix is used so that all terms of a recorded torque share its products.
     """
     u, v, w = vector
     rows = rows_to_body(attitude)

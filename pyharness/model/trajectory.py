@@ -1,4 +1,4 @@
-"""Trajectories, the results for a scene; and the base class of results for many bodies."""
+"""Trajectories, the results for one scene; and the base class of results for many bodies."""
 
 import math
 import textwrap
@@ -99,42 +99,41 @@ class Trajectory(Conversions):
     velocity : ndarray, shape (n, 3), or None
         Translational velocity along the body axes, m/s.
     steps, evaluations : int
-        The number of steps (for SciPy's methods and the reference, the number of rows), and the
-        number of evaluations of the right-hand side.
+        The number of steps (for SciPy's methods and the reference, of rows), and the number of
+        evaluations of the right-hand side.
     ended : str
         How the integration ended. Endings with all rows are "complete"; "sensitive" if the
-        amplified rounding error exceeds the tolerance; and "unchecked" if the series that bounds
-        SciPy's steps does not reach the end. SciPy may then have stepped over a short change of a
-        recorded torque. Early endings are "stopped" by the Lipschitz test, "overflow", "singular"
-        for an undefined torque, "sliding" where a switch of the torque would change back and forth
-        without end, and a terminal "event".
+        amplified rounding error exceeds the tolerance; and "unchecked" if SciPy may have stepped
+        over a short change of a recorded torque, because the series that limits its steps does not
+        reach the end. Early endings are "stopped" by the Lipschitz test, "overflow", "singular" for
+        an undefined torque, "sliding" where a switch of the torque would change back and forth
+        without end, and "event" for a terminal event.
     stop : Stop or None
         Where the Lipschitz test ended the run.
     ier : ndarray of int, shape (n,), or None
         Error codes of the collocation programs' linear solver; 129 for a singular matrix.
     error : float or None
-        Largest estimated error in any row, of omega relative to its largest component along the
-        trajectory, or of the attitude (rad).
+        The largest estimated error in any row: of omega, relative to its largest component along
+        the trajectory, or of the attitude (rad).
     growth : float or None
         The error amplification: the largest norm of the state-transition matrix of omega from any
         time to the end.
     reason : str or None
-        Why a recorded torque ended the integration or made it sensitive, with the time and the
-        operation.
+        Why a recorded torque ended the integration early or made the ending "sensitive", with the
+        time and the operation.
     attitude : ndarray, shape (n, 4), or None
         Quaternions from body to space, scalar first, with continuous signs.
     own : ndarray, shape (n, k), or None
         The scene's own states, in the order of its `states`.
     moments : tuple of three floats, ChangingMoments, ChangingInertia, or None
-        Principal moments (kg m2), or an inertia that changes; None for a body given by
-        coefficients.
+        Principal moments (kg m2), or an inertia that changes; None if the body has coefficients.
     axes : ndarray, shape (3, 3), or None
         The principal axes in columns; None if they are the body axes.
     exact : ndarray of object, shape (n, 8), or None
         Time, recorded time, omega and velocity of a program in another arithmetic than binary64;
         the other attributes have the nearest floats.
     tolerance : float or None
-        The tolerance of a method without a fixed step.
+        The tolerance; None for methods with a fixed step.
     scene : Scene or None
         The scene, if `solve` returned the trajectory.
     sol : DenseOutput or None

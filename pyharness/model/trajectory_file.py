@@ -1,9 +1,9 @@
 """Writing of trajectory files, which `pyharness.engine.trajectory_reader` reads.
 
 The archive has an array for each attribute, the text `scene` of a scene file, and `header` with
-everything else in JSON, such as a tape (recorded torque). There a linear combination is a list of
-its constant and pairs of slot and coefficient. An operation is a list of its kind, and its
-operands, linear combination, or breaks and pieces.
+everything else in JSON, such as a tape (recorded torque). In a tape, a linear combination is a list
+of its constant and of pairs of slot and coefficient. An operation is a list of its kind, followed
+by its operands, its linear combination, or the breaks and pieces of its table.
 """
 
 import json
@@ -178,7 +178,6 @@ def tape_of(record: Any, n_own: int = 0, n_outputs: int = 3) -> Tape:
 
 
 def _operation(record: Any, slots: int) -> Operation:
-    """Return the operation that `record` describes, with operands in slots below `slots`."""
     kind, *rest = record
     if kind == "linear":
         (linear,) = rest

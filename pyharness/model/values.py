@@ -74,7 +74,7 @@ def is_no_number(value: object) -> bool:
 
 
 def parsed_float(text: str) -> float:
-    """Return the number in `text`; raise ValueError if there is none, or underscores."""
+    """Return the number in `text`, or raise ValueError, also for a number with underscores."""
     return float(_read_text(text))
 
 

@@ -1,8 +1,9 @@
 """Exact sums of the waves of a torque law that have the same frequency.
 
-A solver divides amplitudes by a moment and rounds. The sum of two opposite amplitudes with a
-relative difference of 1e-10 would then have only six correct digits; after an exact sum it has all.
-A merged law has at most one sine and one cosine per frequency, none of frequency 0.
+A solver divides amplitudes by a moment, and rounds. If two opposite amplitudes differ by 1e-10 of
+their size, the sum of the rounded quotients has only six correct digits; that of exact amplitudes,
+rounded afterwards, has all. A merged law has at most one sine and one cosine of each frequency,
+none of frequency 0.
 """
 
 import math
@@ -141,6 +142,6 @@ def _mergeable_rows(sines: Array, cosines: Array) -> NDArray[np.bool_]:
 
 
 def _without_empty(waves: Array) -> Array:
-    """Return the waves, (m, k, 4), without those that are 0 in all laws; NaN counts as a wave."""
+    """Return the waves, (m, k, 4), without those whose amplitudes are 0 in all laws."""
     is_one = waves[..., :3].any(axis=-1) | ~np.isfinite(waves[..., 3])
     return np.ascontiguousarray(waves[:, is_one.any(axis=0)])

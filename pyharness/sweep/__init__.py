@@ -1,1 +1,1 @@
-"""Sweeps: grids of scenes, solved and stored in blocks (chunks), so that a run can be continued."""
+"""Sweeps: grids of scenes, stored chunk by chunk, so that an interrupted run can be continued."""

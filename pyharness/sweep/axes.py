@@ -31,8 +31,8 @@ class Field:
     """A number of a scene or solver that an axis may vary.
 
     `allowed` describes the values that `takes` accepts. If `looped`, all scenes of a batch must
-    share the value; for the thesis's programs, step size and Lipschitz constant may differ all the
-    same. If `whole`, values are rounded to integers.
+    share the value, except step size and Lipschitz constant of the thesis's programs. If `whole`,
+    values are rounded to integers.
     """
 
     units: str
@@ -143,11 +143,11 @@ class Axis:
     """One axis of a sweep's grid: a field of the scene or solver, as in ``omega.1``.
 
     Axes with the same `dimension` (by default the field's name, or `sample` for random values) vary
-    together. `how` is one of the following, and determines what `values` contains:
+    together. `how` determines what `values` contains:
 
     - `listed`: all values of the axis;
     - a spacing of `SPACINGS`: the first and the last value;
-    - a distribution of `DRAWS`: the parameters of the distribution.
+    - a distribution of `DRAWS`: its parameters; `seed` then determines the values.
     """
 
     field: str

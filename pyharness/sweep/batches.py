@@ -1,7 +1,7 @@
 """Batches: scenes of a sweep that are solved in one call with the same settings.
 
-The n scenes of a batch share the values of one scene; `own` maps each field that varies to its n
-values.
+The n scenes of a batch share all fields of one scene except those in `own`, which maps each to its
+n values.
 """
 
 import tomllib
@@ -29,7 +29,7 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve chunk number `chunk`, from 0, in any executor.
+    """Solve chunk number `chunk`, from 0; every executor calls this function.
 
     The result maps each reduction to an array with the shape of the chunk, and one more dimension
     if the reduction has several components.
@@ -125,7 +125,7 @@ def _batch(sweep: Sweep, shared: dict[str, Any], own: Columns, n: int) -> Batch:
 def _components(
     name: str, base: tuple[float, ...], own: Columns, n: int, first: int = 1
 ) -> Array | None:
-    """Return the n values of each field ``name.1`` and so on, shape (n, fields); None if fixed."""
+    """Return the values of fields ``name.1`` and so on, shape (n, fields); None if none varies."""
     fields = {f"{name}.{number}": value for number, value in enumerate(base, first)}
     if not any(field in own for field in fields):
         return None
@@ -134,7 +134,7 @@ def _components(
 
 
 def _body(scene: Scene, own: Columns, n: int) -> tuple[str, Array | None]:
-    """Return "moments", "inertia" (kg m2) or "coefficients", with n values, or None if fixed."""
+    """Return "moments", "inertia" or "coefficients", and n values (kg m2 or 1), None if fixed."""
     if scene.coefficients is not None:
         return "coefficients", _components("body.coefficients", scene.coefficients, own, n)
     if scene.inertia is not None:
@@ -207,8 +207,8 @@ def _tilted(scene: Scene, moments: Array | None, tilt: Array, azimuth: Array) ->
 def check_state_axis(scene: Scene, field: str) -> None:
     """Raise InputError if the scene's torque lacks the field of an axis.
 
-    A torque that depends on the state has no fields for a constant and a linear term; only a torque
-    given by expressions has named constants.
+    A torque that depends on the state has no constant and no linear term; only a torque given by
+    expressions has named constants.
     """
     torque = scene.torque
     if isinstance(torque, StateTorque):

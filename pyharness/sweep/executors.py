@@ -45,7 +45,7 @@ class Engine(NamedTuple):
 
     workers: int
     computed: Callable[[Sweep, list[int]], Results]
-    is_here: bool = False  # whether the process that writes the results also computes them
+    is_here: bool = False  # whether the process that computes the results also writes them
 
 
 @contextlib.contextmanager
@@ -211,7 +211,6 @@ def _local_cluster(dask: Any, workers: int) -> Iterator[Any]:
 
 
 def _connected(dask: Any, address: str) -> Any:
-    """Return a client of the Dask scheduler at `address`."""
     found = _ADDRESS.fullmatch(address)
     allowed = "allowed: the address of a Dask scheduler with workers, as in tcp://host:8786"
     where = f"--scheduler '{address}'"

@@ -28,11 +28,11 @@ RANKS = ("least", "middle", "largest")
 class Reduction:
     """A quantity that a sweep can store for each scene, and its computation.
 
-    `compute` returns, for a batch of n scenes and the parameters, n values, or n rows with a value
-    for each of `labels`, along `dimension`. `only` is `program` or `method` if the quantity exists
-    for programs or methods alone. `needs` lists requirements of the scene: `moments`, `no torque`
-    or `attitude`. `parameters` has the defaults. If the values are codes of outcomes, `flags` has
-    their meanings.
+    For a batch of n scenes and the parameters, `compute` returns n values, or n rows with a value
+    for each of `labels`, whose dimension in the store is `dimension`. `only` is `program` or
+    `method` if the quantity exists for programs or methods alone. `needs` lists requirements of the
+    scene: `moments`, `no torque` or `attitude`. `parameters` has the defaults. If the values are
+    codes of outcomes, `flags` has their meanings.
     """
 
     title: str
@@ -159,7 +159,6 @@ def _pointing_error(batch: Batch, given: Mapping[str, Any]) -> Found:
 
 
 def _in_space(batch: Batch) -> Found:
-    """Return the attitudes at the end as quaternions, shape (n, 4)."""
     turn = batch.attitudes(1)[:, 0]
     return np.stack(np.broadcast_arrays(*product(batch.first_attitudes.T, turn.T)), axis=1)
 
@@ -170,7 +169,7 @@ def _tilts(batch: Batch, given: Mapping[str, Any]) -> Array:
 
 
 def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Return the squared cosine and the squared sine of half the tilt of an axis at each sample."""
+    """Return squared cosine and squared sine of half the angle of an axis from its initial one."""
     squares = batch.attitudes(given["samples"]) ** 2
     is_own = _is_own(batch, given, len(squares))[:, None, :]
     along = squares[:, :, 0] + np.where(is_own, squares[:, :, 1:], 0.0).sum(axis=2)
@@ -179,7 +178,6 @@ def _tilt_squares(batch: Batch, given: Mapping[str, Any]) -> tuple[Array, Array]
 
 
 def _is_own(batch: Batch, given: Mapping[str, Any], n: int) -> NDArray[np.bool_]:
-    """Return whether each principal axis of n bodies has the rank `of`, shape (n, 3)."""
     axis = np.argsort(batch.bodies, axis=1, kind="stable")[:, RANKS.index(given["of"])]
     return np.asarray(np.arange(3) == np.broadcast_to(axis, (n,))[:, None])
 

@@ -155,9 +155,9 @@ def chosen_quantity(sweep: Sweep, name: str | None) -> ReductionSpec:
 def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
     """Return the picture of a reduction.
 
-    The picture is a map over the last two dimensions that have several values, numbers and not
-    random. If there is only one such dimension, it is a line; if there is none, dots over a random
-    one.
+    Consider the dimensions with several values that are numbers and not random. The picture is a
+    map over the last two of them, a line if there is only one, and dots over a random dimension if
+    there is none.
     """
     from matplotlib.figure import Figure
 
@@ -204,7 +204,7 @@ def sweep_picture(store: Store, asked: ReductionSpec) -> Picture:
 def _panels(
     store: Store, asked: ReductionSpec, axis_of: dict[str, Axis], places: dict[str, Array]
 ) -> list[tuple[str, Array]]:
-    """Return title and values of each panel; panels differ in the values along other dimensions."""
+    """Return title and values of each panel; panels differ in component or in other dimensions."""
     choices: dict[str, list[int]] = {}
     room = _MOST_PANELS
     for dimension in (d for d in store.sweep.dimensions if d not in places):

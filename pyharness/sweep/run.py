@@ -1,4 +1,4 @@
-"""Runs of a sweep: check of its size, forecast from samples, computation of missing chunks."""
+"""Runs of a sweep: check of its size, forecast of its time, computation of missing chunks."""
 
 import contextlib
 import math
@@ -43,8 +43,7 @@ class Estimate(NamedTuple):
 def forecast(sweep: Sweep, path: str, n_missing: int, own: Engine) -> float:
     """Return the time (s) to solve and write the missing chunks, and to read all chunks.
 
-    If other processes compute, solving and writing overlap, and only the longer of both times
-    counts.
+    If other processes compute, solving and writing overlap, so that only the longer time counts.
     """
     write, read = seconds_of_files(sweep, path)
     solve = n_missing * seconds_per_chunk(sweep) / own.workers
@@ -95,7 +94,7 @@ def _pattern(sweep: Sweep, chunk: int) -> Arrays:
 def seconds_per_chunk(sweep: Sweep) -> float:
     """Return the time (s) to solve a chunk in this process.
 
-    It is measured on sample scenes or, if below 0.2 s, on whole chunks.
+    It is measured on sample scenes or, if these give less than 0.2 s, on whole chunks.
     """
     scenes = math.prod(sweep.chunk_shape)
     seconds = scenes * seconds_per_scene(sweep)
@@ -133,7 +132,7 @@ def places_of_a_chunk(sweep: Sweep, where: list[Indices]) -> list[Indices]:
 
     Along dimensions in which all scenes of a batch are equal, only five distinct indices remain, or
     more if the batches of a chunk are small. The batches of the sample are then about as large as
-    real ones.
+    those of a chunk.
     """
     shared = {axis.dimension for axis in sweep.axes if axis.field in looped_fields(sweep)}
     found, scenes = [], math.prod(sweep.chunk_shape)

@@ -1,8 +1,8 @@
 """The store of a sweep: a Zarr group in a folder, with one array for each reduction.
 
-A chunk of the grid has one file for each array, and a file with their checksums, which is written
-last. Every file is written under a temporary name and renamed. A chunk with checksums is therefore
-complete.
+A chunk of the grid has a file for each array, and a file with their checksums, which is written
+last. Every file is written under a temporary name and then renamed. Therefore a chunk with
+checksums is complete.
 """
 
 import contextlib

@@ -1,6 +1,6 @@
 """Layout of a sweep's store: its arrays, their metadata, its identity, and checksums of its files.
 
-The command `sha256sum --check` can read a file of checksums. The first line names the version of
+The command `sha256sum --check` can read a file of checksums. Its first line names the version of
 pyharness, the sweep and the part of the store, so that a file from elsewhere is detected. Each
 further line has the SHA-256 and the path of a file. In all functions `folder` is the folder of the
 store, and `name` a path in this folder.
@@ -34,7 +34,7 @@ _PIECE = 1 << 20  # bytes read at once
 
 
 class DamageError(Exception):
-    """A file of a store is damaged; the message names the file and the damage."""
+    """The exception for a damaged file of a store; its message names the file and the damage."""
 
 
 class Label(NamedTuple):
@@ -129,7 +129,7 @@ def exists(folder: Path, name: str) -> bool:
 
 
 def clear(folder: Path, name: str) -> None:
-    """Remove the file, link or folder at a path, and a file in the place of a parent folder."""
+    """Remove the file, link or folder at `folder / name`, and a file where a parent should be."""
     path = folder
     for part in Path(name).parts[:-1]:
         path /= part
@@ -177,7 +177,7 @@ def label(sweep: Sweep) -> Label:
 
 
 def labels(folder: Path) -> list[Label]:
-    """Return the readable identities in a store's metadata and in their checksums.
+    """Return the identities that can be read in a store's metadata and in their checksums.
 
     In an undamaged store there are two, which are equal.
     """
@@ -278,6 +278,6 @@ def _make_array(group: Any, sweep: Sweep, asked: ReductionSpec) -> None:
 
 
 def largest_chunk(sweep: Sweep) -> int:
-    """Return an upper bound of the size (bytes) of each file of a chunk."""
+    """Return an upper bound on the size (bytes) of each file of a chunk."""
     scenes = math.prod(sweep.chunk_shape)
     return 65536 + 2 * scenes * max(empty(asked, 1).nbytes for asked in sweep.reductions)

@@ -93,7 +93,7 @@ def _sweep(data: dict[str, Any], path: Path, text: str, claims: Mapping[str, Cla
 
 
 def _scene(table: object, path: Path) -> tuple[Scene, bytes]:
-    """Return the scene of the table [scene], and a zero byte with the bytes of its file, or b""."""
+    """Return the scene of the table [scene], and b"", or a zero byte and the bytes of its file."""
     if not isinstance(table, dict):
         raise InputError(f"scene is {kind_of(table)}; it must be a table [scene]")
     given = [key for key in ("case", "file") if key in table]
@@ -152,7 +152,6 @@ def _solver(table: object, axes: tuple[Axis, ...]) -> Solver:
 
 
 def _reduction(entry: object, claims: Mapping[str, Claim]) -> ReductionSpec:
-    """Return the reduction of `entry`, a name or a table; raise InputError if it is invalid."""
     table = {"name": entry} if isinstance(entry, str) else entry
     if not isinstance(table, dict) or "name" not in table:
         raise InputError("reductions: allowed: names, and tables with name and parameters")
@@ -307,7 +306,6 @@ def _chosen_together(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _check_solvers(sweep: Sweep) -> None:
-    """Raise InputError for an unknown solver, a tolerance that is not allowed, or `t_end` 0."""
     solver = sweep.solver
     programs = list(_choices(sweep, "program", solver.program))
     own = [] if programs else _choices(sweep, "method", solver.method)

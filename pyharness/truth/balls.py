@@ -1,7 +1,7 @@
-"""Number types of the enclosures: balls, power series of balls, complex balls, and functions.
+"""Numbers of the enclosures: balls, power series of balls, complex balls, and their functions.
 
 A ball is an interval, stored as middle and radius. Each operation of python-flint returns a ball
-that contains the exact result for all numbers in its operands.
+that contains the exact results for all numbers in the operands.
 """
 
 from bisect import bisect_left, bisect_right

@@ -1,7 +1,7 @@
 """Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
-A proof encloses the solution in balls (intervals, given by middle and radius). The distance of the
-reference from their farthest points bounds its error.
+A proof encloses the solution in balls (intervals, given by middle and radius). The largest distance
+of the reference from a point of its ball bounds the error.
 """
 
 import math
@@ -36,7 +36,8 @@ class ErrorBound(NamedTuple):
     """Bounds on the error of the reference at all its times.
 
     `value` is for any component of omega (rad/s), `angle` for the attitude (rad). Each has a basis,
-    "proved" or "estimated". `warning` is a sentence if the proved error exceeds the estimate.
+    "proved" or "estimated". `warning` is a sentence if the proof shows an error above the estimate,
+    else empty.
     """
 
     value: float
@@ -125,12 +126,12 @@ def error_bound(
     """Return the error bound of the reference at `times` (s).
 
     `omega` (rad/s) and `remainder`, which is added to it, have the shape (n, 3), `attitude` (n, 4).
-    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, which remain where nothing is
-    proved.
+    `claimed` (rad/s) and `claimed_angle` (rad) are the estimates, returned where nothing is proved.
 
-    Without python-flint, omega is proved if the scene can have a certificate. With python-flint,
-    the attitude is proved in torque-free motion, and with `any_torque` both under any recorded
-    torque. The limit of a proof is about half a second times `effort`.
+    The bound of omega is proved, even without python-flint, if the scene can have a certificate.
+    With python-flint, that of the attitude is proved in torque-free motion; and both bounds under
+    any recorded torque if `any_torque`. The work limit of a proof is about half a second times
+    `effort`.
     """
     rows = _exact(omega, remainder)
     order = sorted(range(len(times)), key=lambda k: abs(times[k]))
@@ -154,7 +155,7 @@ def _exact(omega: Array, remainder: Array | None) -> Sequence[Row]:
 
 
 def joined(found: Sequence[ErrorBound]) -> ErrorBound:
-    """Return the largest of the bounds in `found`, at least one."""
+    """Return the largest of the bounds in `found`, which must not be empty."""
     angles = [each.angle for each in found if each.angle is not None]
     bases = [each.angle_basis for each in found if each.angle_basis is not None]
     return ErrorBound(
@@ -201,7 +202,7 @@ class _Statement(NamedTuple):
     def _balls(
         self, any_torque: bool, effort: float
     ) -> tuple[Sequence[Balls] | None, Sequence[Balls] | None]:
-        """Return balls of omega and of the attitude, each None without a proof."""
+        """Return balls that contain omega and the attitude; None for what is not proved."""
         # Imported only here, because few programs need the provers.
         from pyharness.truth.certificate import has_certificate, prove
 
@@ -227,7 +228,7 @@ class _Statement(NamedTuple):
         return omega, attitude
 
     def _digits(self) -> int | None:
-        """Return the digits for balls that are small against the estimate; None if too many."""
+        """Return the digits that make balls small against the estimate; None if more than 60."""
         largest = max(1.0, *(abs(float(x)) for row in self.omega for x in row))
         if not (0.0 < self.claimed < math.inf):
             # Omega is 0 at all times, or there is no estimate.
@@ -259,9 +260,10 @@ def _extreme_angles(
 ) -> tuple[float, float]:
     """Return the least and the largest error (rad) that the quaternions `rows` may have.
 
-    The error is twice the angle between the lines of two quaternions. For the sine s of the angle
-    to the ball's middle, arcsin(s) < s (1 + s**2) if s <= 1/2. Four radii r have the norm 2 r, so
-    that middle and true line differ by at most arcsin(2 r) < 4 r.
+    The error is twice the angle between the lines of the quaternions `rows` and of the true ones.
+    For the sine s of the angle between a row and the middle of its ball, arcsin(s) < s (1 + s**2)
+    if s <= 1/2. Four components of at most the radius r have a norm of at most 2 r, so that middle
+    and true line differ by at most arcsin(2 r) < 4 r.
     """
     least = most = 0.0
     for row, (middle, radius) in zip(rows, found, strict=True):

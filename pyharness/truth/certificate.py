@@ -1,6 +1,6 @@
 """Proofs by Taylor steps in integer arithmetic, and their certificates.
 
-The bounds of a step are those of `certificate_checker`, which verifies each step and ball of a
+Steps are bounded as in `certificate_checker`, which verifies each step and ball (interval) of a
 certificate without trusting this module.
 """
 
@@ -56,7 +56,7 @@ class Proof:
 
 
 class _AmplifiedError(Exception):
-    """Signal that amplified errors need more digits; their number is the argument."""
+    """Signal that amplified errors require further digits, whose number is the argument."""
 
 
 def has_certificate(scene: Scene) -> bool:
@@ -202,7 +202,7 @@ class _Run:
     def _expected_excess(
         self, radius: int, source: int, middle: Sequence[int], share: float
     ) -> float:
-        """Return by how many digits the last radius will be too large, by extrapolation."""
+        """Return, by extrapolation, by how many digits the radius will be too large at the end."""
         amplified = self._amplified
         total = amplified[-1][1] + math.log10(radius) - math.log10(source)
         amplified.append((share, total))
@@ -213,7 +213,7 @@ class _Run:
         return math.log10(radius) - math.log10(unit) + self._goal + rate * (1.0 - share)
 
     def _tube(self, radius: int, wave_radius: int, expansion: Expansion, h: int) -> tuple[int, int]:
-        """Return the error of one step without amplification, and a larger radius for the tube."""
+        """Return a bound on a step's error without amplification, and the radius of its tube."""
         series, residuals, wave_residual = expansion
         forced = self._system.forced(h) * (wave_radius + wave_residual) >> 64
         source = radius + self._system.norm(residuals) + forced

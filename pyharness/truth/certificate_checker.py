@@ -10,9 +10,9 @@ Taylor series with coefficients rounded down. Any polynomial would do, because t
 residual d = p' - h f(p).
 
 The error e = y - p obeys |e|' <= h mu |e| + |d| (Dahlquist 1958). Here mu bounds the logarithmic
-norm of the Jacobian of f in a tube around p. The resulting bound of |e|, the radius of the step,
-holds while |e| is less than the radius of the tube. If the bound itself is less, it holds on the
-whole step, because |e| is continuous.
+norm of the Jacobian of f in a tube around p. The resulting bound on |e|, the radius of the step,
+holds while |e| is less than the radius of the tube. If the bound is less than this radius too, it
+holds on the whole step, because |e| is continuous.
 
 A number y is stored as the integer y 2**bits, a time t (s) as t 2**clock. The norm of an error of
 omega is sqrt(sum (e_i / scale_i)**2), with scales in units of 2**-20.
@@ -49,9 +49,10 @@ def over(numerator: int, denominator: int) -> int:
 class System:
     """Euler's equations of a scene, with integer coefficients: equations 13-15 of the thesis.
 
-    They are D y_i' = P y_j y_k + C + R t + sum (S s_f + G c_f), with i, j, k in cyclic order. Each
-    frequency f of the torque adds two unknowns, with s_f' = f c_f and c_f' = -f s_f. An entry of
-    `rows` is D and the list P, C, R, and S, G of each frequency.
+    They are D y_i' = P y_j y_k + C + R t + sum over f of (S s_f + G c_f), with i, j, k in cyclic
+    order. Each frequency f of the torque adds the unknowns s_f and c_f, its sine and cosine, with
+    s_f' = f c_f and c_f' = -f s_f. An entry of `rows` is D, and a list of P, C, R and of S, G for
+    each frequency.
     """
 
     def __init__(self, scene: dict[str, Any], bits: int, clock: int, scales: Sequence[int]) -> None:
@@ -81,7 +82,7 @@ class System:
         self.factors = [abs(parts[i] + parts[j]) * scales[i] * scales[j] / 2 for i, j in pairs]
 
     def expand(self, state: Sequence[int], time: int, h: int, order: int) -> Expansion:
-        """Return Taylor series, and bounds on the residuals of omega and waves, over 2**bits."""
+        """Return Taylor series, and bounds on the residuals of omega and of sines and cosines."""
         series, bits, clock, wave_residual = [[x] for x in state], self.bits, self.clock, 0
         # Coefficient k is rounded down by less than 1, which changes the residual by less than k.
         rounding = order * (order + 1) // 2
@@ -121,7 +122,7 @@ class System:
         return isqrt(sum(x * x for x in parts)) + 1
 
     def forced(self, h: int) -> int:
-        """Return a bound on h times the norm of the Jacobian of omega' by the waves, over UNIT."""
+        """Return a bound on h times the norm of d(omega')/d(sines, cosines), times UNIT."""
         total = 0
         for (common, (_, _, _, *amplitudes)), scale in zip(self.rows, self.scales, strict=True):
             push = sum(map(abs, amplitudes)) * abs(h) << SCALE_BITS
@@ -129,7 +130,7 @@ class System:
         return total
 
     def growth(self, series: Sequence[Sequence[int]], tube: int, h: int) -> int:
-        """Return a bound on h mu, for the Jacobian of omega' by omega, over UNIT."""
+        """Return a bound on h mu, where the Jacobian is d(omega')/d(omega), times UNIT."""
         growth = 0
         for factor, each, scale in zip(self.factors, series, self.scales, strict=False):
             # The mean is a sharper bound, but for a small factor not worth its time.
@@ -141,7 +142,7 @@ class System:
     def radii(
         self, radius: int, wave_radius: int, expansion: Expansion, tube: int, h: int
     ) -> tuple[int, int]:
-        """Return radii of omega and waves for a whole step, or raise NotProvedError."""
+        """Return the radii of omega and of the waves for a step, or raise NotProvedError."""
         series, residuals, wave_residual = expansion
         growth = self.growth(series, tube, h)
         if growth > 2 * UNIT:
@@ -157,7 +158,7 @@ class System:
     def ball(
         self, series: Sequence[list[int]], place: Fraction, radius: int
     ) -> tuple[list[int], Fraction]:
-        """Return middle and radius of omega at the fraction `place` of a step, over 2**bits."""
+        """Return middle and radius of omega, times 2**bits, at the fraction `place` of a step."""
         middle, (n, d) = [0, 0, 0], place.as_integer_ratio()
         for i, each in enumerate(series[:3]):
             for x in reversed(each):
@@ -177,7 +178,7 @@ def mean(polynomial: Sequence[int]) -> int:
 
 
 def exponential(x: int) -> int:
-    """Return a bound on exp(x), x from 0 to 2; both over UNIT."""
+    """Return a bound on exp(x), x from 0 to 2; both are times UNIT."""
     total = term = UNIT
     for k in range(1, 20):
         term = over(term * x, k * UNIT)

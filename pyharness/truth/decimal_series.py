@@ -1,7 +1,7 @@
 """Omega, velocity and attitude by Taylor series of equations 13-15 in decimal arithmetic.
 
-In functions of Taylor series, `coefficients` has the Taylor coefficients of each unknown; elsewhere
-it is A, B, C.
+The argument `coefficients` is A, B, C, but in functions of Taylor series the coefficients of each
+unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,10 +48,9 @@ def taylor_series(
     """Return a row of omega (rad/s), velocity (m/s) and attitude at each of `times` (s).
 
     The rows end where omega grows without bound or the torque is singular. Quaternions keep the
-    norm of the scene's quaternion. `coefficients` are A, B, C. `order` is the degree of the series,
-    which high powers in the torque may increase. `tolerance` is local and relative. `effort` is a
-    factor on a work limit of some ten seconds; None means a limit of 100 000 steps, fewer if the
-    torque depends on the state.
+    norm of the scene's quaternion. `order` is the degree of the series, which high powers in the
+    torque may increase. `tolerance` is local and relative. `effort` is a factor on a work limit of
+    some ten seconds; None means a limit of 100 000 steps, fewer if the torque depends on the state.
     """
     equations, limit = _Equations(scene, coefficients, velocity), _Limit(scene, effort)
     tape = equations.tape
@@ -170,8 +169,8 @@ class _Limit:
         """Return the expected number of steps until the end.
 
         `begin` (s) is the time after `step` steps, `rest` (s) the remaining time. The mean length
-        of a step is assumed to remain. If the number of steps grew with a power of time above 1.3,
-        this power, at most 3, is extrapolated.
+        of a step is assumed to remain; but if the number of steps so far grew with a power of time
+        above 1.3, it is extrapolated with this power, at most 3.
         """
         step_before, begin_before = self._before
         power = Decimal(1)
@@ -209,8 +208,8 @@ def _law_of(scene: Scene) -> TorqueLaw:
 def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: int = 3) -> Decimal:
     """Return the length (s), at most `rest`, of a step whose last two Taylor terms are small.
 
-    They are at most `tolerance` times the largest of the first `leading` unknowns, or of their
-    first nonzero Taylor terms if these unknowns are 0.
+    The terms are at most `tolerance` times the largest of the first `leading` unknowns, or if these
+    are 0, of their first nonzero Taylor terms.
     """
     order = len(coefficients[0]) - 1
     begun = next((j for j in range(order - 1) if _size(coefficients, j, leading)), None)
@@ -229,7 +228,6 @@ def _step(coefficients: list[Row], tolerance: Decimal, rest: Decimal, leading: i
 
 
 def _size(coefficients: list[Row], k: int, unknowns: int | None = None) -> Decimal:
-    """Return the largest absolute Taylor coefficient k of the first (or all) unknowns."""
     return max(abs(series[k]) for series in coefficients[:unknowns])
 
 
@@ -247,8 +245,8 @@ def _is_continued(
 ) -> bool:
     """Return whether the rates at the end of a step agree with the derivative of the Taylor series.
 
-    A pulse of the torque within the step may be invisible at its beginning. Rounding errors, which
-    the last of the `equations` determines, are allowed.
+    They disagree after a pulse of the torque that is invisible at the beginning of the step.
+    Differences due to rounding, which the last of the `equations` show, are allowed.
     """
     slopes = _evaluate([[k * x for k, x in enumerate(row)][1:] for row in series], length)
 
@@ -278,8 +276,9 @@ def divisors(scene: Scene) -> tuple[Fraction, Fraction, Fraction]:
 class _Equations:
     """The equations of one scene as recurrences of Taylor coefficients.
 
-    `velocity` adds dV/dt = F/m - omega x V; an attitude adds dq/dt = q (0, omega)/2. For a changing
-    inertia the equations are (I omega)' = N - omega x (I omega), without `coefficients` (A, B, C).
+    `velocity` adds dV/dt = F/m - omega x V, with force F and mass m; an attitude adds dq/dt =
+    q (0, omega)/2. For a changing inertia I and a torque N the equations are (I omega)' = N - omega
+    x (I omega), without `coefficients`.
     """
 
     def __init__(
@@ -306,7 +305,7 @@ class _Equations:
     def expand(self, time: Decimal, state: Row, order: int, forward: bool) -> list[Row]:
         """Return the Taylor coefficients 0 to `order` of all unknowns around `time` (s).
 
-        Where a table changes, they hold after `time` if `forward`, else before it.
+        If a table changes at `time`, they hold after it if `forward`, else before it.
         """
         series = [[x] for x in state]
         torque = self._torque_series(time, order, series, forward)

@@ -19,9 +19,9 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    A switch changes where its operand crosses a level. `_levels` has, by slot of a switch whose
-    operand is at a level, -1 if the level is the lower end of the operand's interval, 1 if it is
-    the upper end.
+    A switch changes where its operand crosses a level: 0, or a whole number for a floor. Between
+    levels, the operand is in an interval. For each switch whose operand is at a level, `_levels`
+    has by slot -1 if the level is the lower end of this interval, 1 if it is the upper end.
     """
 
     def __init__(self, tape: TapeSeries) -> None:
@@ -53,7 +53,7 @@ class Switches:
         return False
 
     def turns(self, time: Decimal, length: Decimal) -> bool:
-        """Return whether an operand would not leave its level, so that its result was changed.
+        """Change the result of an operand that would not leave its level; return whether one was.
 
         Raise TimedError if it leaves the level with neither result.
         """
@@ -76,7 +76,7 @@ class Switches:
         return False
 
     def end(self, length: Decimal) -> Decimal:
-        """Return the step (s), shortened to resolve all operands, and to end at the first root."""
+        """Return the step (s), shortened to resolve all operands and to end at the first root."""
         while any(self._is_unresolved(x, length) for *_, x in self._tape.operands_of_switches()):
             length *= Decimal("0.75")
         roots = []
@@ -116,7 +116,7 @@ class Switches:
 
 
 def _first_root(terms: Row, length: Decimal, side: int) -> Decimal | None:
-    """Return the first place up to `length` where a series changes to the sign opposite to `side`.
+    """Return the first place up to `length` where a series gets the sign opposite to `side`.
 
     The roots of the polynomial are the eigenvalues of its companion matrix, in binary64, which
     Newton's method corrects.

@@ -1,8 +1,8 @@
 """Torque-free motion by Jacobi's elliptic functions in decimals, to check other methods.
 
-Unlike a Taylor series, they lose no digits with time, and many flips near the separatrix take no
-more work. The module uses Landen's transformation, and shares no code with the closed form that it
-checks.
+Unlike a Taylor series, they lose no digits with time, and a long time with many flips (sign changes
+of omega near the separatrix) takes no more work. The module uses Landen's transformation, and
+shares no code with the closed form that it checks.
 """
 
 import decimal
@@ -23,8 +23,8 @@ def torque_free(scene: Scene, time: float | Decimal, rounded: bool = False) -> R
     """Return omega (rad/s) of a scene without torque at `time` (s).
 
     If `rounded`, A, B and C are rounded to binary64. Raise InputError if the torque depends on the
-    state, or an unsteady motion may be unbounded. It is bounded if A, B, C belong to moments, or
-    one is above and one below 0.
+    state, or an unsteady motion may be unbounded. It is bounded if the body has moments, or if at
+    least one of A, B, C is above 0 and one below 0.
     """
     i = checked_scene(scene).exact_moments
     a, w = [Fraction(x) for x in scene.euler_coefficients], [Fraction(x) for x in scene.omega]
@@ -72,9 +72,9 @@ def _solution(coefficients: Sequence[Fraction], start: Sequence[Fraction], time:
 def _general(a: Sequence[Fraction], omega: Sequence[Fraction], time: Decimal) -> Row:
     """Return omega (rad/s) at `time` (s) if no coefficient is 0 and the second is negative.
 
-    Scaled components obey x' = y z, y' = -z x, z' = x y. p = x**2 + y**2 and q = z**2 + y**2
-    (1/s**2) are compared as fractions: on the separatrix, p = q, a rounding error would cause
-    flips.
+    The scaled components x, y, z (1/s) obey x' = y z, y' = -z x, z' = x y. Their integrals p = x**2
+    + y**2 and q = z**2 + y**2 are compared as fractions: on the separatrix, p = q, a rounding error
+    would cause flips.
     """
     s1, s2, s3 = (abs(each) for each in a)
     squares = [s2 * s3, s1 * s3, s1 * s2]

@@ -23,7 +23,8 @@ class Enclosure:
     """Balls that contain the solution of one scene; quantities that were not requested are None.
 
     The attitude is a unit quaternion, scalar first. The transition matrix has, row by row, the
-    derivatives of omega and of the (not normalised) quaternion by omega at time 0.
+    derivatives of omega and of the quaternion, before its normalisation, with respect to omega at
+    time 0.
     """
 
     time: tuple[float, ...]  # s
@@ -95,7 +96,7 @@ def rounded_up(x: Fraction) -> float:
 def largest_radius(omega: Sequence[Balls], digits: int) -> Fraction:
     """Return the largest ratio of a radius to the allowed radius.
 
-    Allowed is 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
+    A radius may be 10**-digits rad/s, times the largest component of omega if that exceeds 1 rad/s.
     """
     largest = Fraction(0)
     for middle, radius in omega:
@@ -121,9 +122,9 @@ def _decimal(x: Fraction, digits: int) -> str:
 def scales_of(coefficients: Sequence[Fraction]) -> list[float]:
     """Return the units in which proofs measure errors of the components of omega, at most 1.
 
-    They are the square roots of abs(A), abs(B) and abs(C) over the largest of these, but at least
-    0.01. If none is 0.01, the logarithmic norm is 0 for rotations about the axes of the largest and
-    smallest moment.
+    They are the square roots of abs(A), abs(B) and abs(C), divided by the largest of these, but at
+    least 0.01. If this limit does not apply, the logarithmic norm is 0 for rotations about the axes
+    of the largest and the smallest moment.
     """
     sizes = [abs(x) for x in coefficients]
     largest = max(sizes) or Fraction(1)

@@ -94,8 +94,9 @@ class Orbit:
     """A torque-free motion that is not steady, with nonzero coefficients.
 
     Omega about the three `axes` is `sizes` (rad/s) times cn(u), sn(u) and dn(u), where u = `start`
-    + `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` is k**2, and `square` the square of
-    the size that multiplies dn. On the separatrix m = 1; cn and dn are then sech, and sn is tanh.
+    + `rate` t, with `rate` in 1/s; see DLMF Table 22.13.1. `m` is k**2, with the modulus k, and
+    `square` the square of the size that multiplies dn. On the separatrix m = 1; cn and dn are then
+    sech, and sn is tanh.
     """
 
     def __init__(self, a: list[Fraction], w: list[Fraction]) -> None:
@@ -165,10 +166,10 @@ class _Attitude:
 
     Let e be the direction of the axis of dn and n that of the angular momentum L, both in the body,
     and T the kinetic energy. Then n e = c dn(u) with c > 0. The attitude is the product of a
-    constant, the rotation by psi about e, and the smallest rotation from n to e.
+    constant rotation, the rotation by psi about e, and the smallest rotation from n to e.
 
-    Euler's equations give psi' = (2 T/L + omega e)/(1 + n e). Like dn, psi' has the periods 2K and
-    4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the
+    Euler's equations give psi' = (2 T/|L| + omega e)/(1 + n e). Like dn, psi' has the periods 2K
+    and 4iK' in complex u. Its poles, where dn(u) = -1/c, are at u = 2iK' + iy and 2iK' - iy; the
     residues of psi'/(2 rate) are 1/2i and -1/2i, or opposite. The derivative of the phase of
     theta4((u - iy)/2K | 2 tau), or of its conjugate, has the same periods, poles and residues, so
     that the difference is constant.

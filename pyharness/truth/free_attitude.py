@@ -1,9 +1,9 @@
 """Attitude of a torque-free body at any time in decimals, to check other methods.
 
 In each period of omega the body rotates about the angular momentum by the same angle, so that
-Taylor series integrate only one period. Near the separatrix errors of omega grow exponentially;
-segments therefore start from the omega of `elliptic.py`. No code is shared with the closed form
-that this module checks.
+Taylor series integrate only one period. It is divided into segments that start from the omega of
+`elliptic.py`, because near the separatrix errors of omega grow exponentially. No code is shared
+with the closed form that this module checks.
 """
 
 import decimal
@@ -30,9 +30,10 @@ _MOST_RADIANS = 1e5  # work limit of the integration; some three minutes
 def free_attitude(scene: Scene, time: float) -> Row:
     """Return the attitude of a scene without torque at `time` (s), as a unit quaternion.
 
-    Its sign is continuous in time. The scene must have moments and an attitude. On the separatrix,
-    where omega has no period, the motion is integrated until the rotation is steady to all digits.
-    Raise InputError if the integration takes too many steps, or if the torque depends on the state.
+    The sign of the quaternion is continuous in time. The scene must have moments and an attitude.
+    On the separatrix, where omega has no period, the motion is integrated until omega is constant
+    to all digits. Raise InputError if the integration takes too many steps, or if the torque
+    depends on the state.
     """
     checked_scene(scene)
     assert scene.attitude is not None
@@ -62,7 +63,7 @@ def period_of(scene: Scene) -> Decimal | None:
 
 
 def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
-    """Return the rate (1/s) of the elliptic functions, and omega's period (s) or None.
+    """Return the rate (1/s) of the elliptic functions, and omega's period (s).
 
     The period is None on the separatrix. Perturbations grow by at most some exp(rate * time).
     """
@@ -88,10 +89,10 @@ def _rate_and_period(scene: Scene) -> tuple[Decimal, Decimal | None]:
 
 
 def _settling_time(scene: Scene, rate: Decimal) -> Decimal:
-    """Return a time (s) beyond which, either way, a separatrix motion is steady to all digits.
+    """Return a time (s) after which, and before its negative, a separatrix motion is steady.
 
-    The components about the outer axes are proportional to sech(rate * time - u), where exp(abs(u))
-    is at most 2/sech(u).
+    Omega is then constant to all digits: its components about the axes of the least and the largest
+    moment are proportional to sech(rate * time - u), where exp(abs(u)) is at most 2/sech(u).
     """
     i, w = list(scene.exact_moments or ()), [Fraction(x) for x in scene.omega]
     low, middle, high = sorted(range(3), key=lambda axis: i[axis])

@@ -47,7 +47,7 @@ class _OtherUnitError(Exception):
 def integer_series(scene: Scene, times: Sequence[float]) -> Path:
     """Return the solution of a scene at `times` (s).
 
-    Before rounding, its error is some 1e-29 of the largest omega, times the error amplification.
+    Before rounding, the error is some 1e-29 of the largest omega, times the error amplification.
     """
     size = _guess(scene, abs(Fraction(times[-1])))
     power = size.numerator.bit_length() - size.denominator.bit_length() if size else 0
@@ -60,7 +60,7 @@ def integer_series(scene: Scene, times: Sequence[float]) -> Path:
 
 
 def _guess(scene: Scene, span: Fraction) -> Fraction:
-    """Return a guess of the largest omega (rad/s) up to `span` (s): initial, or by torque alone."""
+    """Return a guess of the largest omega (rad/s) until `span` (s): initial, or by the torque."""
     law = scene.body_torque
     found = [abs(Fraction(w)) for w in scene.omega]
     for axis, moment in enumerate(scene.moments or (1.0, 1.0, 1.0)):
@@ -121,7 +121,7 @@ def _integrate(scene: Scene, times: Sequence[float], power: int) -> Path:
 
 
 def _evaluate(terms: Series, part: Fraction) -> Fraction:
-    """Return a series at the fraction `part` of its step, from its terms at the step's end."""
+    """Return a series at the fraction `part` of a step; `terms` are its terms at the end."""
     fixed = _fixed(part)
     total = 0
     for term in reversed(terms):

@@ -40,11 +40,11 @@ class Reference:
 
     time: Array  # shape (n,), s; the requested times, up to the last one with finite omega
     omega: Array  # shape (n, 3), rad/s
-    # shape (n, 3), m/s; translational velocity under the scene's forces on its first mass, or None
+    # shape (n, 3), m/s; velocity of the scene's first mass under the scene's forces, or None
     velocity: Array | None
     source: str  # a text that states how the solution was computed
     estimate: float  # estimated error of any omega before rounding (rad/s)
-    # shape (n, 3), rad/s; the part of omega that rounding removed, with as many digits again
+    # shape (n, 3), rad/s; the part of omega that rounding removed, rounded to binary64
     remainder: Array | None = None
     attitude: Array | None = None  # shape (n, 4), unit quaternions; None if the scene has none
     angle_estimate: float = 0.0  # estimated error of any attitude before rounding (rad)
@@ -71,9 +71,9 @@ def reference(
     """Return the reference solution of `scene` at `times` (s).
 
     The times have one sign and lead away from 0; the first may be 0. The estimated error is the
-    largest difference of two integrations with different order and steps, times four if `precise`.
-    A `precise` series is accurate to 1e-25 before rounding, unless errors are amplified too much.
-    Attitudes are always computed by the series.
+    largest difference of two integrations with different orders and steps, times four if `precise`.
+    A `precise` series has an error of at most 1e-25 before rounding, unless errors are amplified
+    too much. Attitudes are always computed by the series.
 
     `effort` is a factor on a work limit of some ten seconds, forecast from the first steps; None
     means 100 000 steps. A torque that depends on the state must be recorded; the rows end before
@@ -149,8 +149,7 @@ def _check_torque(scene: Scene) -> None:
 def known_solution(scene: Scene, times: Sequence[Decimal]) -> list[Row] | None:
     """Return omega (rad/s) of a sphere or a torque-free symmetric body in closed form, else None.
 
-    It has as many digits after the decimal point as the arithmetic has digits; digits before the
-    point are added to the precision.
+    It has as many digits after the decimal point as the precision of the decimal context.
     """
     if isinstance(scene.torque, StateTorque) or scene.changing is not None:
         return None

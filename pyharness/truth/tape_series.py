@@ -58,15 +58,15 @@ class TapeSeries:
     """The Taylor series of a tape's operations around a time.
 
     `begin` starts an expansion, and each `next` adds a coefficient to all series. `least_order` is
-    the lowest order at which all products of the tape show in the series.
+    the lowest order whose series show all products, also those whose factors are 0 at that time.
     """
 
     def __init__(
         self, tape: Tape, change: Decimal = Decimal(0), results: dict[int, Decimal] | None = None
     ) -> None:
-        """Store the operations; terms of sums are multiplied by 1 plus or minus `change`.
+        """Store the operations, with terms of sums multiplied by 1 plus or minus `change`.
 
-        `results` has the results of switches by slot, which the caller changes.
+        `results` has the results of switches by slot; the caller changes them.
         """
         self.results = {} if results is None else results
         self._tape = tape
@@ -197,7 +197,7 @@ class TapeSeries:
         return new
 
     def _slope(self, operand: int, k: int) -> Row:
-        """Return coefficients 1 to k of a slot, each times its number."""
+        """Return coefficients 1 to k of a slot, times their numbers."""
         slope = self._slopes.setdefault(operand, [])
         if len(slope) < k:
             slope.append(k * self._slots[operand][k])
@@ -215,10 +215,10 @@ class TapeSeries:
         """Return the step (s), reduced so that the series of every operation converges.
 
         An exponential, or the derivative of a hyperbolic tangent, may be negligible at the
-        beginning of a step and large a little later. Its argument therefore changes by at most half
-        the order, unless the function remains negligible. The mean order of the terms of a product,
-        weighted by their magnitudes, is limited in the same way. A divisor has no zero in the
-        circle around the beginning whose radius is the step.
+        beginning of a step and large a little later. Its argument may therefore change by at most
+        half the order, unless the function remains negligible. The mean order of the terms of a
+        product, weighted by their magnitudes, is limited in the same way. A divisor must have no
+        zero in the circle around the beginning whose radius is the step.
         """
         for _, operation in self._live_operations():
             most = self._largest_change(operation)
@@ -253,7 +253,7 @@ class TapeSeries:
         return 2 * order > self._order and size > least
 
     def _largest_change(self, operation: Operation) -> Decimal | None:
-        """Return the limit, or None, of the change of an operation's last operand in a step."""
+        """Return the limit of the change of an operation's last operand in a step, None if none."""
         if operation.kind not in ("exp", "tanh", "quotient"):
             return None
         x = self._slots[operation.operands[-1]][0]
@@ -273,10 +273,10 @@ class TapeSeries:
         return self._changes[place] if 0 <= place < len(self._changes) else None
 
     def crosses_a_branch(self, offset: Decimal) -> bool:
-        """Return whether a square root reaches 0 up to `offset` (s) from the expansion.
+        """Return whether a square root reaches 0 within `offset` (s) of the expansion's time.
 
-        Beyond a double zero the series is the negative of the root: the series of sqrt(x**2) is x
-        or -x.
+        Beyond a double zero its series is the negative of the root, as for sqrt(x**2), whose series
+        is x or -x.
         """
         for slot, operation in self._live_operations():
             if operation.kind == "sqrt":
@@ -315,7 +315,7 @@ def _powers(tape: Tape) -> tuple[list[_Power], int]:
 
 
 def _divisors(tape: Tape) -> dict[int, set[int]]:
-    """Return, by slot, the divisors of quotients and the arguments of roots that depend on it."""
+    """Return, by slot, the divisors of quotients and the arguments of roots in which it occurs."""
     found: dict[int, set[int]] = {}
     for slot, (kind, operands, linear, _) in reversed([*enumerate(tape.operations, N_INPUTS)]):
         parts = operands if linear is None else [each for each, _ in linear.terms]

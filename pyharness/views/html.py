@@ -9,7 +9,7 @@ from pyharness.model.report import Field, Line, Section, Table
 
 
 def sections(text: Sequence[Section]) -> str:
-    """Return sections as HTML, with numbers written as in text output."""
+    """Return sections of a report as HTML; numbers are rounded as in text output."""
     return "\n".join(part for section in text if section for part in _write_section(section))
 
 

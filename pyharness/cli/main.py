@@ -22,7 +22,7 @@ _GROUPS = {
     "the thesis": {
         "claims": "judge the statements of the thesis by its programs, with evidence",
         "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
-        "cards": "show the printed cards with the scan, our versions and the notes",
+        "cards": "show printed cards, the scanned text, our Fortran and Python, notes",
         "defects": "list defects and doubtful cards of the programs, and their effects",
         "deck": "write a program of the thesis as a deck of FORTRAN cards",
         "limits": "show the limits of the original programs as the step size goes to 0",
@@ -30,13 +30,13 @@ _GROUPS = {
         "words": "run the programs in CDC arithmetic and in other word lengths",
     },
     "rigid bodies": {
-        "rotations": "find steady rotations, their stability and the time between flips",
+        "rotations": "find steady rotations, their stability, and the time between flips",
         "prove": "enclose the true solution in proved intervals, with certificates",
         "sweep": "solve a grid of scenes, locally or on a cluster; store the results",
     },
     "checks and publication": {
         "verify": "check our programs and methods, your port, or your integrator",
-        "stress": "test the numerical stability of every method against theory",
+        "stress": "test every method in extreme scenes against bounds from theory",
         "bench": "measure run time against error of our and third-party integrators",
         "edition": "write the annotated programs as a web site or as plain data",
     },

@@ -42,24 +42,26 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original, with all defects (faults of its author; "
     "default), or corrected, without any.",
-    "--fix NAME,...": "Run the original program with these defects corrected and all others kept "
-    "(names: `pyharness defects`).",
-    "--keep NAME,...": "Run the original program with these defects kept and all others corrected.",
-    "--reading NAME,...": "Read these doubtful cards of the original program in the other "
-    "possible way, instead of ours (names: `pyharness defects --kind reading`).",
+    "--fix NAME,...": "Correct these defects of the original program and keep all others (names: "
+    "`pyharness defects`).",
+    "--keep NAME,...": "Keep these defects of the original program and correct all others.",
+    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the other possible "
+    "way, instead of ours (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
     "torque-held).",
     "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
-    "program stops when a derivative changes by more than L times the change of its variable.",
+    "program stops when, within a step, a derivative changes by more than L times the change of its "
+    "variable.",
     "--no-stop": "Omit the stop test of --lipschitz, so that the Runge-Kutta program runs to its "
     "last step.",
 }
-EFFORT = {
-    "--effort F": "Multiply the work limit of each computation by F, above 0 (default 1: "
-    "about ten seconds, or about 30 seconds for a program of the thesis). Beyond the limit, the "
-    "computation ends with an error."
-}
+_EFFORT = (
+    "Multiply the work limit of each computation by F, above 0 (default 1: about ten seconds{}). "
+    "Beyond the limit, the computation ends with an error."
+)
+EFFORT = {"--effort F": _EFFORT.format(", or about 30 seconds for a program of the thesis")}
+EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
     "--strict": "Exit with status 1 not only if a result is unexpected, but also if amplified "
     "rounding errors may exceed the tolerance."
@@ -97,8 +99,8 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
     picture = {
-        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
-        "numbers to a .csv file of the same name."
+        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and the "
+        "plotted numbers to a .csv file of the same name."
     }
     out = {"--out FILE": "Write the result to this file instead of standard output."}
     return {**form, **(picture if plot else {}), **out}

@@ -1,4 +1,4 @@
-"""The verb `cards`: show the programs card by card, with the scan and our versions."""
+"""The verb `cards`: show each card, its scanned text, our Fortran and Python, and notes."""
 
 import argparse
 from hashlib import sha256

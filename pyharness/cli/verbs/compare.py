@@ -30,7 +30,7 @@ OPTIONS = {
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
-    "error first. Errors are taken up to the last step that all runs reached.",
+    "error first. Errors are compared up to the last step that all runs reached.",
     "--numerics": "Also show drifts of energy and momentum, differences between Fortran and Python "
     "in units in the last place, the error amplification, the errors of SciPy's solve_ivp, and "
     "run times (JSON and CSV always have them).",

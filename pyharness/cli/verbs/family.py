@@ -17,8 +17,8 @@ OPTIONS = {
     f"{', '.join(WEIGHTINGS)} (default: several methods, or collocation if --terms, --points or "
     "--corrections is given).",
     "--terms N": "Number of terms of the trial function, 1 to 12 (default 2).",
-    "--points P": "Collocation points: thesis (equally spaced, default), gauss, or N fractions "
-    "of the step, as in 0.3,0.6.",
+    "--points P": "Collocation points: thesis (equally spaced, default), gauss (Legendre "
+    "nodes), or one fraction of the step for each term, as in 0.3,0.6.",
     "--corrections K": "Number of times that each step corrects its first estimate, 0 to 100 "
     "(default 1).",
     "--lost": "Instead, examine three programs that failed in the thesis (IV.2) but are not "

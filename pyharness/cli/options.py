@@ -45,14 +45,14 @@ LISTING = {
     "--fix NAME,...": "Correct these defects of the original program and keep all others (names: "
     "`pyharness defects`).",
     "--keep NAME,...": "Keep these defects of the original program and correct all others.",
-    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the other possible "
-    "way, instead of ours (names: `pyharness defects --kind reading`).",
+    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the other "
+    "possible way, instead of ours (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
     "torque-held).",
     "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
-    "program stops when, within a step, a derivative changes by more than L times the change of its "
-    "variable.",
+    "program stops when, within a step, a derivative changes by more than L times the change of "
+    "its variable.",
     "--no-stop": "Omit the stop test of --lipschitz, so that the Runge-Kutta program runs to its "
     "last step.",
 }

@@ -244,7 +244,7 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 def points_picture() -> Picture:
     """Return a picture of the collocation points of each printed program in the first steps.
 
-    Each row is a step, with times (s) after its beginning; the grey band is the step itself.
+    Each row is a step; times (s) are counted from its beginning, and the grey band is the step.
     """
     from matplotlib.figure import Figure
 

@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
-Differences between Fortran and Python are in units in the last place. Errors (rad/s) below the
-error of the reference have no meaning.
+Differences between Fortran and Python are in units in the last place. An error (rad/s) below the
+error of the reference solution has no meaning.
 """
 
 import itertools

@@ -1,7 +1,7 @@
 """Faults of a chosen size: which function is faulty, and how its result changes.
 
-A fault is planted in the running process, and removed when its context ends. A faulty Python twin
-is a copy of the sources with one replacement.
+A fault is planted in the running process, and removed when its context ends. A faulty twin (Python
+version of a program) is a copy of the sources with one replacement.
 """
 
 import importlib

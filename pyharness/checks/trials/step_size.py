@@ -105,7 +105,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return omega's relative error at the end, not finite for an incomplete run, and a note."""
+    """Return omega's relative error at the end, not finite if the run is incomplete, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:

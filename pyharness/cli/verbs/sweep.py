@@ -24,7 +24,8 @@ OPTIONS = {
     "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
     "--out STORE": "Store the results in this folder, in the Zarr format (required); if an "
     "earlier run was interrupted, only the missing results are computed.",
-    "--repair": "Recompute damaged chunks (stored parts of the grid), and rewrite damaged metadata.",
+    "--repair": "Recompute damaged chunks (parts of the grid that are stored together), and "
+    "rewrite damaged metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in "
     "several processes of this machine) or dask (in a Dask cluster).",
     "--workers N": "Number of worker processes of --executor processes or dask, 1 to "

@@ -38,9 +38,9 @@ class Name:
     """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
-    method, `circumstance` the problem that it solves in `scene`, `setting` a tolerance, step size
-    or listing, and `quantity` the compared number. `command` (``verify`` or ``stress``), the id and
-    then `options` form the command that repeats the check.
+    method, `circumstance` the name of the problem in `scene`, `setting` a tolerance, step size or
+    listing, and `quantity` the compared number. `command` (``verify`` or ``stress``), the id and
+    `options` form the command that repeats the check.
     """
 
     suite: str

@@ -63,8 +63,8 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(", or about 30 seconds for a program of the thesis")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 not only if a result is unexpected, but also if amplified "
-    "rounding errors may exceed the tolerance."
+    "--strict": "Exit with status 1 not only if the output reports an unexpected result, but also "
+    "if amplified rounding errors may exceed the tolerance."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too; the ending of a name sets the "
@@ -75,7 +75,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory of a random draw, on one core of 2026, and the largest count of draws."""
+    """Time and memory of a random draw, on one core of 2026, and the largest number of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -145,7 +145,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, which are beginnings of ids, as in ``cells/two-term``.
+    """Return the names in --only, leading parts of ids, as in ``cells/two-term``.
 
     Raise InputError if the part before the first slash is not in `allowed`.
     """
@@ -369,7 +369,7 @@ def check_outputs(options: argparse.Namespace) -> None:
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options of a verb whose --out names a folder, so that its report is printed."""
+    """Return the options without --out, which names a folder, so that the report is printed."""
     return argparse.Namespace(**{**vars(options), "out": None})
 
 

@@ -84,8 +84,8 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError if the solution grows without bound before `time`, if it changes too fast to be
-    sampled, or if the amplification exceeds binary64.
+    Raise InputError if the solution grows without bound before `time`, if the motion is too fast or
+    too long to be sampled, or if the amplification exceeds binary64.
     """
     # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
@@ -197,7 +197,7 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
 
     Under a torque law it is the sensitivity at the last time; under other torques the largest at
     any of the times, because damping may reduce errors. Raise InputError if the torque is opaque,
-    if the solution grows without bound, or if it changes too fast to be sampled.
+    if the solution grows without bound, or if the motion is too fast or too long to be sampled.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])

@@ -245,7 +245,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers that an option, such as --method for "method", lists by name or package.
+    """Return the solvers whose names or packages are in `text`, the value of option `what`.
 
     None selects all, "none" no solver.
     """

@@ -16,10 +16,10 @@ from pyharness.model.errors import InputError
 from pyharness.thesis.programs import BINARY64, WORD_NAMES
 
 OPTIONS = {
-    "--explain ID": "Explain the verdict on one claim, with the numbers behind it; ID is its name "
-    "in the output of `pyharness claims`.",
+    "--explain ID": "Explain the verdict on one claim (statement of the thesis), with the "
+    "numbers behind it; ID is its name in the output of `pyharness claims`.",
     "--assignments": "For each case whose initial angular velocity the thesis omits, show for "
-    "which assumed values the claims (statements of the thesis) about this case hold.",
+    "which assumed values the claims about this case hold.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
     f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
     "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
@@ -36,7 +36,7 @@ EXAMPLE = "claims --explain abstract-superior"
 def run(options: argparse.Namespace) -> int:
     """Print verdicts on the claims of the thesis, or the effect of values that the thesis omits.
 
-    --assignments, --evidence and --atlas test for which of these values, such as the initial omega,
+    --assignments, --evidence and --atlas show for which of these values, such as the initial omega,
     the claims hold.
     """
     if options.assignments:

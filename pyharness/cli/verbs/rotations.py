@@ -10,7 +10,8 @@ from pyharness.model.errors import InputError
 OPTIONS = {
     **shared.BODY,
     "--disturbance D": "Size of the perturbation of each steady rotation (constant omega), divided "
-    "by this omega, above 0 and below 1 (default 0.001).",
+    "by this omega, above 0 and below 1 (default 0.001). In a flip, a body perturbed in its "
+    "rotation about the middle axis reverses omega about this axis.",
     **shared.outputs(
         plot="the polhodes (curves of omega without torque), and the growth rates of perturbations "
         "of bodies with any moments of inertia,"

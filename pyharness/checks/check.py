@@ -124,7 +124,7 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the kind of the check, the first part of its id."""
+        """Return the kind of the check."""
         return self.name.suite
 
     @property

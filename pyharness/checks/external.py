@@ -286,7 +286,6 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at either end (rad/s)."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 

@@ -215,7 +215,7 @@ def linear(limit: float) -> float:
 
 
 def tolerance_of(tried: MethodRun) -> float:
-    """Return the tolerance of a run, which must have one."""
+    """Return the tolerance of a run that has one."""
     assert tried.tolerance is not None
     return tried.tolerance
 

@@ -1,6 +1,7 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-Limits are tolerances, relative to the largest omega for omega, angles (rad) for attitudes.
+Limits are tolerances; those of omega are relative to the largest omega, those of attitudes angles
+(rad).
 
 An order is the power of the step size with which errors decrease. To measure orders, omega of the
 programs is compared with `solve_ivp`; the programs' translational velocity and the methods with a

@@ -179,7 +179,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return the true solution; None if the motion diverges, or is too fast or too long."""
+    """Return the true solution; None if the motion is unbounded, too fast or too long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:

@@ -28,7 +28,7 @@ def checks_report(
     page: Sequence[Section] | None = None,
     **extra: Any,
 ) -> Report:
-    """Return the report of a command's checks; `extra` are further fields of the JSON record."""
+    """Return the report of a command's checks; `extra` has further JSON fields."""
     return Report(
         verb,
         text,

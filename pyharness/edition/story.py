@@ -144,7 +144,6 @@ def _run(
 
 
 def _distance(run: Trajectory, goal: Array) -> float:
-    """Return the largest distance (rad/s) of omega1 from `goal`."""
     return float(np.abs(run.omega - goal[: run.steps])[:, 0].max())
 
 

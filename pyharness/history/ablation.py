@@ -92,7 +92,6 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 
 def _errors(scene: Scene, run: Trajectory, truth: Reference) -> tuple[float, float]:
-    """Return the largest errors of omega (rad/s) and of the velocity (m/s)."""
     found = accuracy(scene, run, truth)
     return max(found.omega), math.nan if found.velocity is None else found.velocity
 

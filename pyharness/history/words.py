@@ -213,7 +213,6 @@ def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
 
 
 def _head(cell: WordCell) -> list[Any]:
-    """Return case, program and listing, with marks of assumptions."""
     case, program, listing, *_ = cell.double
     on_cards = mark(case_scene(case), subset(program, listing))
     return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]

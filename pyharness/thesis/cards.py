@@ -156,8 +156,7 @@ class Deck:
     def executable(self) -> frozenset[int]:
         """Return the numbers of the cards with executable statements.
 
-        All other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END
-        statement.
+        Other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
         """
         found, computes = set(), False
         for card in self.cards.values():

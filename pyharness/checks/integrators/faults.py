@@ -24,7 +24,7 @@ _DEGREES = 180.0 / math.pi
 
 
 class State(NamedTuple):
-    """Angular velocities (rad/s), shape (n, 3), and attitudes, shape (n, 4)."""
+    """Angular velocities (rad/s), shape (n, 3), and quaternions, scalar first, shape (n, 4)."""
 
     omega: Array
     attitude: Array

@@ -116,7 +116,7 @@ class Problem:
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that roundings of relative size `rounding` may cause."""
+        """Return the largest error that roundings of relative size `rounding` cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:

@@ -55,7 +55,6 @@ class Plant:
 
 
 def _plus(found: Any, size: float) -> Any:
-    """Return a number plus `size`, or an integer plus the integer part of `size`."""
     return found + (int(size) if isinstance(found, int) else size)
 
 
@@ -65,7 +64,6 @@ def _off(found: Array, size: float) -> Array:
 
 
 def _bit_off(found: Array, size: float) -> Array:
-    """Return an array with the largest element times 1 + `size`."""
     wrong = found.copy()
     wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
     return wrong

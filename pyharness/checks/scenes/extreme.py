@@ -21,7 +21,7 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound (1/s) on torque-free abs(omega') / `largest`, the largest omega (rad/s)."""
+    """Return a bound (1/s) on torque-free abs(omega') over `largest`, the largest omega (rad/s)."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 

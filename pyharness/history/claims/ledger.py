@@ -90,7 +90,7 @@ def judgement(identity: str, word: str = BINARY64) -> Judgement:
 
 
 def judgements() -> list[Judgement]:
-    """Return our judgements of all claims."""
+    """Return all judgements."""
     return [judgement(entry["id"]) for entry in claims()]
 
 

@@ -26,7 +26,7 @@ _GROUPS = {
         "defects": "list defects and doubtful cards of the programs, and their effects",
         "deck": "write a program of the thesis as a deck of FORTRAN cards",
         "limits": "show the limits of the original programs as the step size goes to 0",
-        "family": "derive and measure the orders of weighted residual methods",
+        "family": "derive and measure convergence orders of weighted residual methods",
         "words": "run the programs in CDC arithmetic and in other word lengths",
     },
     "rigid bodies": {

@@ -49,7 +49,7 @@ LISTING = {
     "possible way, instead of ours (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
-    "torque-held).",
+    "torque-held, by which a varying torque is evaluated once in each step).",
     "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
     "program stops when, within a step, a derivative changes by more than L times the change of "
     "its variable.",

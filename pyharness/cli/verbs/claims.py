@@ -21,7 +21,8 @@ OPTIONS = {
     "--assignments": "For each case whose initial angular velocity the thesis omits, show for "
     "which assumed values the claims about this case hold.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
+    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
+    "computers.",
     "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
     "readings of doubtful statements, assumptions about missing ones, and number of steps.",
     "--atlas STORE": "Report from which initial angular velocities the claims hold, according to "

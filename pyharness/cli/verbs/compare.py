@@ -23,7 +23,8 @@ OPTIONS = {
     "--method M,...": "Compare these methods (names: docs/reference/methods.md) instead of the "
     "programs; the torque may then depend on omega or attitude.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
+    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
+    "computers.",
     "--tolerance E": "Largest allowed error of the methods (without --method, of SciPy's "
     "solve_ivp), relative to the largest component of omega, at most 1 (default: the method's "
     "own).",

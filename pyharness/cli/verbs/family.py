@@ -24,8 +24,8 @@ OPTIONS = {
     "--lost": "Instead, examine three programs that failed in the thesis (IV.2) but are not "
     "printed there: rank possible mistakes by how many of the three would fail with each.",
     "--word W": f"Floating-point arithmetic of the programs of --lost: {', '.join(WORD_NAMES)} "
-    f"(default {WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded "
-    "rounds.",
+    f"(default {WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of "
+    "CDC computers.",
     **shared.outputs(plot=""),
 }
 EXAMPLE = "family --case 5 --weighting galerkin --terms 3"

@@ -33,8 +33,8 @@ OPTIONS = {
     "--implementation I": "Language of the program: fortran or python (default fortran, but "
     "python with --word other than binary64).",
     "--word W": f"Floating-point arithmetic of the program: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds. "
-    f"Fortran has only {', '.join(COMPILED_WORDS)}.",
+    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
+    f"computers. The Fortran programs support only {', '.join(COMPILED_WORDS)}.",
     "--method M": "Solve the scene by this method instead of a program: auto (default with "
     "--scene), taylor, closed-form, dop853 or another of docs/reference/methods.md.",
     **shared.LISTING,

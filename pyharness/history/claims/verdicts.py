@@ -7,8 +7,8 @@ that the thesis leaves open; `case` is a number of Table 1.
 
 An error is the largest deviation of any omega component from the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
-component of the reference omega. A claim that fails is "not reproduced", or "false" if the test
-passes this as `otherwise`.
+component of the reference omega. A claim that fails is "not reproduced"; a test that passes
+`otherwise` calls it "false".
 """
 
 from dataclasses import dataclass, replace

@@ -1,12 +1,12 @@
 """Checks that the Fortran programs and their Python twins agree bit for bit.
 
-A cell is a combination of a program, a case of Table 1 of the thesis, defects and readings. Our
-arithmetic of machine words reproduces a machine's mantissa length and rounding, such as the 48 bits
-of the CDC.
+A twin is the Python version of a program. A cell is a combination of a program, a case of Table 1
+of the thesis, defects and readings. Our arithmetic of machine words reproduces the mantissa length
+and the rounding of a machine, such as the 48 bits of the CDC.
 
-The decks, compiled from the author's cards, share no code with the Fortran port and the twins.
-TAPE5, the file of all steps, is compared with the Fortran port bit for bit, the printed page as
-text. An overflow ends a run of the port; the deck continues, but must not produce finite omega.
+A deck, compiled from the author's cards, shares no code with Fortran port and twin. Its TAPE5, the
+file of all steps, is compared with the port bit for bit, its printed page as text. After an
+overflow the port ends its run; the deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ _EVALUATIONS = {"two-term": 3, "four-term": 5, "runge-kutta": 4}
 
 
 def cells(chosen: Selection) -> Iterator[Attempt]:
-    """Yield a deferred check for each cell, or for a few cells if `chosen.thin` is set."""
+    """Yield a deferred check for each cell, or for only a few cells if `chosen.thin`."""
     divergences = facts("divergences")["divergence"]
     listed = {entry["cell"] for entry in divergences if entry["kind"] == "cross-language"}
     for listing, case in all_cells():
@@ -54,7 +54,7 @@ def cells(chosen: Selection) -> Iterator[Attempt]:
 
 
 def of_cell(suite: str, listing: Listing, case: int) -> Name:
-    """Return the name of the check of one cell in a kind of checks."""
+    """Return the name of the check of a cell; `suite` is the kind of the check."""
     return Name(suite, listing.program, f"case-{case}", listing_name(listing))
 
 
@@ -75,7 +75,8 @@ def _agreement(
 ) -> Check:
     """Return the check that Fortran and Python agree or, if `is_listed`, that they still differ.
 
-    `options` are the constant of the stop test (1/s), and whether the test may end the run.
+    `is_listed` marks a known difference. `options` are the constant of the stop test (1/s), and
+    whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run
     compiled, twin = (run(scene, listing, language, *options) for language in ("fortran", "python"))
@@ -104,9 +105,9 @@ def words(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of our arithmetic of machine words, bit for bit.
 
     Test vectors are CDC instructions with expected results. In each cell, our arithmetic with 53
-    bits must agree with floats, and the program compiled for each other word with its Python
-    version. If `chosen.only` is empty, only some listings are checked: those with at most one
-    change against floats, the original and the corrected one in other words.
+    bits must agree with floats; for each other word, the compiled program must agree with its
+    Python version. If `chosen.only` is empty, only some listings are checked: against floats those
+    with at most one change, in other words the original and the corrected one.
     """
     yield Attempt(Name("words", "vectors"), _vectors)
     for listing, case in all_cells():
@@ -128,7 +129,7 @@ def _vectors(name: Name) -> Check:
 
 
 def _in_word(listing: Listing, case: int, word: str | None, name: Name) -> Check:
-    """Return the check of the Python version in `word` against Fortran; None: against floats."""
+    """Return the check of the Python version in `word` against Fortran; if None, against floats."""
     scene = case_scene(case)
     ours = in_word.run(scene, listing, WORDS[word or BINARY64])
     if word is None:

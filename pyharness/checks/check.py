@@ -38,8 +38,9 @@ class Name:
     """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
-    method, `circumstance` a problem, `setting` a tolerance, step size or listing, and `quantity`
-    the compared number. `options` end the command that repeats the check.
+    method, `circumstance` the name of the problem in `scene`, `setting` a tolerance, step size or
+    listing, and `quantity` the compared number. `command` (``verify`` or ``stress``), the id and
+    `options` form the command that repeats the check.
     """
 
     suite: str
@@ -73,7 +74,7 @@ class Name:
         return replace(self, quantity=quantity)
 
     def bounded(self, value: float, limit: float, basis: Basis, note: str = "") -> "Check":
-        """Return the check that `value` does not exceed `limit`; NaN fails."""
+        """Return the check that `value` is at most `limit`; NaN fails."""
         # NumPy's numbers can't be written as JSON.
         found, allowed = float(value), float(limit)
         return Check(self, not math.isnan(found) and found <= allowed, found, allowed, basis, note)
@@ -123,7 +124,7 @@ class Check:
 
     @property
     def suite(self) -> str:
-        """Return the kind of the check, the first part of its id."""
+        """Return the kind of the check."""
         return self.name.suite
 
     @property
@@ -151,7 +152,7 @@ _OF_ANY = len(fields(Check))
 
 @dataclass(frozen=True)
 class Sample(Check):
-    """A check in a random scene, with the three quantities by which reports group such checks."""
+    """A check in a random scene; reports group such checks by its three fields."""
 
     entrance: str = ""  # call that solved the scene, as in ``solve-taylor``
     tolerance: float = math.nan
@@ -175,7 +176,7 @@ Attempts = Iterable[Check | Attempt]
 def make_checks(
     attempts: Attempts, only: Sequence[str], raised: tuple[type[Exception], ...] = (NotBuiltError,)
 ) -> Iterator[Check]:
-    """Yield the checks in `attempts`: finished ones, and deferred ones if `only` requests them.
+    """Yield the finished checks in `attempts`, and the deferred ones that `only` requests.
 
     An exception becomes a failed check, unless its type is in `raised`.
     """
@@ -210,7 +211,7 @@ def run_suites(
     """Yield the requested checks of all suites (kinds of checks).
 
     An exception becomes a failed check, except NotBuiltError and, in the suites `of_the_user`,
-    InputError, both of which are raised.
+    which test a user's input, InputError; these two are raised.
     """
     for suite, attempts in suites.items():
         raised = (NotBuiltError, InputError) if suite in of_the_user else (NotBuiltError,)
@@ -227,7 +228,7 @@ def requested_suites(suites: Iterable[str], only: Sequence[str]) -> list[str]:
 
 
 def severity(check: Check) -> tuple[bool, float]:
-    """Return a sort key: passed checks before failed ones, then by the ratio of value to limit."""
+    """Return a sort key: passed before failed checks, each by the ratio of value to limit."""
     if check.value is None or check.limit is None or check.value == check.limit == 0.0:
         return not check.passed, 0.0
     ratio = abs(check.value) / check.limit if check.limit else math.inf

@@ -1,8 +1,8 @@
 """Amplification of perturbations by the programs, and step sizes at which runs diverge.
 
-The amplification of a step is measured by running the step, and derived exactly in
-`theory.amplification`; limits therefore allow for rounding only. Step sizes of divergence follow
-from linear stability. J is the Jacobian of Euler's equations (13-15 of the thesis).
+The amplification by a step is measured in a run, and derived exactly in `theory.amplification`;
+limits therefore allow for rounding only. Linear stability predicts the step sizes of divergence. J
+is the Jacobian of Euler's equations (13-15 of the thesis).
 """
 
 import math
@@ -112,8 +112,8 @@ def first_step(scene: Scene, listing: Listing) -> Probe:
 def later_steps(scene: Scene, listing: Listing) -> Probe:
     """Return the perturbation of a spinning top after all steps of a scene, measured and derived.
 
-    omega3 is the spin; omega1 and omega2 are the perturbation. C and the torque are zero, so that
-    the equations are linear and the perturbation may have any size.
+    omega3 is the spin; omega1 and omega2 are the perturbation. Euler's coefficient C and the torque
+    are zero, so that the equations are linear and the perturbation may have any size.
     """
     rows = _run(scene, listing)
     found = rows[-1, :2] if len(rows) == scene.steps else np.full(2, np.nan)
@@ -158,8 +158,8 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
     """Return the distance of z from 0 at which perturbations begin to grow, measured and derived.
 
     z, the step size times an eigenvalue of J, is bisected along `direction`, -1 or 1j, over runs of
-    a spinning top. Its change from step to step is measured, because with the defect
-    `base-not-restored` a constant part of omega might hide the growth.
+    a spinning top. The change of omega from step to step is measured instead of omega, because with
+    the defect `base-not-restored` a constant part of omega might hide the growth.
     """
     matrix = amplification(listing)
     expected, slope = boundary(matrix, direction)
@@ -189,7 +189,7 @@ def observed_boundary(listing: Listing, direction: complex) -> Probe:
 
 
 def _moved(listing: Listing, step: int) -> float:
-    """Return the factor by which the defect `dt-accumulates` moves the points in step `step`."""
+    """Return the factor by which the defect `dt-accumulates` moves the collocation points."""
     return float(step) if listing.has("dt-accumulates") else 1.0
 
 
@@ -282,8 +282,8 @@ def divergence(
 ) -> tuple[float, float, float]:
     """Return two step sizes (s) of divergence, and a bound on their relative difference.
 
-    The body spins about axis 3, which is stable, for `time` (s). The first step size is from
-    `smallest_divergent`; with the second, the wobble about axis 3 doubles by linear theory.
+    The body spins about axis 3, which is stable, for `time` (s). The first step size is that of
+    `smallest_divergent`; with the second, by linear theory, the wobble about axis 3 doubles.
     """
     found = smallest_divergent(scene, time, runner, smallest)
     a, b, c = scene.euler_coefficients

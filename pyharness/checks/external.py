@@ -88,7 +88,8 @@ def _triples(triple: Triple | None, part: float) -> Iterator[Triple]:
 def external_checks(problems: Sequence[Problem], only: Sequence[str] = ()) -> Iterator[Check]:
     """Yield checks of each method that accepts a problem: ``external/<problem>/<time>/<method>``.
 
-    Value and limit, in the problem's unit, are those of the component with the largest ratio.
+    Value (the error) and limit, in the problem's unit, are those of the component of omega with the
+    largest ratio of the two.
     """
     for problem in problems:
         # Values are always solved together, so that repeating one check gives the same bits.
@@ -154,10 +155,10 @@ def _pointings(problem: Problem, values: Sequence[Value], only: Sequence[str]) -
 
 
 def _turns(scene: Scene, times: Sequence[float]) -> Array:
-    """Return the changes of attitude (rad), at each time, by rounding the scene's numbers.
+    """Return the change of attitude (rad) at each time when the scene's numbers are rounded.
 
-    The magnitudes of first-order changes are added. If there is no solution, only the rounding of
-    quaternions counts.
+    It is the sum of the magnitudes of first-order changes or, without a solution, the rounding of
+    quaternions alone.
     """
     turned = np.full(len(times), 8.0 * _HALF_ULP)
     run = method_candidate("auto", METHODS["auto"].finest).rows
@@ -198,7 +199,7 @@ def _as_far_as_solved(
 ) -> tuple[list[_Row], str]:
     """Return the results of `solve` for as many values as possible, and its refusal or "".
 
-    If it refuses all values together, it may still solve those at earlier times.
+    If it refuses all values together, it may still solve those at the first times.
     """
     try:
         return solve(values), ""
@@ -238,9 +239,9 @@ def _program(problem: Problem, value: Value, program: str) -> _Result | None:
     """Return omega by a corrected program at the time of `value`, and a bound on its error.
 
     The step is halved until the estimated error is below a tenth of the published accuracy, or
-    below rounding error, half a unit in the last place for each step. The estimate is twice the
-    last change, divided by 2**order - 1. Return None if the matrix is singular even for the longest
-    step.
+    below the rounding error, half a unit in the last place for each step. The estimate is twice the
+    change of the result by the last halving, divided by 2**order - 1. Return None if the
+    collocation matrix is singular even for the longest step.
     """
     scene, time = problem.scene, float(value.time)
     finest_print = min(figure.accuracy for figure in value.omega if figure is not None)
@@ -285,12 +286,11 @@ def _check(name: Name, unit: str, value: Value, result: _Result, rounding: Array
 
 
 def _scale(scene: Scene, omega: Array) -> float:
-    """Return the largest abs(omega) at either end (rad/s)."""
     return max(*map(abs, scene.omega), float(np.abs(omega).max()))
 
 
 def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
-    """Return the change of omega (rad/s) by rounding a scene's numbers, by printed time.
+    """Return, by printed time, the change of omega (rad/s) when a scene's numbers are rounded.
 
     It is zero at times without a solution; each method's check reports why.
     """
@@ -309,7 +309,7 @@ def _rounding(scene: Scene, values: Sequence[Value]) -> dict[str, Array]:
 
 
 def _moves(scene: Scene, times: Sequence[float], method: str) -> Array:
-    """Return the change of omega (rad/s) by rounding the scene's numbers, to first order."""
+    """Return the first-order change of omega (rad/s) when the scene's numbers are rounded."""
     moved = np.zeros((len(times), 3))
     run = method_candidate(method, METHODS[method].finest).rows
     here = run(scene, times).omega

@@ -1,6 +1,7 @@
 """Published results that were not computed here, and the files that describe them.
 
-A file has a scene, its source, and the printed digits, which determine the accuracy.
+A file has a scene, the source of the results, and their printed digits, which determine their
+accuracy.
 """
 
 import math

@@ -91,9 +91,10 @@ def recorded() -> Iterator[Recorded]:
 def golden(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred comparisons with the golden record, if its folder `chosen.record` exists.
 
-    Methods with a tolerance must agree within twice the tolerance, because processors and compilers
-    round differently. All other methods must agree bit for bit or, if another mathematical library
-    computes the torque's waves, within the amplified rounding errors.
+    Methods with a tolerance must agree with the record within twice the tolerance, because
+    processors and compilers round differently. Programs and all other methods must agree bit for
+    bit or, if another mathematical library computes the torque's sines and cosines, within the
+    amplified rounding errors.
     """
     if not chosen.record.is_dir():
         return

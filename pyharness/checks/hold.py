@@ -1,8 +1,8 @@
 """Checks of methods against the true solution of a scene, within bounds derived beforehand.
 
 Errors of the programs of the thesis are reported without a bound. The `flow` of a scene is its
-error amplification and rounding. Methods without a tolerance, `auto` and `quick` run as prepared
-solvers, which return that they refuse a scene; other methods raise InputError.
+error amplification and rounding. `auto`, `quick` and all methods without a tolerance run as
+prepared solvers, which return the refusal of a scene; the other methods raise InputError.
 """
 
 import math
@@ -121,11 +121,11 @@ def check_methods(
 ) -> Iterator[Attempt]:
     """Yield deferred checks of each method's error at `time` (s) in the scene of `name`.
 
-    By default, the limit is the sum of three errors: the tolerance and rounding, both amplified,
-    and the error of the true solution. For a fixed step without torque, a bound from the order
-    replaces the tolerance. There is no limit if neither is known, or if the sum leaves fewer than
-    two digits of omega. Without torque, energy and momentum always have a limit, because the flow
-    does not amplify their errors. A method fails if it refuses a scene that it must solve.
+    By default, the limit is the sum of the amplified tolerance, the amplified rounding error, and
+    the error of the true solution. For a fixed step without torque, a bound from the order replaces
+    the tolerance. There is no limit if neither tolerance nor bound is known, or if the sum leaves
+    fewer than two digits of omega. Without torque, energy and momentum always have a limit, because
+    their errors are not amplified. A method fails if it refuses a scene that it must solve.
     """
     scene = scene_of(name)
     known = cache(partial(truth, scene, time))
@@ -169,7 +169,7 @@ def refusable(tried: MethodRun, truth: Truth, why: str) -> bool:
 def _derived(truth: Truth, tried: MethodRun) -> float | None:
     """Return the limit of a method's error, relative to the largest omega.
 
-    It is None if there is no bound on the errors of steps, and infinite if it leaves fewer than two
+    It is None without a bound on the errors of steps, and infinite if it would leave fewer than two
     digits of omega.
     """
     made = promised_sum(tried, truth)
@@ -188,7 +188,7 @@ DERIVED = Policy(_derived, STEPS, refusable)
 
 
 def _roundings(tried: MethodRun, truth: Truth) -> float:
-    """Return the number of uncompensated roundings of omega in a run; an estimate for SciPy's."""
+    """Return the number of uncompensated roundings of omega in a run; estimated for SciPy's."""
     method, answer = tried.method, tried.answer
     if tried.tolerance is None:
         return 0.0 if method in GAUSS else float(_steps(tried.scene, truth.end))
@@ -226,8 +226,8 @@ def scene_of(name: Name) -> Scene:
 def promised_sum(tried: MethodRun, truth: Truth) -> float | None:
     """Return a bound on the summed errors of steps, relative to the largest omega, or None.
 
-    In fixed steps without torque, it is infinite if `angle`, the product of the largest Euler
-    coefficient, the largest omega and the step, is 0.5 rad or more.
+    For fixed steps without torque, it is infinite if the product of the largest Euler coefficient,
+    the largest omega and the step is 0.5 rad or more.
     """
     method = tried.method
     if method not in FIXED_STEP or not truth.exact:
@@ -290,6 +290,6 @@ def describe_programs(name: Name) -> Iterator[Attempt]:
 
 
 def apart(found: Array, wanted: Array) -> float:
-    """Return the largest absolute difference over the common rows."""
+    """Return the largest absolute difference over the rows that both arrays have."""
     n = min(len(found), len(wanted))
     return float(np.abs(found[:n] - wanted[:n]).max(initial=0.0))

@@ -1,7 +1,7 @@
 """Comparison of a method's result with the true solution, and limits of the error.
 
-Errors and limits of omega are relative to its largest component; those of the attitude are angles
-(rad).
+Errors of omega and their limits are relative to its largest component; those of the attitude are
+angles (rad).
 """
 
 import math
@@ -87,7 +87,7 @@ def by_rows(method: str, tolerance: float, scene: Scene, times: Sequence[float])
 def by_end(
     method: str, candidate: Candidate, tolerance: float, scene: Scene, time: float
 ) -> MethodRun:
-    """Return a deferred run of a candidate to `time` (s); `method` selects the limit."""
+    """Return a deferred run of a candidate to `time` (s); limits are those of `method`."""
     return MethodRun(method, tolerance, scene, lambda: of_end(method, candidate.end(scene, time)))
 
 
@@ -198,7 +198,7 @@ class Policy:
 
 
 def allowed(truth: Truth, made: float, growth: float, steps: float = 0.0) -> float:
-    """Return the limit: the steps' error `made` times `growth`, plus rounding and truth's error."""
+    """Return the limit: the steps' error `made` times `growth`, rounding and the truth's error."""
     if truth.attitude is not None:
         return truth.flow.angle_limit(made * growth, truth.end) + truth.angle_error
     return replace(truth.flow, amplification=growth).limit(made, steps) + truth.relative_error
@@ -215,7 +215,7 @@ def linear(limit: float) -> float:
 
 
 def tolerance_of(tried: MethodRun) -> float:
-    """Return the tolerance of a run, which must have one."""
+    """Return the tolerance of a run that has one."""
     assert tried.tolerance is not None
     return tried.tolerance
 

@@ -1,10 +1,11 @@
 """Checks of methods against the high-precision reference in the cases of Table 1.
 
-Limits are tolerances, for omega relative to the largest omega, for attitudes an angle (rad).
+Limits are tolerances; those of omega are relative to the largest omega, those of attitudes angles
+(rad).
 
-An order is the power of the step size with which errors decrease. For orders, omega of the programs
-is compared with `solve_ivp`. Methods with a fixed step are compared with the reference, and so is
-the programs' translational velocity, which no other method computes.
+An order is the power of the step size with which errors decrease. To measure orders, omega of the
+programs is compared with `solve_ivp`; the programs' translational velocity and the methods with a
+fixed step are compared with the reference.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -140,7 +141,7 @@ def _judged(tried: Callable[[], MethodRun], truth: Callable[[], Truth], name: Na
 
 
 def _same_steps(scene: Scene, name: Name) -> Check:
-    """Return the check that 100 steps agree bit for bit with `solve` or the kernel."""
+    """Return the check that 100 steps of a prepared solver equal those of `solve` or the kernel."""
     method, time = name.subject, 100.0 * scene.step_size
     found = prepared_candidate(method, 1.0).end(scene, time).omega
     if method in FIXED_STEP:
@@ -217,8 +218,8 @@ def in_few_steps(scene: Scene, time: float) -> Scene:
 def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> Check:
     """Return the check of the order of a fixed-step method, the setting or subject of `name`.
 
-    The order is only reported if the scene is too fast or sensitive for 4096 steps, or the torque
-    has a table: steps across its changes lower the order.
+    The order is reported, but not checked, if the scene is too fast or sensitive for 4096 steps, or
+    if the torque has a table, because steps across its changes lower the order.
     """
     method = name.setting or name.subject
     found = _order_of_method(scene, method, truth(), most_steps=_MOST)
@@ -230,7 +231,7 @@ def order_if_seen(scene: Scene, truth: Callable[[], Reference], name: Name) -> C
 
 
 def judged_order(name: Name, found: Order) -> Check:
-    """Return the check that an order is at most `_ORDER_SLACK` too low, or errors are rounding."""
+    """Return the check that an order is at most `_ORDER_SLACK` too low, or errors only rounding."""
     missing = None if found.value is None else found.due - found.value
     passed = found.state in ("as due", "rounding") and (missing or 0.0) <= _ORDER_SLACK
     return name.judged(passed, str(found), missing, _ORDER_SLACK, _SLACK)

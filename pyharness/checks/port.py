@@ -1,7 +1,7 @@
 """Checks of a port, an implementation of the programs in any language, against the twins.
 
-A twin is our Python version. Results must agree bit for bit in all cells (a program, a case,
-defects and readings) and in random scenes. `docs/how-to/ports.md` describes the protocol.
+A twin is our Python version. Results must agree bit for bit in random scenes and in all cells, the
+combinations of program, case, defects and readings. `docs/how-to/ports.md` describes the protocol.
 """
 
 import math
@@ -40,8 +40,8 @@ _LIBRARY = "the torque has sines or cosines, whose last bits differ between libr
 class Cell:
     """A run to request from a port.
 
-    `of` is the name of the check of this run. With `options`, ``verify --port`` requests this run
-    alone. `lipschitz` is the constant of the stop test (1/s).
+    `of` is the name of the check of this run; `options`, given to ``verify --port``, request this
+    run alone. `lipschitz` is the constant of the stop test (1/s).
     """
 
     name: str
@@ -90,8 +90,8 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has leading parts of the names to return, and is empty for all. Its numbers may exceed
-    `draws`.
+    `cells` has the leading parts of the names of the runs to return, or is empty for all `draws`
+    scenes. A number in `cells` may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}
     found = []
@@ -126,7 +126,7 @@ def port(command: str, cells: Sequence[Cell], patience: float = PATIENCE) -> Ite
 
 
 def refuse_port(command: str) -> None:
-    """Raise InputError if `command`, which does not answer as an integrator, is a port."""
+    """Raise InputError that advises `--port` if `command`, no integrator, answers as a port."""
     cell = port_cells(PROGRAMS, (1,), ())[0]
     read = partial(read_answer, steps=cell.scene.steps)
     refuse_other(command, "--integrator", "--port", cell.request, read)
@@ -206,7 +206,7 @@ _TIMES = (
 
 
 def port_report(command: str, checks: Sequence[PortCheck], asked: int, seed: str) -> Report:
-    """Return the report of a port's checks, of which there is at least one."""
+    """Return the report of at least one check of a port."""
     title = [f"{command}: against the twins, bit for bit"]
     title += [f"seed of the random scenes: {seed}"] if seed else []
     if checks[-1].value is None:

@@ -1,7 +1,7 @@
 """The process of a port or an integrator, which answers requests line by line.
 
-The process must answer within a time limit. It is ended together with all processes that it
-started.
+The process must answer within a time limit. At its end, all processes that it started are ended
+too.
 """
 
 import contextlib
@@ -47,7 +47,7 @@ def split_command(command: str, option: str = "--port") -> list[str]:
 def refuse_other(
     command: str, option: str, instead: str, line: bytes, read: Callable[[bytes], object]
 ) -> None:
-    """Raise InputError if `command` answers `line`, a request for the option `instead`."""
+    """Raise InputError that advises the option `instead` if `command` answers its request."""
     with contextlib.suppress(PortError), PortProcess(command, _PROBE, option) as process:
         read(process.ask(line))
         raise InputError(f"{option} {command}: answers requests of {instead}; give it to {instead}")

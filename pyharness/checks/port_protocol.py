@@ -27,8 +27,8 @@ ENDINGS = ("complete", "stopped", "overflow")
 class Answer:
     """A port's result of one run.
 
-    `rows` has `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`. `ier` has the
-    error code of each step, or is None for a program that prints none.
+    `rows` has the values of `VARIABLES` after each step, shape (n, 7); `ended` is one of `ENDINGS`.
+    `ier` has the error code of each step, or is None for a program that prints none.
     """
 
     rows: Array
@@ -118,7 +118,7 @@ def read_list(where: str, value: object) -> list[Any]:
 
 
 def read_row(where: str, row: object, width: int, told: str) -> list[float]:
-    """Return a JSON list of `width` numbers; the PortError for another count ends with `told`."""
+    """Return a JSON list of `width` numbers; a PortError for another length ends with `told`."""
     values = read_list(where, row)
     if len(values) != width:
         raise PortError(f"{where} has {len(values)} numbers; {told}")

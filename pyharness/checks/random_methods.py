@@ -2,8 +2,8 @@
 
 The true omega is from `integer_series`, the true attitude from `reference`. An entry point is
 `solve` or a prepared solver, with one method. The tolerance limits the error of omega, relative to
-the largest omega until the last time, or the attitude error (rad). With the error amplification K,
-rounding alone causes relative errors of 2e-15 K.
+the largest omega until the last time, or the attitude error (rad). If errors are amplified by the
+factor K, rounding alone causes relative errors of 2e-15 K.
 
 Torques that depend on omega or attitude are sums of recorded functions or of ready-made terms. The
 reference's series for them (`pyharness.truth.tape_series`) shares no code with the methods.
@@ -133,7 +133,7 @@ TORQUE_POLICY = replace(POLICY, may_refuse=_may_refuse_torque)
 
 
 def random_methods(chosen: Selection) -> Iterator[Check | Attempt]:
-    """Yield checks of omega from every entry point, or one of the scene without true solution."""
+    """Yield checks of omega by every entry point or, without a true solution, one of the scene."""
     for number in range(chosen.draws):
         if number // 2 % _EVERY or not chosen.may_ask(f"random/{number}"):
             continue
@@ -179,7 +179,7 @@ def random_attitudes(chosen: Selection) -> Iterator[Attempt]:
 
 
 def _truth_if_known(scene: Scene, times: tuple[float, float], effort: float) -> Truth | None:
-    """Return the true solution, or None for a motion that diverges, or is too fast or too long."""
+    """Return the true solution; None if the motion is unbounded, too fast or too long."""
     try:
         return reference_truth(scene, times, effort)
     except InputError:

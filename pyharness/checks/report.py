@@ -28,7 +28,7 @@ def checks_report(
     page: Sequence[Section] | None = None,
     **extra: Any,
 ) -> Report:
-    """Return the report of a command's checks; `extra` are further fields of the JSON record."""
+    """Return the report of a command's checks; `extra` has further JSON fields."""
     return Report(
         verb,
         text,
@@ -97,7 +97,7 @@ def basis_note(checks: Sequence[Check]) -> list[str]:
 def summary(
     title: Sequence[str], checks: Sequence[Check], depth: int = 1, more: Section = ()
 ) -> list[Section]:
-    """Return the printed sections: title, failures, a table by `depth` parts of ids, verdict."""
+    """Return the text: title, failures, a table by the first `depth` parts of ids, verdict."""
     table: Section = [*basis_note(checks), _groups(checks, depth)]
     return [title, listed_singly(checks), table, more, [verdict(checks)]]
 
@@ -145,8 +145,9 @@ _SAMPLES = (
 def samples(checks: Sequence[Check], rounding: float) -> Section:
     """Return a table of the worst ratios of error to tolerance, by entry point and tolerance.
 
-    `rounding` times the error amplification is subtracted from the error. The columns are three
-    ranges of the amplification, each with the number of samples and the worst ratio.
+    Before the division, `rounding` times the error amplification is subtracted from the error. For
+    each of three ranges of the amplification, columns show the number of samples and the worst
+    ratio.
     """
     cells: dict[tuple[str, str], list[list[float]]] = {}
     for check in checks:
@@ -167,7 +168,7 @@ def samples(checks: Sequence[Check], rounding: float) -> Section:
 
 
 def references(checks: Sequence[Check]) -> Section:
-    """Return lines on the references: the largest proved error, largest estimate, and warnings."""
+    """Return lines on the references: the largest proved and estimated error, and warnings."""
     bounds = [each.reference_bound() for each in checks if each.reference_bound is not None]
     known = [each for each in bounds if each is not None]
     lines = []

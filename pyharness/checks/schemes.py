@@ -50,7 +50,10 @@ _Stages = tuple[_Stage, _Stage, _Stage, _Stage]
 
 
 def schemes(chosen: Selection) -> Iterator[Attempt]:
-    """Yield deferred checks of steps; the value is the largest ratio of difference to bound."""
+    """Yield deferred checks of the programs' steps.
+
+    The value is the largest ratio of a step's difference from the recomputed step to its bound.
+    """
     for case in cases(chosen, (7,)):
         compare = partial(_compare_steps, case_scene(case))
         for program in PROGRAMS:
@@ -155,7 +158,8 @@ class _Quotients:
 def stops(chosen: Selection) -> Iterator[Attempt]:
     """Yield deferred checks of the stops, for every combination of the stop test's defects.
 
-    The value is the largest ratio of a quotient's difference to its rounding bound.
+    The value is the largest ratio of the difference of two computations of a quotient to its
+    rounding bound.
     """
     ways = tuple(name for name in names_of("defect", _PROGRAM) if name.startswith("lipschitz"))
     for case in cases(chosen, (3,)):
@@ -220,7 +224,7 @@ def _quotients(scene: Scene, run: Trajectory, kutta: _Stages, listing: Listing) 
 
 
 def _constants(quotients: _Quotients) -> list[float]:
-    """Return stop constants (1/s) on both sides of each new maximum, beyond rounding."""
+    """Return stop constants (1/s) below and above each new maximum, by more than its rounding."""
     constants = []
     below = 0.0
     for values, rounding in zip(quotients.values, quotients.rounding, strict=True):

@@ -87,8 +87,8 @@ def _size(check: Check) -> float:
 class _Mark(NamedTuple):
     """A plotted check, with the properties that determine its position and style.
 
-    `kind` is the circumstance's name before its first number. Equal `rank` and `what` form a
-    series.
+    `kind` is the circumstance's name up to its first number. Marks with equal `rank` and `what` are
+    one series.
     """
 
     method: str

@@ -1,7 +1,7 @@
 """Tolerances at which the checks run each method, and limits on its work.
 
-A work limit, a number of right-hand sides, determines which tolerances are affordable; it bounds no
-error.
+A work limit, a number of evaluations of the right-hand side, determines which tolerances are
+affordable; it bounds no error.
 """
 
 import math
@@ -85,7 +85,7 @@ def affordable(name: str, scene: Scene, time: float, flow: Conditioning) -> list
 
 
 def _cost(name: str, tolerance: float, radians: float, amplification: float) -> float:
-    """Return the estimated number of a method's right-hand sides; 0 if it has no work limit."""
+    """Return the estimated work of a method, in right-hand sides; 0 if it has no work limit."""
     if name in GAUSS:
         stages = int(name[-1])
         # Steps of z radians cause an error of amplification times radians times z**order.

@@ -1,4 +1,4 @@
-"""Interruption: at any time Ctrl-C ends a command with a one-line message and exit status 130.
+"""Interruption: Ctrl-C ends a command at any time, with a one-line message and exit status 130.
 
 KeyboardInterrupt can be raised between any two instructions. An import may replace it, and a
 finalizer or a callback may drop it. The signal is therefore recorded, and a dropped exception is
@@ -69,7 +69,7 @@ def came() -> bool:
 def leave_when_interrupted() -> bool:
     """Make Ctrl-C end the process at once and return True; return False if SIGINT is ignored.
 
-    This is right while nothing needs cleanup: during imports, and after the results are written.
+    Call it only while nothing needs cleanup: during imports, and after the results are written.
     """
     # A shell starts background processes with SIGINT ignored, which must remain so.
     if not callable(signal.getsignal(signal.SIGINT)):
@@ -114,7 +114,7 @@ def leave(code: int) -> None:
 
     Python's own exit would wait for threads and free all memory; on Ctrl-C it would drop the
     interrupt, or end by the signal instead of with status 130. After an interrupt, child processes
-    are ended, and cleanup may take two seconds.
+    are ended, and cleanup is limited to two seconds.
     """
     if code == CODE:
         # The interrupt was reported; messages of ending threads and finalizers are suppressed.

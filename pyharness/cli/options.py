@@ -42,27 +42,29 @@ SCENE = {
 LISTING = {
     "--listing L": "Version of the program: original, with all defects (faults of its author; "
     "default), or corrected, without any.",
-    "--fix NAME,...": "Run the original program with these defects corrected and all others kept "
-    "(names: `pyharness defects`).",
-    "--keep NAME,...": "Run the original program with these defects kept and all others corrected.",
-    "--reading NAME,...": "Read these doubtful cards of the original program in the other "
+    "--fix NAME,...": "Correct these defects of the original program and keep all others (names: "
+    "`pyharness defects`).",
+    "--keep NAME,...": "Keep these defects of the original program and correct all others.",
+    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the other "
     "possible way, instead of ours (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
-    "torque-held).",
+    "torque-held, by which a varying torque is evaluated once in each step).",
     "--lipschitz L": "Limit of the stop test, 1/s (default 500, as printed): the Runge-Kutta "
-    "program stops when a derivative changes by more than L times the change of its variable.",
+    "program stops when, within a step, a derivative changes by more than L times the change of "
+    "its variable.",
     "--no-stop": "Omit the stop test of --lipschitz, so that the Runge-Kutta program runs to its "
     "last step.",
 }
-EFFORT = {
-    "--effort F": "Multiply the work limit of each computation by F, above 0 (default 1: "
-    "about ten seconds, or about 30 seconds for a program of the thesis). Beyond the limit, the "
-    "computation ends with an error."
-}
+_EFFORT = (
+    "Multiply the work limit of each computation by F, above 0 (default 1: about ten seconds{}). "
+    "Beyond the limit, the computation ends with an error."
+)
+EFFORT = {"--effort F": _EFFORT.format(", or about 30 seconds for a program of the thesis")}
+EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 not only if a result is unexpected, but also if amplified "
-    "rounding errors may exceed the tolerance."
+    "--strict": "Exit with status 1 not only if the output reports an unexpected result, but also "
+    "if amplified rounding errors may exceed the tolerance."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too; the ending of a name sets the "
@@ -73,7 +75,7 @@ _WORTH_SAYING = 60.0  # run time (s) above which a forecast is printed
 
 
 class Cost(NamedTuple):
-    """The time and memory of a random draw, on one core of 2026, and the largest count of draws."""
+    """Time and memory of a random draw, on one core of 2026, and the largest number of draws."""
 
     what: str  # plural noun for the draws, as in "random scenes"
     seconds: float  # run time (s) of a draw
@@ -97,8 +99,8 @@ def outputs(formats: Sequence[str] = FORMATS, plot: str = "the results") -> dict
     first, *others = formats
     form = {"--format F": f"Output format: {first} (default), {', '.join(others)}."}
     picture = {
-        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and its "
-        "numbers to a .csv file of the same name."
+        "--plot FILE": f"Write a picture of {plot} to this file (.png, .svg or .pdf), and the "
+        "plotted numbers to a .csv file of the same name."
     }
     out = {"--out FILE": "Write the result to this file instead of standard output."}
     return {**form, **(picture if plot else {}), **out}
@@ -143,7 +145,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, which are beginnings of ids, as in ``cells/two-term``.
+    """Return the names in --only, leading parts of ids, as in ``cells/two-term``.
 
     Raise InputError if the part before the first slash is not in `allowed`.
     """
@@ -367,7 +369,7 @@ def check_outputs(options: argparse.Namespace) -> None:
 
 
 def without_out(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options of a verb whose --out names a folder, so that its report is printed."""
+    """Return the options without --out, which names a folder, so that the report is printed."""
     return argparse.Namespace(**{**vars(options), "out": None})
 
 

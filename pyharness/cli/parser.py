@@ -17,7 +17,7 @@ _NARROWEST, _WIDEST = 80, 100  # columns
 
 
 class _Formatter(argparse.HelpFormatter):
-    """A help formatter that keeps an example's lines, and shows only required options as usage."""
+    """A help formatter that keeps an example's lines; its usage shows only required options."""
 
     def _split_lines(self, text: str, width: int) -> list[str]:
         from textwrap import wrap

@@ -139,7 +139,7 @@ def _draw_polhode(axes: Any, moments: Array, found: Trajectory) -> None:
 
 
 def _in_plane(found: Trajectory) -> Array:
-    """Return the part of omega in space (rad/s) perpendicular to the momentum, shape (n, 2)."""
+    """Return omega's part (rad/s) perpendicular to the momentum, in space, shape (n, 2)."""
     assert found.attitude is not None
     momentum = found.angular_momentum("space")[0]
     up = momentum / np.linalg.norm(momentum)

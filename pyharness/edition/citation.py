@@ -61,7 +61,7 @@ def check_publishable() -> None:
 def bibtex(place: str = "", path: str = "") -> str:
     """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
 
-    `path` is the path of the place in the pages. It is given instead of an address if the pages
+    `path` is the path of the place in the pages; it follows their address, or stands alone if they
     have none.
     """
     described = codemeta()
@@ -98,7 +98,7 @@ def csl(place: str = "", path: str = "") -> list[dict[str, Any]]:
 
 
 def cite_data() -> dict[str, Any]:
-    """Return the data of the script that cites a place; it fills in the place and the path."""
+    """Return the data of the script that cites a place; the script fills in place and path."""
     place = "@PLACE@", "@PATH@"
     return {
         "address": address(), "publish": PUBLISH, "digest": text_digest(),

@@ -230,7 +230,7 @@ def machine_parts() -> Iterator[Part]:
 
 
 def outcomes_table() -> str:
-    """Return a Markdown table of what each possible outcome of a job would show."""
+    """Return a Markdown table of the conclusion from each possible outcome of a job."""
     rows = [[each["seen"], each["learned"], each["open"]] for each in facts("machine")["outcome"]]
     return table("outcome | what would be learned | what remains open", rows).rstrip()
 

@@ -1,7 +1,7 @@
 """The data of the pages that show the listings card by card, with scan and ports.
 
-The ports are in modern Fortran. A note is a numbered entry of the critical apparatus; `entry` is
-the identifier of an entry.
+The ports are in modern Fortran. A note is a numbered entry of the critical apparatus, which
+explains defects and deviations of the scan; `entry` is the identifier of an entry.
 """
 
 import math
@@ -79,9 +79,9 @@ class CardView(NamedTuple):
     printed, where we made them uniform; it is empty if the scan lacks the card, and None if it
     equals `card`. `after` has the following lines of the scan that belong to no card, each with its
     entry. `scan` is the line of the scan with its blanks, or None. `port` has each line of the
-    Fortran port, with the defect or reading on which the line depends, if any, and whether the line
-    is executed if that is active. `notes` begin with the most important kind; `begins` has the
-    notes whose range of cards begins here, each with this range alone.
+    Fortran port, the defect or reading on which it depends, if any, and whether it is executed if
+    that is active. `notes` begin with the most important kind; `begins` has the notes with a range
+    of cards that begins here, each with this range alone.
     """
 
     number: int
@@ -133,7 +133,7 @@ def notes(program: str) -> list[Note]:
 
 @cache
 def _changes(name: str, program: str) -> tuple[float, float]:
-    """Return by how much errors of omega and velocity change at most if an entry is corrected."""
+    """Return the largest changes of the errors of omega and velocity by an entry's correction."""
     if name not in names_of("defect", program):
         return 0.0, 0.0
     found = [each for each in effects_of(name) if each.program == program]

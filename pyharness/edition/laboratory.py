@@ -86,7 +86,7 @@ def _printed_parts(program: str) -> dict[str, Any]:
 
 
 def _deck_data() -> dict[str, Any]:
-    """Return the cards that are executed in a step, and how corrections alter them.
+    """Return the cards that are executed in a step, and their alterations by corrections.
 
     A pass is a part of a step that is executed once, with constant subscripts. Continuation cards
     are joined to statements. Alterations for compilers are omitted.

@@ -104,7 +104,7 @@ def counted(judged: Sequence[Judgement]) -> str:
 
 
 def account() -> dict[str, Markup]:
-    """Return texts in HTML by id: those of ``data/account.toml`` and of single defects' effects."""
+    """Return texts in HTML by id: those of `data/account.toml`, and effects of single defects."""
     texts = {each["id"]: each["text"] for each in facts("account")["statement"]}
     texts |= {each["id"]: each["part"] for each in entries() if "part" in each}
     return {name: inline(text) for name, text in texts.items()}
@@ -190,7 +190,7 @@ def printed_figures(
     """Return the thesis's figures in order, each with its number, caption and place.
 
     `drawn` has our drawings of the figure. `says` has the thesis's sentences on it, each with its
-    anchor, which is empty for sections I to IV. `ours` is our text on a figure that is not drawn.
+    anchor (empty for sections I to IV). `ours` is our text on a figure that is not drawn.
     """
     found = []
     for each in facts("figures")["printed"]:

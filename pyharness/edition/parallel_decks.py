@@ -62,7 +62,7 @@ def operations() -> list[Operation]:
 
 
 def thesis_on(disagreement: Disagreement) -> str:
-    """Return text on the equations and the place of the thesis that a disagreement concerns."""
+    """Return a text on the equations and the place in the thesis that a disagreement concerns."""
     given = ", ".join(disagreement.equations)
     noun = "equations" if "," in given or "-" in given else "equation"
     return "; ".join(filter(None, (given and f"{noun} {given}", disagreement.where)))

@@ -188,7 +188,7 @@ def _documents(docs: Path) -> Iterator[Page]:
 
 
 def _sections(path: str, html: str) -> Iterator[Found]:
-    """Yield the sections of a page, each with its text, for the search."""
+    """Yield the sections of a page, for the search."""
     heads = r'<h[12](?: id="(?:h-)?([\w-]+)")?>(.*?)</h[12]>'
     _, *parts = re.split(heads, html.partition("</main>")[0])
     for anchor, title, text in zip(*(parts[n::3] for n in range(3)), strict=True):
@@ -237,7 +237,7 @@ def script(name: str, value: Any) -> bytes:
 
 
 def vendor() -> list[dict[str, Any]]:
-    """Return the entries of `vendor.toml`, which lists the third-party JavaScript."""
+    """Return the entries of `vendor.toml`, the list of third-party JavaScript."""
     text = (shipped("web") / "vendor" / "vendor.toml").read_text(encoding="utf-8")
     return list(tomllib.loads(text)["package"])
 

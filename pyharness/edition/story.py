@@ -1,7 +1,7 @@
 """The data of the story, the home page: charts and numbers of its seven scenes.
 
-The data come from runs of the Python ports; a script repeats such runs when a visitor changes a
-value.
+The data come from runs of the Python ports; when a visitor changes a value, a script runs the
+programs again.
 """
 
 import math
@@ -138,13 +138,12 @@ def context() -> dict[str, Any]:
 def _run(
     case: int, program: str, listing: str = "original", without: Names = (), may_stop: bool = True
 ) -> Trajectory:
-    """Return the run of a Python port, corrected or as printed but without defects in `without`."""
+    """Return the run of a Python port: `listing`, but without the defects in `without`."""
     active = set(switches(program)) - set(without) if listing == "original" else set()
     return run_program(case_scene(case), Listing(program, active), "python", may_stop=may_stop)
 
 
 def _distance(run: Trajectory, goal: Array) -> float:
-    """Return the largest distance (rad/s) of omega1 from `goal`."""
     return float(np.abs(run.omega - goal[: run.steps])[:, 0].max())
 
 

@@ -40,7 +40,7 @@ class Effect:
     """The outcome of one listing (a program with a choice of defects) on one scene.
 
     `omega` (rad/s) and `velocity` (m/s) are the largest errors over the completed `steps`; `common`
-    has both errors over only the steps that all compared listings completed, or NaN.
+    has both over only the steps that all compared listings completed, or NaN.
     """
 
     listing: Listing
@@ -92,7 +92,6 @@ def effect(scene: Scene, listing: Listing, truth: Reference, effort: float = 1.0
 
 
 def _errors(scene: Scene, run: Trajectory, truth: Reference) -> tuple[float, float]:
-    """Return the largest errors of omega (rad/s) and of the velocity (m/s)."""
     found = accuracy(scene, run, truth)
     return max(found.omega), math.nan if found.velocity is None else found.velocity
 
@@ -107,9 +106,8 @@ def case_truth(case: int) -> Reference:
 def effects_of(name: str) -> Iterator[CaseEffects]:
     """Yield the effect of an apparatus entry in each of its programs and every case.
 
-    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with
-    and without the entry; `kept_alone` and `corrected` are the corrected listing with and without
-    it.
+    For a reading or a conjecture, `original` and `corrected_alone` are the original listing with it
+    and without it, `kept_alone` and `corrected` the corrected listing with it and without it.
     """
     known = entry(name)
     for program in known["programs"]:

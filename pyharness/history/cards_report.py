@@ -44,7 +44,7 @@ def cards_report(
 
 
 def _contents(cards: Sequence[Card]) -> list[Section]:
-    """Return a table of contents by the programs' comment cards."""
+    """Return a table of contents; its headings are the programs' comment cards."""
     parts: list[str] = []
     ranges: dict[tuple[str, str], list[int]] = {}
     for program in PROGRAMS:
@@ -72,7 +72,7 @@ def _contents(cards: Sequence[Card]) -> list[Section]:
 def card_record(card: Card) -> dict[str, Any]:
     """Return a card as a JSON record, with its lines in Fortran and Python.
 
-    `scan` is null if the scan agrees with our text, and empty if the scan lacks the card.
+    `scan` is null if the scan agrees with our text, empty if it lacks the card.
     """
     found = deck(card.program)
     scan = (card.scan or "") if card.deviates else None
@@ -112,7 +112,7 @@ def scan_report(
 
 
 def classes_report() -> Report:
-    """Return the report of how many apparatus entries there are, on how many cards, by kind."""
+    """Return the report of the numbers of apparatus entries, and of their cards, by kind."""
     entries = facts("apparatus")["entry"]
     cards = [card for program in PROGRAMS for card in deck(program).cards.values()]
     entries_of = Counter(each.entry for card in cards for each in card.differences)
@@ -170,7 +170,7 @@ def _named(name: str, texts: Iterable[str]) -> list[str]:
 
 
 def collation_report(found: Sequence[Row]) -> Report:
-    """Return the report of the agreement of decks and thesis, operation by operation."""
+    """Return the report on whether the decks and the thesis agree on each operation."""
     told = faults([*found])
     rows, full = [], []
     for row in found:

@@ -253,7 +253,7 @@ class OrderFinding:
 
     @property
     def misses(self) -> bool:
-        """Return whether the measured order is too low; a special scene may cause a higher one."""
+        """Return whether the measured order is too low; in special scenes it may be higher."""
         return self.settled and self.deviation < -SLACK
 
 
@@ -322,7 +322,7 @@ def _ladder(scene: Scene, members: Sequence[Member], horizon: float, end: Array)
 
 
 def _slopes(errors: Array) -> list[float]:
-    """Return the order from each usable pair of errors; its step sizes have the ratio 2."""
+    """Return the order from each usable pair of errors, whose step sizes have the ratio 2."""
     return [
         math.log2(coarse / fine)
         for coarse, fine in zip(errors[:-2], errors[2:], strict=True)
@@ -349,7 +349,7 @@ def family_report(scene: Scene, found: Sequence[OrderFinding]) -> Report:
 
 
 def _finding(found: Sequence[OrderFinding]) -> list[str]:
-    """Return a sentence on the order with one correction, if several methods make just one."""
+    """Return a sentence on the order with one correction, if several methods make one."""
     alike = (each.measured for each in found if each.member.corrections == 1)
     orders = Counter(round(order) for order in alike if order is not None)
     if orders.total() < 2:

@@ -74,7 +74,7 @@ class FigurePlan:
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the figure's files: two pictures, and the numbers as CSV."""
+        """Return the names of the figure's files: two pictures and a CSV file."""
         return [f"{self.stem}.{ending}" for ending in ENDINGS]
 
     @property
@@ -173,7 +173,7 @@ def _record(finding: FigureFinding) -> dict[str, Any]:
 
 
 def curve_numbers(finding: FigureFinding) -> Table:
-    """Return a figure's plotted numbers: omega (rad/s) by curve and time (s)."""
+    """Return the plotted omega (rad/s) by curve and time (s)."""
     truth, start = finding.reference, np.array(finding.scene.omega)
     rows = [
         [curve, "", t, None, *omega]
@@ -244,7 +244,7 @@ def together_picture(first: FigureFinding, second: FigureFinding) -> Picture:
 def points_picture() -> Picture:
     """Return a picture of the collocation points of each printed program in the first steps.
 
-    Each row is a step, with times (s) after its beginning; the grey band is the step itself.
+    Each row is a step; times (s) are counted from its beginning, and the grey band is the step.
     """
     from matplotlib.figure import Figure
 

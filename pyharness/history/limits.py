@@ -86,10 +86,10 @@ class Limit:
 
 
 def limit(program: str, scene: Scene, halvings: int = 6, effort: float = 1.0) -> Limit:
-    """Return the convergence of an original program to its limit; the stop test is not made.
+    """Return the convergence of an original program, run without stop test, to its limit.
 
-    Under a varying torque only the Runge-Kutta program has a limit. Raise InputError above the work
-    limit.
+    Under a varying torque only the Runge-Kutta program has a limit. Raise InputError if the work
+    limit is exceeded.
     """
     times = scene.times()
     truth = reference(scene, times, effort=effort)
@@ -216,7 +216,7 @@ def _solved(
 
 
 def invisible(scene: Scene) -> dict[str, tuple[str, ...]]:
-    """Return, by program, the defects whose sole correction changes omega at most by rounding."""
+    """Return, by program, the defects whose correction alone changes omega at most by rounding."""
     found = {}
     for program in PROGRAMS:
         before = run_program(scene, Listing.original(program))

@@ -39,9 +39,9 @@ def fits(
 ) -> list[Fit]:
     """Return the comparisons of a page with our pages of the same form, nearest first.
 
-    The form of a page is given by the moments and torques in its heading and the number of columns.
-    Our runs have as many steps as in the text of the thesis or, if the page is longer, as on the
-    cards. Raise InputError if none of our pages has the form.
+    Pages have the same form if the moments and torques in their headings and the numbers of columns
+    agree. Our runs have as many steps as in the text of the thesis or, if the page is longer, as on
+    the cards. Raise InputError if none of our pages has the form.
     """
     found: list[Fit] = []
     listings = {program: listings_of(program) for program in programs}

@@ -124,7 +124,7 @@ def integrate(scene: Scene, weighting: str, mistake: str = "none") -> Array:
 
 
 def _rates(estimate: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return A omega2 omega3, B omega1 omega3 and C omega1 omega2 as columns, polynomials in t."""
+    """Return A omega2 omega3, B omega1 omega3, C omega1 omega2: columns of coefficients in t."""
     columns = [
         polynomial.polymul(estimate[:, j], estimate[:, k]) * a
         for a, j, k in zip(coefficients, (1, 0, 0), (2, 2, 1), strict=True)

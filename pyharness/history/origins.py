@@ -1,6 +1,6 @@
 """Disagreements of the decks and the thesis, as evidence on the origin of faults.
 
-The table `data/disagreements.toml` separates the sources' statements from our inferences.
+The table `data/disagreements.toml` separates what the sources say from our inferences.
 """
 
 from collections import Counter

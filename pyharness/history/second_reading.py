@@ -1,8 +1,8 @@
 """An estimate of the remaining transcription errors, by capture and recapture.
 
 The first reading of the scan is our text of the cards. The second is a random sample that was read
-again (`data/cards/second-reading.toml`). The numbers of misreadings (errors of the scan) that one
-reading, or both, correct give an estimate of the uncorrected ones.
+again (`data/cards/second-reading.toml`). The numbers of misreadings (errors of the scanned text)
+that either reading alone corrects, and that both correct, give an estimate of the uncorrected ones.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class ReadCard(NamedTuple):
 
 
 def chapman(first: int, second: int, both: int) -> float:
-    """Return Chapman's estimate of a population: Lincoln and Petersen's, for small samples."""
+    """Return Chapman's estimate of a population from two samples and their common members."""
     return (first + 1) * (second + 1) / (both + 1) - 1
 
 
@@ -41,9 +41,9 @@ def recapture_interval(first: int, second: int, both: int) -> tuple[int, int]:
     """Return the limits of the 95 % confidence interval of a population's size.
 
     `first` and `second` are the sizes of two samples, `both` the number of their common members.
-    For independent samples, `both` has the hypergeometric distribution. For a size in the interval,
-    neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, because there is no
-    upper limit then.
+    For independent samples, `both` has the hypergeometric distribution. A size is in the interval
+    if neither tail from `both` on is below 0.025. Raise ValueError if `both` is 0, because there is
+    no upper limit then.
     """
     if both < 1:
         raise ValueError("both must be positive")

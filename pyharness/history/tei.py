@@ -7,7 +7,7 @@ The elements are:
 - `fw`: a heading added by an editor;
 - `surplus`: text that belongs to no card.
 
-Cards are in the order of their numbers. The text of the scan is restored from the pages in the
+Cards are in the order of their numbers. To restore the text of the scan, take the pages in the
 order of `n`, with their lines of cards, `fw` and `surplus`, and each `rdg` in place of its `lem`.
 """
 

@@ -62,7 +62,8 @@ class WordRun(NamedTuple):
     `rule` is ``nearest-even``, ``chop`` (towards zero), or ``FX`` or ``RX``, the unrounded or the
     rounded operations of the CDC 6600. `stop` has reason and step of an early end, as in ``V2 at
     25``. The longer one of the two printed pages has `fields` numbers, of which `different` differ.
-    `error` is the largest error of omega (rad/s); `singular` counts rows with IER = 129.
+    `error` is the largest error of omega (rad/s); `singular` counts the steps with IER = 129, a
+    singular matrix.
     """
 
     case: int
@@ -90,7 +91,7 @@ class WordCell:
         return next((run for run in self.runs if (run.p, run.rule) == (p, rule)), None)
 
     def settled(self, rule: str, same: Sequence[WordRun]) -> int | None:
-        """Return the least p from which on every run with this rounding is in `same`, or None."""
+        """Return the least p such that all runs of `rule` with at least p bits are in `same`."""
         of_rule = sorted((r for r in self.runs if r.rule == rule), key=lambda run: -run.p)
         return min((run.p for run in takewhile(same.__contains__, of_rule)), default=None)
 
@@ -212,7 +213,6 @@ def _scenes(cells: Sequence[WordCell]) -> list[tuple[Scene, list[Listing]]]:
 
 
 def _head(cell: WordCell) -> list[Any]:
-    """Return case, program and listing, with marks of assumptions."""
     case, program, listing, *_ = cell.double
     on_cards = mark(case_scene(case), subset(program, listing))
     return [f"{case}{case_mark(case)}", program, f"{listing}{on_cards}"]
@@ -279,7 +279,7 @@ def _errors(cells: Sequence[WordCell]) -> Table:
 
 
 def _picture(cells: Sequence[WordCell], data: Table) -> Picture:
-    """Return a picture of the largest error of omega (rad/s) against p; dashed lines: p = 113."""
+    """Return a picture of the largest error of omega (rad/s) over p; dashed lines show p = 113."""
     from matplotlib.figure import Figure
 
     programs = list(dict.fromkeys(cell.double.program for cell in cells))

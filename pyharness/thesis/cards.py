@@ -2,8 +2,8 @@
 
 A card is a line of a printed program, a deck the cards of one program. A line of the scan consists
 of card number, dash and text; blanks are ignored. `data/cards` has the decks, the pages of the
-scan, and for each card the corresponding lines of the Python port (the twin). The Fortran port
-names its cards in comments. `data/apparatus.toml`, the critical apparatus, explains where the scan
+scan, and for each card the corresponding lines of the Python port (the twin). Comments in the
+Fortran port name its cards. `data/apparatus.toml`, the critical apparatus, explains where the scan
 deviates from our text.
 """
 
@@ -47,9 +47,9 @@ class Card(NamedTuple):
     """A card of a printed program, and its appearance in the scan.
 
     `text` is columns 1 to 72 in our text. `differences` are ordered from left to right; each is the
-    first occurrence of its characters after the previous difference. If the scan has another card
-    number, `printed` is that number and the apparatus entry that explains it. If the scan lacks the
-    card, `lost` is the apparatus entry on it.
+    first occurrence of its characters after the previous difference. `printed` is a deviating card
+    number in the scan, with the apparatus entry that explains it. If the scan lacks the card,
+    `lost` is the apparatus entry on it.
     """
 
     program: str
@@ -89,7 +89,7 @@ class Card(NamedTuple):
         return f"{number}-{''.join(shown)}"
 
     def passages(self) -> Iterator[tuple[str, Difference | None]]:
-        """Yield each passage of the text with its difference from the scan, or None.
+        """Yield each passage of the text, with its difference from the scan or None.
 
         Raise ValueError if the text does not have all differences in order.
         """
@@ -156,8 +156,7 @@ class Deck:
     def executable(self) -> frozenset[int]:
         """Return the numbers of the cards with executable statements.
 
-        All other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END
-        statement.
+        Other cards are comments, or part of a PROGRAM, DIMENSION, REAL, FORMAT or END statement.
         """
         found, computes = set(), False
         for card in self.cards.values():
@@ -303,8 +302,8 @@ def port_file(program: str) -> str:
 def switch_at(place: Place) -> tuple[str, bool] | None:
     """Return the switch on which a Fortran line depends, and whether the line runs if it is active.
 
-    A switch is the flag of a defect or reading. Return None unless the line depends on exactly one
-    switch.
+    A switch is the flag of a defect or reading. Return None if the line depends on no switch or on
+    several.
     """
     lines = _lines(shipped(PORT) / place.file)
     depth = _indentation(lines[place.line - 1])

@@ -47,7 +47,7 @@ def cell_name(listing: Listing, case: int) -> str:
 
 
 def listing_name(listing: Listing) -> str:
-    """Return a listing's name, as in ``original``, ``corrected:READING`` or ``DEFECT+DEFECT``."""
+    """Return a listing's name, such as ``original``, ``corrected:READING`` or ``DEFECT+DEFECT``."""
     if listing.label == "custom":
         return "+".join(sorted(listing.active))
     return ":".join([listing.label, *sorted(listing.readings)])

@@ -23,8 +23,8 @@ _OF_THE_SCAN = ("misreading", "missing text", "normalization")
 def expected_lines() -> list[tuple[str, str]]:
     """Return the lines that our tables expect in the appendix of the thesis, as pairs (text, name).
 
-    The text has no blanks. The name is that of a card, such as ``two-term:1660``, or ``furniture``
-    for a line that an editor added, or ``phantom`` for text that belongs to no card at its place.
+    The text has no blanks. The name is that of a card, such as ``two-term:1660``, ``furniture`` for
+    a line that an editor added, or ``phantom`` for text that belongs to no card at its place.
     """
     found = []
     for page in facts("cards/scan")["page"]:
@@ -129,11 +129,12 @@ def undeclared() -> list[str]:
 class Row(NamedTuple):
     """A row of the comparison: an operation, and whether the decks and the thesis agree on it.
 
-    `cards` has the card numbers by program, as in ``750-770, 800``. `decks` is ``agree`` if all
-    decks with the operation have the same statements, ``names`` if only names differ, ``order`` if
-    only names and order differ, else ``differ``; it is ``-`` if no deck has the operation. `thesis`
-    is ``agrees``, ``differs`` or ``silent``; `text` is the place in the thesis, and `says` the
-    statement there. `entries` (of the apparatus) or `reason` explain a disagreement.
+    `what` is the operation. `cards` has the card numbers by program, as in ``750-770, 800``.
+    `decks` is ``agree`` if all decks with the operation have the same statements, ``names`` if only
+    names differ, ``order`` if only names and order differ, else ``differ``; it is ``-`` if no deck
+    has the operation. `thesis` is ``agrees``, ``differs`` or ``silent``; `text` is the place in the
+    thesis, `says` the statement there. `entries` of the apparatus, or `reason`, explain a
+    disagreement.
     """
 
     what: str

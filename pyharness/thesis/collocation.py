@@ -30,9 +30,9 @@ def integrate(
 ) -> Trajectory:
     """Run a collocation program on a scene, and return its trajectory.
 
-    `points_of` returns the collocation points (s) for DT, the step size (s) that the program
-    computes. `rates` returns the right-hand sides at point k (0 for the start). Its arguments are
-    the torques over the moments (rad/s2) at the start and at all points, k, and the six unknowns.
+    `points_of` returns the collocation points (s) for DT (s), the program's variable for the step
+    size. `rates` returns the right-hand sides at point k (0 for the start). Its arguments are the
+    torques over the moments (rad/s2) at the start and at all points, k, and the six unknowns.
     """
     h = scene.step_size
     dt = h

@@ -36,7 +36,7 @@ def read_rows(
 ) -> Trajectory:  # fmt: skip
     """Return the output of a compiled program as a trajectory.
 
-    `rows` has shape (n, 8): true time and recorded TIME (s), omega (rad/s) and translational
+    `rows` has shape (n, 8): true time and the program's TIME (s), omega (rad/s) and translational
     velocity (m/s). `ier` has at least n codes. `stop_variable` is the number in `STOP_VARIABLES`,
     from 1, of the variable that failed the stop test, or 0. `stop_quotient` is the change of its
     right-hand side divided by its own change (1/s).
@@ -58,8 +58,7 @@ def program_arguments(
 
     Among them are a bit mask of defects, readings and conjectures, and seven triples: moments (kg
     m2), or A, B and C of Euler's equations; omega (rad/s); masses (kg); forces (N); constant (N m)
-    and rate (N m/s) of the torque; and the initial torque divided by the moments (rad/s2), or
-    zeros.
+    and rate (N m/s) of the torque; initial torque divided by the moments (rad/s2), or zeros.
     """
     first = initial_torque(scene) if listing.has("initial-torque") else None
     if first is None and listing.has("initial-torque"):

@@ -41,7 +41,7 @@ class Run(NamedTuple):
     """The output of a compiled deck.
 
     `tape5` has shape (n, 7): TIME (s), U1 to U3 (rad/s) and V1 to V3 (m/s). `page` is the text of
-    TAPE6, without carriage-control characters and trailing blanks.
+    the printer file TAPE6, without carriage-control characters and trailing blanks.
     """
 
     tape5: np.ndarray
@@ -53,9 +53,9 @@ def deck_text(
 ) -> str:
     """Return a program as fixed-form FORTRAN, with card numbers in columns 73 to 80.
 
-    By default the data are those of the published cards: Case 2 with 300 steps (collocation) or
-    Case 5 with 100 steps (Runge-Kutta). A `scene` of Table 1 replaces the numbers in the
-    assignments and in the DO statement.
+    The published cards have the data of Case 2 with 300 steps (collocation) or Case 5 with 100
+    steps (Runge-Kutta). A `scene` of Table 1 replaces the numbers in the assignments and in the DO
+    statement.
 
     In the `dialect` "1982" the cards are as published; "ftn" adds the torque of Case 7, "gfortran"
     also adaptations to a modern compiler. Column 73 marks added and adapted cards. `terms`, 3 or 5,

@@ -48,7 +48,7 @@ def initial_torque(scene: Scene) -> Vector | None:
 
 
 def card_torque(scene: Scene) -> Vector | None:
-    """Return the initial torque (N m) of a scene's case of Table 1, or None."""
+    """Return the initial torque (N m) of a scene's case in Table 1, or None if it has none."""
     given = {each["case"]: each["torque"] for each in facts("printer")["initial_torque"]}
     return given.get(scene.case)
 

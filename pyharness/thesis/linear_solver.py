@@ -11,7 +11,7 @@ def leqt1f(
 ) -> tuple[list[list[float]], int]:
     """Return the solutions x of A x = b for each right-hand side b, and the error code IER.
 
-    If A is algorithmically singular, IER is `SINGULAR` (129), and each b is returned in place of
+    If A is singular within rounding, IER is `SINGULAR` (129), and each b is returned in place of
     its x; otherwise IER is 0.
     """
     factors = [list(row) for row in matrix]

@@ -31,7 +31,7 @@ ALIKE = dict.fromkeys(_OPERATIONS, 1)
 class Count(NamedTuple):
     """The number of additions, subtractions, multiplications and divisions in a step.
 
-    `written` counts every operation on the cards; `once` counts repetitions with the same operands
+    `written` counts every operation on the cards, `once` repetitions with the same operands only
     once. If each operation is weighted with its time, both are times of sequential execution.
     """
 

@@ -50,8 +50,8 @@ def page(scene: Scene, program: str, trajectory: Trajectory) -> str:
 def _printed_rows(trajectory: Trajectory, form: str) -> list[list[float]]:
     """Return omega (rad/s) and velocity (m/s) of each row, as six floats.
 
-    Numbers of other arithmetics than binary64 are rounded to the decimals of the FORMAT `form`, so
-    that the floats are printed as those numbers would be.
+    Numbers of another arithmetic than binary64 are first rounded to the decimals of the FORMAT
+    `form`, so that the floats are printed as these numbers would be.
     """
     if trajectory.exact is None:
         assert trajectory.velocity is not None

@@ -1,8 +1,8 @@
 """Numbers and instructions of CDC machines in octal, and test vectors for their arithmetic.
 
 A CDC word has 60 bits: a sign bit, an exponent field of 11 bits, and a coefficient of 48 bits. All
-60 bits of a negative number are complemented. The exponent is the exponent field minus 2000
-(octal), plus one if the field is below 2000 (octal).
+60 bits of a negative number are complemented. The exponent is the field minus 2000 (octal),
+plus one if the field is below 2000 (octal).
 
 The test vectors in `data/words/cdc.json` follow from the CYBER 170 hardware reference, CDC
 60463560; a public emulator agrees with them. A file of test vectors is a JSON object with `schema`

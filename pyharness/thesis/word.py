@@ -34,8 +34,8 @@ class Rules(NamedTuple):
     """The arithmetic of a format, as functions of integers m and e.
 
     `nearest` (ties to even) rounds square roots, sines, cosines and literals; `cut` (towards zero)
-    rounds literals if the format truncates them. Subtraction is addition of the negative number.
-    `difference` serves comparisons only: two numbers are equal if it is zero.
+    rounds literals if the format truncates them. Subtraction adds the negative number. `difference`
+    is for comparisons alone: two numbers are equal if it is zero.
     """
 
     nearest: Rounding
@@ -376,7 +376,7 @@ class Word:
         return f"Word({self.p}, {self.rule!r})"
 
     def __call__(self, value: Any) -> Number:
-        """Return a float, integer, fraction, decimal text or number as a number of this format.
+        """Return a float, integer, fraction, decimal text or `Number` as a number of this format.
 
         A float is converted from its shortest decimal representation. Raise TypeError for any other
         type, and for a number of another format.

@@ -37,7 +37,8 @@ class Accuracy:
 def accuracy(scene: Scene, trajectory: Trajectory, truth: Reference) -> Accuracy:
     """Return the errors of a trajectory against `truth`, and the drifts of conserved quantities.
 
-    Errors are taken up to the end of the shorter one, and infinite if there are no rows.
+    Errors are compared up to the end of the shorter of the two, and are infinite if there are no
+    rows.
     """
     n = min(len(trajectory.time), len(truth.time))
     with np.errstate(all="ignore"):
@@ -93,7 +94,7 @@ def distance(first: Trajectory, second: Trajectory) -> float:
 
 
 def differences(first: Trajectory, second: Trajectory) -> list[str]:
-    """Return the names of the results that differ: counts and ending or, if these agree, arrays."""
+    """Return the names of the counts and endings that differ or, if these agree, of the arrays."""
     names = {"steps": "steps", "evaluations": "evaluations", "ended": "ending", "stop": "stop"}
     found = [told for name, told in names.items() if getattr(first, name) != getattr(second, name)]
     if found:
@@ -116,7 +117,7 @@ def _rows(trajectory: Trajectory, name: str) -> Array:
 
 
 def ulps(x: Array | float, y: Array | float) -> float:
-    """Return the largest distance, in floats, between corresponding elements of `x` and `y`.
+    """Return the largest distance, counted in floats, between corresponding elements.
 
     The distance of two NaNs is 0, that of a NaN and a number infinite.
     """

@@ -1,4 +1,4 @@
-"""Batches of scenes; arrays hold the quantities in which the scenes differ."""
+"""Batches of scenes; arrays have the quantities in which the scenes differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ class Solver:
     """The solver of a batch: a method or a program of the thesis; the other field is None.
 
     `t_end` (s) is by default the step size times the number of steps. The fields after it are for
-    programs: `listing` selects the active defects, `reading` the interpretation of doubtful cards.
+    programs: `listing` names the active defects, `reading` the interpretation of doubtful cards.
     `lipschitz` is the limit (1/s) of the stop test; `may_stop` tells whether the test may end a
     run.
     """
@@ -158,8 +158,8 @@ class Batch:
     def run(self, at: list[int]) -> ProgramEnsemble:
         """Return a program's results at the steps `at`, ascending.
 
-        Scenes run one by one, without the codes IER, if they differ in `torque_rate`, or if the
-        program refuses one of them. Only refused scenes have the status REFUSED.
+        If the scenes differ in `torque_rate`, or the program refuses one of them, they run one by
+        one, without the error codes IER. Only refused scenes have the status REFUSED.
         """
         if "torque_rate" not in self.arrays:  # `run_many` takes one rate for all bodies
             try:
@@ -207,7 +207,7 @@ class Batch:
         return self._solve(method, tolerance, t_end, **more)
 
     def _solve(self, method: str, tolerance: float, t_end: Array, **more: Any) -> Ensemble:
-        """Return the states at `t_end` (s), scene by scene without a kernel for many bodies."""
+        """Return the states at `t_end` (s); one scene at a time if no kernel solves many bodies."""
         by_state = isinstance(self.scene.torque, StateTorque)
         tolerance = max(tolerance, REGISTRY[method].finest)
         if method not in (PREPARED_FOR_STATE if by_state else PREPARED):

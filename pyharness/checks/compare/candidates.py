@@ -43,7 +43,7 @@ class End:
 
     @property
     def has_result(self) -> bool:
-        """Return whether the candidate reached the time, even with an error above the tolerance."""
+        """Return whether the candidate reached the time, whatever its error."""
         return self.ended in WITH_ALL_ROWS
 
 
@@ -154,7 +154,7 @@ def unstopped(listing: Listing) -> Candidate:
 
 
 def copied_result(values: Iterable[float]) -> Array:
-    """Return a copy of a compiled function's result, because its next call overwrites it."""
+    """Return a copy of a compiled function's result, which its next call overwrites."""
     return np.array([float(x) for x in values])
 
 

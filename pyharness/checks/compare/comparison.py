@@ -1,7 +1,7 @@
 """Comparisons of programs, original and corrected, and of methods, on one scene.
 
-Differences between Fortran and Python are in units in the last place. Errors (rad/s) below the
-error of the reference have no meaning.
+Differences between Fortran and Python are in units in the last place. An error (rad/s) below the
+error of the reference solution has no meaning.
 """
 
 import itertools
@@ -256,7 +256,7 @@ def _with_methods(
     word: str = BINARY64,
     are_run: bool = True,
 ) -> Comparison:
-    """Return the comparison of programs, and of methods with their tolerances."""
+    """Return the comparison of programs and methods."""
     if are_run:
         import scipy.integrate  # noqa: F401  (not to be timed with the first method)
 

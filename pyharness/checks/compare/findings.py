@@ -68,7 +68,7 @@ class Comparison:
     reference : Reference
         The reference solution and the estimate of its error.
     bound : ErrorBound
-        The error of the reference, proved or estimated; no other result depends on it.
+        The error of the reference solution, proved or estimated.
     programs : tuple of ProgramFinding
         The results of the programs, one for each listing.
     methods : tuple of MethodFinding

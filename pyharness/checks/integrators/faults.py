@@ -24,7 +24,7 @@ _DEGREES = 180.0 / math.pi
 
 
 class State(NamedTuple):
-    """Angular velocities (rad/s), shape (n, 3), and attitudes, shape (n, 4)."""
+    """Angular velocities (rad/s), shape (n, 3), and quaternions, scalar first, shape (n, 4)."""
 
     omega: Array
     attitude: Array
@@ -34,10 +34,10 @@ class State(NamedTuple):
 class Fault:
     """A fault of an integrator: its name, a sentence on it, and its changes.
 
-    A faulty integrator computes the motion of another `scene` (None if the fault has no effect) at
-    other `times` (s; the second argument is the step size), and then changes the states by `state`,
-    whose second argument is the right scene. If `of_step`, the faulty states approach the true ones
-    as the step decreases.
+    The function `scene` returns the scene whose motion the faulty integrator computes, or None if
+    the fault has no effect; `times` returns the times (s) of its states, from the requested ones
+    and the step size (s). `state` then changes the states; its second argument is the right scene.
+    If `of_step`, the faulty states approach the true ones as the step decreases.
     """
 
     name: str

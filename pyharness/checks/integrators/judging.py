@@ -94,9 +94,10 @@ def judge_integrator(
 ) -> Verdict:
     """Return the results of all checks of an integrator, started by `command`.
 
-    ``again(name)`` returns the command that repeats the checks in a scene; ``told`` receives the
-    number of finished problems and the name of the next problem. `due` is the required order. An
-    invalid answer ends the checks. Raise InputError for an empty command.
+    `chosen` are the problems (random scenes), `due` is the required order. ``again(name)`` returns
+    the command that repeats the checks in a scene; `told` receives the number of finished problems
+    and the name of the next. An invalid answer ends the checks. Raise InputError for an empty
+    command.
     """
     found = Verdict(command, again)
     where = "start"
@@ -130,8 +131,8 @@ def judge_integrator(
 def _unexplained(found: Verdict) -> tuple[str, ...]:
     """Return the problems with failed checks that no fault explains.
 
-    A fault also explains an overflow of the faulty motion; a fault that lowers the order also
-    explains the lack of a higher order.
+    A fault also explains failures by an overflow of the faulty motion and, if it lowers the order,
+    by too low an order.
     """
     faults = {x.name: x.problems for x in found.findings if x.name not in FIRST_ORDER}
     explained = {*chain.from_iterable(faults.values()), *(["long"] if faults else [])}

@@ -31,7 +31,11 @@ Advance = Callable[[Any, Array, Array, float], Any]
 
 @dataclass(frozen=True)
 class IntegratorPlant:
-    """A fault planted in an integrator, and the name by which it must be recognised."""
+    """A fault planted in an integrator, and the name by which it must be recognised.
+
+    `request` changes the request, `state` the answered states. `advance` computes the attitude
+    after a step from the attitude before it, omega (rad/s) before and after, and the step size (s).
+    """
 
     name: str
     request: Callable[[dict[str, Any]], object] | None = None

@@ -1,8 +1,8 @@
 """Random scenes in which an integrator is judged, its errors in them, and its drift.
 
-The drift is that of conserved quantities in a long torque-free motion: relative for energy and |L|,
-an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to `LEVELS` -
-1, determines a step size (s) and a tolerance; both decrease as the level increases.
+The drift is the change of conserved quantities in a long torque-free motion: relative for energy
+and |L|, an angle (rad) for the direction of the angular momentum L in space. A level, from 0 to
+`LEVELS` - 1, determines a step size (s) and a tolerance; both decrease as the level increases.
 """
 
 import math
@@ -116,7 +116,7 @@ class Problem:
         return float(self.times[-1] / self.step_size(LEVELS - 1))
 
     def floor(self, rounding: float) -> float:
-        """Return the largest error that roundings of relative size `rounding` may cause."""
+        """Return the largest error that roundings of relative size `rounding` cause."""
         return _ROUNDINGS * rounding * math.sqrt(self.most_steps)
 
     def request(self, level: int, scene: Scene | None = None, times: Array | None = None) -> bytes:
@@ -188,9 +188,9 @@ def convergence(
 ) -> Convergence:
     """Return the measured order of convergence of errors above `floor`.
 
-    It is the order of the last pair of settings. With `overall`, for tolerances, whose errors
-    decrease irregularly, it is the smaller of two orders: from the first setting to the last, and
-    from the fourth last to the last.
+    It is the order from the last pair of settings. With `overall`, it is the smaller of two orders:
+    from the first setting to the last, and from the fourth last to the last; this is for
+    tolerances, with which errors decrease irregularly.
     """
     seen = [k for k in range(1, len(errors)) if not errors[k] <= floor]
     order = None
@@ -264,9 +264,10 @@ def problems(seed: str, draws: int, names: Sequence[str] = ()) -> list[Problem]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The drifts from time 0, shape (n,), and the largest `change` between neighbouring rows.
+    """The drifts since time 0 at n `times` (s), and the largest `change` from row to row.
 
-    `named` has the drifts of "energy" and "momentum" and, with an attitude, of "direction".
+    `named` has the drifts, shape (n,), of "energy" and "momentum" and, with an attitude, of
+    "direction".
     """
 
     times: Array
@@ -275,10 +276,10 @@ class Drift:
 
 
 def long_motion(free: Judged) -> tuple[int, Array, float | None]:
-    """Return level and times (s) of the long motion, and the limit of the change between rows.
+    """Return level and times (s) of the long motion, and the limit of the drift between rows.
 
     The level is the first one whose limits allow enough rows, or else the last. The limit is None
-    if the errors are too large.
+    if the errors in the problem `free` are too large.
     """
     control = free.finest.control
     levels = range(_FIRST[control], LEVELS)

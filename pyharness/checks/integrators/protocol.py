@@ -69,7 +69,7 @@ def asking_of(process: PortProcess) -> Ask:
 
 
 def refuse_integrator(command: str) -> None:
-    """Raise InputError if `command`, which does not answer as a port, is an integrator."""
+    """Raise InputError that advises `--integrator` if `command`, no port, is an integrator."""
     line = request(draw_moderate("", MODERATE[0], 0), [1.0], 0.5, 1e-3)
     refuse_other(command, "--port", "--integrator", line, lambda answer: read_motion(answer, 1))
 

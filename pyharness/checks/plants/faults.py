@@ -1,7 +1,7 @@
 """Faults of a chosen size: which function is faulty, and how its result changes.
 
-A fault is planted in the running process, and removed when its context ends. A faulty Python twin
-is a copy of the sources with one replacement.
+A fault is planted in the running process, and removed when its context ends. A faulty twin (Python
+version of a program) is a copy of the sources with one replacement.
 """
 
 import importlib
@@ -96,7 +96,7 @@ def change_attribute(name: str, change: Change) -> Change:
 
 
 class TwinFault(NamedTuple):
-    """A row of `data/plants.toml`: a faulty replacement in the Python version of a program."""
+    """A row of `data/plants.toml`: `wrong` replaces `right` in a `file` of the Python versions."""
 
     file: str
     right: str
@@ -114,7 +114,7 @@ _COUNT = itertools.count()
 
 @dataclass(frozen=True)
 class PlantedTwin(Program):
-    """A program with a faulty Python version, which also replaces Fortran if `both`."""
+    """A program with a faulty Python version, which replaces Fortran too if `both`."""
 
     module: ModuleType
     both: bool = True

@@ -37,7 +37,10 @@ def control(failed: int, note: str) -> Outcome:
 def self_test_report(
     title: Sequence[str], found: Sequence[Outcome], again: str, **extra: Any
 ) -> Report:
-    """Return the report of a self-test; the command `again` repeats it, `extra` are JSON fields."""
+    """Return the report of a self-test; `again` is the command that repeats it.
+
+    `extra` has further JSON fields.
+    """
     lines = []
     for each in found:
         lines += [f"{'' if each.passed else 'FAILED '}{each.name}: {each.fault}", f"  {each.note}"]

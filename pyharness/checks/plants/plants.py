@@ -1,6 +1,7 @@
 """Planted faults, which test what each check detects.
 
-Compiled programs are altered at their entry point, Python twins in a copy of their source.
+Compiled programs are altered at their entry point, twins (Python versions) in a copy of their
+source.
 """
 
 import itertools
@@ -54,7 +55,6 @@ class Plant:
 
 
 def _plus(found: Any, size: float) -> Any:
-    """Return a number plus `size`; if the number is an integer, plus the integer part of `size`."""
     return found + (int(size) if isinstance(found, int) else size)
 
 
@@ -64,7 +64,6 @@ def _off(found: Array, size: float) -> Array:
 
 
 def _bit_off(found: Array, size: float) -> Array:
-    """Return an array with the largest element times 1 + `size`."""
     wrong = found.copy()
     wrong[np.unravel_index(np.abs(found).argmax(), found.shape)] *= 1.0 + size
     return wrong
@@ -169,7 +168,7 @@ def _label_both(
 def _shifted(
     size: float, solve: _Run, scene: Scene, times: Sequence[float], *rest: float
 ) -> Trajectory:
-    """Return results for later times, labelled with `times`; only the true solution reveals it."""
+    """Return results for later times as if for `times`; only the true solution reveals this."""
     late = size * scene.step_size if times[-1] >= 0.0 else -size * scene.step_size
     found = solve(scene, [t + late for t in times], *rest)
     time = np.array(times[: len(found.time)], dtype=float)
@@ -284,7 +283,7 @@ def self_test(seed: str, record: Path) -> Iterator[Outcome]:
 
 
 def outcome(plant: Plant, chosen: Selection) -> Outcome:
-    """Return whether any checks detect a planted fault, apart from the golden record's."""
+    """Return whether any check, apart from the golden record's, detects a planted fault."""
     with plant.planted(plant.size):
         failed, note = _failed(replace(chosen, only=plant.kinds))
     noticed = failed.total() - failed[_NOT_ENOUGH]
@@ -292,7 +291,7 @@ def outcome(plant: Plant, chosen: Selection) -> Outcome:
 
 
 def _failed(chosen: Selection) -> tuple[Counter[str], str]:
-    """Return numbers of failed checks by kind, and a note with one id, preferably not golden."""
+    """Return numbers of failed checks by kind, and a note with one id, if possible not golden."""
     names = [check.id for check in verify(chosen) if not check.passed]
     failed = Counter(name.partition("/")[0] for name in names)
     example = min(names, key=lambda name: name.startswith(_NOT_ENOUGH), default="")

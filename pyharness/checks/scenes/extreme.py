@@ -1,4 +1,4 @@
-"""Extreme scenes with end times, in five named groups (suites)."""
+"""Extreme scenes with end times, in five named groups."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ class Circumstance(NamedTuple):
 
 
 def speed(scene: Scene, largest: float) -> float:
-    """Return a bound (1/s) on torque-free abs(omega') / `largest`, the largest omega (rad/s)."""
+    """Return a bound (1/s) on torque-free abs(omega') over `largest`, the largest omega (rad/s)."""
     return max(map(abs, scene.euler_coefficients)) * largest
 
 
@@ -56,8 +56,8 @@ def _separatrix() -> Iterator[Circumstance]:
     """Yield perturbed rotations about the axis of the middle moment.
 
     Perturbations are from 1e-1 to 1e-15 rad/s. At a flip, omega about that axis changes its sign.
-    End times are before the first flip, during the first, and during the fifth flip. Other scenes
-    start on the separatrix.
+    End times are before the first flip, during it, and during the fifth. Further scenes start on
+    the separatrix.
     """
     for d in (10.0**-k for k in range(1, 16)):
         beside, on = (d, 1.0, 0.0), (d, 1.0, d)

@@ -41,7 +41,7 @@ class Draw:
         return self.scene.step_size * self.scene.steps * (-1.0 if self.backward else 1.0)
 
     def tolerance(self, finest: float) -> float:
-        """Return the relative tolerance, by `digits` between 1e-3 and a method's `finest`."""
+        """Return the relative tolerance that `digits` selects, from 1e-3 to a method's `finest`."""
         return float(max(finest, COARSEST * (finest / COARSEST) ** self.digits))
 
 
@@ -291,8 +291,8 @@ KINDS = {"plain": _plain, **NASTY, "pointing": _pointing, "driven": _driven}
 def _law(source: Random, size: float, kinds: int, frequencies: tuple[float, float]) -> TorqueLaw:
     """Return a random torque law whose components do not exceed `size` (N m, N m/s).
 
-    `kinds` is a bit mask: 1 constant, 2 linear in time, 4 sine, 8 cosine. `frequencies` are the
-    lowest and the highest (rad/s).
+    `kinds` is the sum of the kinds of terms: 1 constant, 2 linear in time, 4 sine, 8 cosine.
+    `frequencies` are the lowest and the highest (rad/s).
     """
     low, high = map(math.log10, frequencies)
     constant, rate = _vector(source, size), _vector(source, size)

@@ -69,7 +69,7 @@ class Amplification:
     def moving(self) -> "Amplification":
         """Return the matrix without the row and column of the step's result, if possible.
 
-        This is possible if only the new result depends on the old result, by a factor free of z.
+        This is possible if only the new result depends on the old result, by a constant factor.
         """
         column = self.coefficients[:, -1]
         if self.size > 1 and not column[:-1].any() and not column[-1, 1:].any():

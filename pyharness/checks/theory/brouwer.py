@@ -146,9 +146,10 @@ def gauss_noise(body: Orbit, scene: Scene, step: float, stages: int) -> Noise:
     Gauss collocation conserves quadratic invariants for any step size.
 
     The truncation error is the integral of the state-transition matrix times the residual. The
-    residual is zero at the nodes, the zeros of an orthogonal polynomial, so that of the other
-    factor's Taylor series in time only the power s contributes. By Leibniz's rule its coefficient
-    is a sum over j of multiples of (h J)**j / j! times the Taylor term 2s + 1 - j of omega.
+    residual is zero at the nodes, the zeros of an orthogonal polynomial. Divide it by this
+    polynomial: in the Taylor series of the remaining factor of the integrand, only the power s of
+    time contributes. By Leibniz's rule its coefficient is a sum over j of multiples of (h J)**j /
+    j! times the Taylor term 2s + 1 - j of omega.
     """
     from pyharness.checks.theory.tableau import tableau
 
@@ -189,8 +190,8 @@ def errors(
     """Return the signed errors of energy and momentum (relative) and of the phase (rad).
 
     The phase error is the time by which `omega` is ahead of the exact solution, times the frequency
-    of the motion. If `rounded`, the exact solution is that for A, B, C rounded to binary64, which
-    methods use.
+    of the motion. If `rounded`, the exact solution is for A, B, C rounded to binary64, as methods
+    use them.
     """
     start = [Decimal(w) for w in scene.omega]
     found = [Decimal(float(w)) for w in omega]
@@ -217,7 +218,7 @@ def root_mean_square(found: Array) -> Array:
 
 
 def exponent(steps: Sequence[float] | Array, found: Array) -> float:
-    """Return p of the fit error ~ steps**p; column j of `found` has the errors after steps[j]."""
+    """Return the fitted p of error ~ steps**p; column j of `found` is after steps[j]."""
     size = np.log(np.maximum(root_mean_square(found), 1e-300))
     return float(np.polyfit(np.log(np.asarray(steps)), size, 1)[0])
 
@@ -234,7 +235,7 @@ def _frequency(a: Array, omega: Array) -> float:
 
 
 def _steepness(a: Array, omega: Array) -> float:
-    """Return the sum of abs(derivatives) of `_frequency` by omega, from central differences."""
+    """Return the sum of magnitudes of the derivatives of `_frequency` with respect to omega."""
     size = 1e-6 * float(np.abs(omega).max())
     return sum(
         abs(_frequency(a, omega + shift) - _frequency(a, omega - shift)) / (2.0 * size)

@@ -205,8 +205,9 @@ def solver_roundings(program: str) -> tuple[float, float]:
     Both bounds are in units of 2**-53 times step size times rate. The first is for equal rates at
     all points, where only c1 is not zero. The second, multiplied by the relative deviation from
     equal rates, is for unequal rates. They are 3n abs(powers) abs(inverse) abs(L) abs(U) abs(X) for
-    n points (Higham 2002, theorem 9.4), with the factors L and U, the solution X and the powers of
-    the step size. They do not depend on the step size as long as each row's largest element is 1.
+    n points (Higham 2002, theorem 9.4), with the matrix's inverse and factors L and U, the solution
+    X and the powers of the step size. They do not depend on the step size as long as the largest
+    element of each row of the matrix is 1.
     """
     step, matrix = _small_step(program)
     count = len(matrix)
@@ -224,9 +225,10 @@ def solver_roundings(program: str) -> tuple[float, float]:
 def singular_below(program: str, bits: int = 53) -> float:
     """Return the largest step size (s) for which LEQT1F must report a singular matrix.
 
-    LEQT1F does so if the computed sum N + p equals N, for a scaled pivot p and N rows. Then p is at
-    most half a unit in the last place of N. As N is a power of 2, this unit is N 2**(1 - bits), and
-    a tie is rounded to N. The last scaled pivot, proportional to step**(N-1), decides.
+    With N rows, LEQT1F does so if the computed sum N + p equals N for a scaled pivot p, which means
+    that p is at most half a unit in the last place of N. As N is a power of 2, this unit is
+    N 2**(1 - bits), and a tie is rounded to N. The last scaled pivot, which is proportional to
+    step**(N-1), is the first to be so small.
     """
     step, matrix = _small_step(program)
     count = len(matrix)

@@ -53,10 +53,10 @@ _Sample = TypeVar("_Sample")
 class Conditioning:
     """The sensitivity of omega at the end of a motion to errors during it.
 
-    The limits contain `made`, the sum of the errors allowed in the steps (relative, or rad), and
-    rounding errors. `limit` amplifies `made`, and is at most 2, because components up to `largest`
-    differ by no more. Its argument `steps` is the number of roundings of omega, 0 with compensated
-    summation. `angle_limit` assumes that omega has its largest rounding error at all times.
+    `limit` and `angle_limit` add rounding errors to `made`, the sum of the errors allowed in the
+    steps (relative, or rad). `limit` amplifies `made`, and is at most 2, because components up to
+    `largest` differ by no more. Its argument `steps` is the number of roundings of omega, 0 with
+    compensated summation. `angle_limit` assumes the largest rounding error of omega at all times.
     """
 
     # Largest factor, at least 1, from an error of omega at any time to the error at the end.
@@ -84,8 +84,8 @@ class Conditioning:
 def conditioning(scene: Scene, time: float) -> Conditioning:
     """Return the sensitivity of omega at `time` (s) to earlier errors.
 
-    Raise InputError if the solution grows without bound before `time`, if it would be needed at too
-    many times, or if the amplification exceeds binary64.
+    Raise InputError if the solution grows without bound before `time`, if the motion is too fast or
+    too long to be sampled, or if the amplification exceeds binary64.
     """
     # Near the separatrix a numerical integration deviates after a few revolutions.
     method = "closed-form" if closed_form(scene) else "taylor"
@@ -123,9 +123,9 @@ def sampled(
 ) -> tuple[Array, _Sample]:
     """Return equally spaced times up to `time` (s), between which the state changes little.
 
-    `sample` returns the largest rate (1/s) at given times, and results, of which the last are
-    returned too. The first attempt has `fewest` intervals. Raise InputError if more than `most`
-    intervals are needed.
+    `sample` returns the largest rate (1/s) at given times, and results; the results at the returned
+    times are returned too. The first attempt has `fewest` intervals. Raise InputError if more than
+    `most` intervals are needed.
     """
     count = fewest
     while True:
@@ -197,7 +197,7 @@ def conditioning_at(scene: Scene, times: Sequence[float]) -> Conditioning:
 
     Under a torque law it is the sensitivity at the last time; under other torques the largest at
     any of the times, because damping may reduce errors. Raise InputError if the torque is opaque,
-    if the solution grows without bound, or if it would be needed at too many times.
+    if the solution grows without bound, or if the motion is too fast or too long to be sampled.
     """
     if not isinstance(scene.torque, StateTorque):
         return conditioning(scene, times[-1])
@@ -243,8 +243,8 @@ def _path(scene: Scene, times: Array) -> Array:
 def _sources(tape: Tape, times: Array, state: Array) -> Array:
     """Return bounds on the rounding errors of the equations (1/s), divided by the unit roundoff.
 
-    In this running error analysis each operation adds the rounding error of its result; in a sum
-    the magnitudes of all terms count.
+    In this running error analysis each operation adds the rounding error of its result. For a sum
+    it is taken from the magnitudes of the terms.
     """
     given = [_Bounded(each, np.zeros(len(times))) for each in inputs_of(times, state)]
     with np.errstate(all="ignore"):

@@ -5,8 +5,8 @@ small perturbation proportional to exp(Q t). Let A, B, C be the coefficients of 
 and M = N / I torque over moment. Then (a, b, c) is steady if A bc = -M1, B ca = -M2, C ab = -M3.
 The rates Q (1/s) are the roots of Q**3 - (BC a**2 + CA b**2 + AB c**2) Q - 2 ABC abc = 0.
 
-In the functions, `share` is the initial perturbation divided by the rotation. Of a continuous
-family of steady rotations only some members are reported.
+In the functions, `share` is the magnitude of the initial perturbation divided by that of the
+rotation. Of a continuous family of steady rotations only some members are reported.
 """
 
 import cmath
@@ -198,10 +198,10 @@ def _flip_interval(coefficients: Sequence[float], spin: float, share: float) -> 
     """Return the shortest time (s) between flips about the middle axis.
 
     `coefficients` are in cyclic order from that axis; `spin` is in rad/s. The time is 2 K / lambda,
-    where K is the complete elliptic integral with the complementary modulus k', and lambda is near
-    the growth rate. For a small perturbation the time is near (2 / lambda) ln(4 / k'). It is
-    shortest for a perturbation along that other axis which has the smaller coefficient. Return None
-    if the signs of the coefficients are impossible for a middle axis.
+    where K is the complete elliptic integral of the first kind with complementary modulus k', and
+    lambda is near the growth rate. For a small perturbation the time is near (2 / lambda) ln(4 /
+    k'). It is shortest for a perturbation along the other axis with the smaller coefficient. Return
+    None if the signs of the coefficients are impossible for a middle axis.
     """
     first, second, third = coefficients
     if first * second >= 0.0 or first * third >= 0.0:

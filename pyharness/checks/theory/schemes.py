@@ -1,8 +1,8 @@
 """The schemes of programs and fixed-step methods, implemented again for comparison.
 
-A scheme computes one step from `omega`, under constant torque (equations 16-18). The argument `on`
-of a scheme is `Numbers`, or `Series` for power series in the step size, which yield each term of
-the truncation error. Schemes share no code with the methods.
+A scheme computes one step from `omega`, under constant torque (equations 16-18). Its argument `on`
+is a `Numbers`, or a `Series` for power series in the step size, which yield each term of the
+truncation error. Schemes share no code with the methods.
 """
 
 import math
@@ -109,7 +109,8 @@ def collocation(program: str) -> Scheme:
 def collocation_singular(program: str) -> Scheme:
     """Return the scheme of a collocation program whose matrix is reported as singular.
 
-    LEQT1F then returns the right-hand sides of the system, which the program uses as c1, c2, ...
+    The linear solver LEQT1F then returns the right-hand sides of the system, which the program uses
+    as the coefficients c1, c2, ... of its trial functions.
     """
     parts = PARTS[program]
 
@@ -159,8 +160,8 @@ def improved_euler(on: Numbers, omega: Array) -> Array:
 def taylor_3(on: Numbers, omega: Array) -> Array:
     """Return omega after a step of the Taylor method with three terms (eq. 30).
 
-    As the right-hand side F is quadratic, its derivative in the direction F is half of F(omega + F)
-    - F(omega - F).
+    As the right-hand side F is quadratic, its derivative in the direction F is exactly half of
+    F(omega + F) - F(omega - F).
     """
     rate = on.rate(omega)
     along = 0.5 * (on.rate(omega + rate) - on.rate(omega - rate))

@@ -1,7 +1,7 @@
 """Predicted truncation and rounding errors of fixed steps at the end of a scene.
 
 The state-transition matrix propagates the errors of the steps to the end. Truncation errors are
-computed by `schemes`; the methods are not run.
+computed by `schemes`, without a run of the methods.
 """
 
 import math
@@ -63,7 +63,7 @@ class Forecast:
     # Bound of truncation and rounding together; infinite for too large steps.
     bound: float
     rounding: float  # bound of the rounding error
-    wandering: float  # expected rounding error, if steps are independent
+    wandering: float  # expected rounding error if those of the steps are independent
 
 
 def path(scene: Scene, time: float) -> Path:

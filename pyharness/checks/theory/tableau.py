@@ -36,10 +36,11 @@ def tableau(weighting: str, terms: int, points: str | tuple[float, ...] | None =
     """Return the tableau of one weighted residual method.
 
     `weighting` is "collocation", "subdomain", "galerkin" or "least-squares", `terms` is n; `points`
-    is for collocation, as in `grid`. The Gauss-Legendre quadrature with m points is exact to degree
-    2m - 1. For constant torques the products of two omegas have degree 2n, and the weight functions
-    n (Galerkin), n - 1 (least squares) or 0. Under torques that vary with time the error of the
-    quadrature is of order 2n + 1 or higher, above the method's order.
+    is for collocation, as in `grid`. The other weightings use Gauss-Legendre quadrature with m
+    points, exact up to degree 2m - 1. For constant torques the products of two omegas have degree
+    2n, and the weight functions n (Galerkin), n - 1 (least squares) or 0 (subdomain). Under torques
+    that vary with time the error of the quadrature is of order 2n + 1 or higher, above the method's
+    order.
     """
     n = terms
     if weighting == "collocation":

@@ -168,8 +168,9 @@ def _montgomery(name: Name) -> Check:
     """Return the check of the body's rotation in a period against Montgomery's formula.
 
     The angle about the angular momentum L is 2 E T/L minus a solid angle, with energy E and period
-    T. L encloses the solid angle in the body, about the axis along which its component keeps its
-    sign. Only this check detects a wrong rate of the angle, because the angle is not conserved.
+    T. In a period the direction of L encloses this solid angle in the body, about the axis along
+    which its component keeps its sign. Only this check detects a wrong rate of the angle, because
+    the angle is not conserved.
     """
     scene = scene_of(name)
     period = float(period_of(scene) or 0.0)

@@ -52,7 +52,8 @@ SCENES = {
 class Symmetry:
     """A rotation or rescaling of a problem, with its inverse for omega.
 
-    A time t becomes t/`faster`; the methods in `bitwise` must return the same bits.
+    `turn` transforms the scene, and `back` omega in the result. A time t becomes t/`faster`; the
+    methods in `bitwise` must return the same bits.
     """
 
     turn: Callable[[Scene], Scene]

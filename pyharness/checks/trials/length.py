@@ -70,9 +70,9 @@ class Integrator:
     """A method whose error growth is measured, with bounds on the errors of its steps.
 
     `run` returns omega, shape (n, 3), and the number of steps until each time; `noise` bounds the
-    errors of a step (s). `revolutions` is the length of the longest run from the first initial
-    condition, `others` of the runs from the other ones. `preference` tells whether rounding errors
-    are biased.
+    errors of a step of given size (s). In revolutions, `revolutions` is the length of the longest
+    run from the first initial condition, `others` of that from each other one. `preference` tells
+    whether rounding errors are biased.
     """
 
     run: Runner
@@ -157,9 +157,10 @@ def check_growth(integrator: Integrator, name: Name) -> Iterator[Check]:
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """The errors of one quantity of a motion by one method, by number of steps.
+    """The errors of a quantity of a motion, integrated by one method, after n numbers of `steps`.
 
-    `error` is the root mean square over `starts` initial conditions.
+    `what` is the quantity. `error` is the root mean square over `starts` initial conditions;
+    `limits` are the bounds on it by Brouwer's law.
     """
 
     motion: str

@@ -1,4 +1,7 @@
-"""Trial of the collocation matrices for steps from 1e-10 to 10 s, and of their singularity."""
+"""Trial of the collocation matrices for steps from 1e-10 to 10 s, and of their singularity.
+
+The linear solver LEQT1F reports a singular matrix by the error code IER = 129.
+"""
 
 import math
 from collections.abc import Iterator
@@ -74,7 +77,7 @@ def _threshold(name: Name) -> Check:
 
 
 def _counted(listing: Listing, name: Name) -> Check:
-    """Return the check of the number of steps with IER = 129, a singular matrix.
+    """Return the check of the number of steps with IER = 129.
 
     With `dt-accumulates` the matrix is singular in the first steps only.
     """

@@ -51,7 +51,7 @@ def _attempts() -> Iterator[Attempt]:
 
 
 def _of_case(case: int, listing: Listing | None, place: Name) -> Iterator[Attempt]:
-    """Yield deferred checks of a method's errors, their crossing, and its divergence in a case."""
+    """Yield deferred checks of a method's errors, crossing and divergence in a case."""
     before = listing is not None and listing.label == "original"
     method, place = place.subject, replace(place, scene=case_scene(case))
     scenes = {n: replace(case_scene(case), step_size=TIME / n, steps=n) for n in COUNTS}
@@ -105,7 +105,7 @@ def _crossing(method: str, case: int, error: Callable[[int], float], name: Name)
 
 
 def _error(scene: Scene, name: str, case: int, listing: Listing | None) -> tuple[float, str]:
-    """Return omega's relative error at the end, not finite for an incomplete run, and a note."""
+    """Return omega's relative error at the end, not finite if the run is incomplete, and a note."""
     largest = _path(case).flow.largest
 
     def error(omega: Array) -> float:

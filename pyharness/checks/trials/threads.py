@@ -72,7 +72,7 @@ def _run(only: Sequence[str]) -> Iterator[Check]:
 
 
 def different(jobs: Sequence[Job], repeats: int = _REPEATS) -> list[Job]:
-    """Return each job, for each call in threads whose bits differ from those of a call alone."""
+    """Return the jobs whose bits differ in threads, once for each call that differs."""
     alone = [bits(job) for job in jobs]
     order = [index for index in range(len(jobs)) for _ in range(repeats)]
     random.Random("threads").shuffle(order)

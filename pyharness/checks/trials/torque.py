@@ -62,7 +62,8 @@ def axial(scene: Scene, time: float) -> Truth:
     """Return the true omega at `time` (s) of a symmetric body with a torque along its axis.
 
     The phase of a wave has a random rounding error in each of n evaluations, at least one in a
-    period. `conditioning` adds all n errors; for random errors 4 sqrt(n) suffice (Hoeffding 1963).
+    period. `conditioning` adds all n errors; as they are random, 4 sqrt(n) suffice (Hoeffding
+    1963).
     """
     flow = conditioning(scene, time)
     waves = scene.law.sines + scene.law.cosines

@@ -30,9 +30,9 @@ OPTIONS = {
     "--draws N": "Measure N random scenes, 1 to 10000, with all kinds of torque and body, "
     "instead of the cases.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
-    "body against the number of bodies, and memory.",
-    "--terms": "Measure torques that depend on omega (angular velocity), time and attitude, both "
-    "ready ones (pyharness.torques) and Python functions, for one body and for many.",
+    "body as a function of the number of bodies, and memory.",
+    "--terms": "Measure run times under torques that depend on omega (angular velocity), time and "
+    "attitude, ready-made ones (pyharness.torques) and Python functions, for one body and many.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "
@@ -43,7 +43,7 @@ OPTIONS = {
     "--peers X,Y": "Measure only these third-party solvers, by their names in the first column "
     "of the result or by package (heyoka, numba, scipy); none: measure none of them (default: all "
     "installed ones).",
-    "--compiled": "With --terms, have the C compiler translate Python functions first, as "
+    "--compiled": "With --terms, compile Python functions with the C compiler first, as "
     "prepare(..., compiled=True) does.",
     "--plan": "Measure instead run times with and without each computation that `pyharness plan` "
     "can omit.",
@@ -245,7 +245,7 @@ def _choose_bodies(options: argparse.Namespace, default: int) -> int:
 
 
 def named(contenders: Sequence[_Named], text: str | None, what: str) -> list[_Named]:
-    """Return the solvers that an option, such as --method for "method", lists by name or package.
+    """Return the solvers whose names or packages are in `text`, the value of option `what`.
 
     None selects all, "none" no solver.
     """

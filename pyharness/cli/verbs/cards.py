@@ -1,4 +1,4 @@
-"""The verb `cards`: show the programs card by card, with the scan and our versions."""
+"""The verb `cards`: show each card, its scanned text, our Fortran and Python, and notes."""
 
 import argparse
 from hashlib import sha256
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     """Print cards, or the comparison that an option requests.
 
     Return 1 if --scan or --collate finds a difference that the apparatus (the notes) does not
-    explain, or --origins finds a mistake in its own table.
+    explain, or --origins a mistake in the table of disagreements.
     """
     given = [options.format == "tei", options.classes, options.collate, options.origins]
     given += [options.second_reading, options.scan is not None]

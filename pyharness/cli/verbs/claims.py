@@ -18,16 +18,17 @@ from pyharness.thesis.programs import BINARY64, WORD_NAMES
 OPTIONS = {
     "--explain ID": "Explain the verdict on one claim (statement of the thesis), with the "
     "numbers behind it; ID is its name in the output of `pyharness claims`.",
-    "--assignments": "For each case whose initial angular velocity the thesis omits, show with "
+    "--assignments": "For each case whose initial angular velocity the thesis omits, show for "
     "which assumed values the claims about this case hold.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
+    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
+    "computers.",
     "--evidence": "Count the claims that hold for each combination of initial angular velocity, "
     "readings of doubtful statements, assumptions about missing ones, and number of steps.",
     "--atlas STORE": "Report from which initial angular velocities the claims hold, according to "
     "the results of `pyharness sweep` in this folder; needs --sweep.",
-    "--sweep FILE.toml": "The sweep file from which the folder of --atlas was made.",
-    **shared.outputs(plot="the counts of --evidence, or of the map of --atlas,"),
+    "--sweep FILE.toml": "The sweep file from which `pyharness sweep` made the folder of --atlas.",
+    **shared.outputs(plot="the counts of --evidence, or the map of --atlas,"),
 }
 GROUPS = {"instead of all verdicts": "explain assignments evidence atlas sweep"}
 EXAMPLE = "claims --explain abstract-superior"
@@ -36,7 +37,7 @@ EXAMPLE = "claims --explain abstract-superior"
 def run(options: argparse.Namespace) -> int:
     """Print verdicts on the claims of the thesis, or the effect of values that the thesis omits.
 
-    --assignments, --evidence and --atlas test for which of these values, such as the initial omega,
+    --assignments, --evidence and --atlas show for which of these values, such as the initial omega,
     the claims hold.
     """
     if options.assignments:

@@ -23,14 +23,15 @@ OPTIONS = {
     "--method M,...": "Compare these methods (names: docs/reference/methods.md) instead of the "
     "programs; the torque may then depend on omega or attitude.",
     "--word W": f"Floating-point arithmetic of the programs: {', '.join(WORD_NAMES)} (default "
-    f"{WORD_NAMES[0]}). cdc48 is that of CDC computers, which truncates; cdc48-rounded rounds.",
+    f"{WORD_NAMES[0]}). cdc48 is the truncating, cdc48-rounded the rounding arithmetic of CDC "
+    "computers.",
     "--tolerance E": "Largest allowed error of the methods (without --method, of SciPy's "
     "solve_ivp), relative to the largest component of omega, at most 1 (default: the method's "
     "own).",
     "--attitude": "Compare the attitude (orientation) of the body too; its error is an angle in "
     "rad.",
     "--ablate": "Run each program with every subset of its defects, and list the subsets, largest "
-    "error first. Errors are taken up to the last step that all runs reached.",
+    "error first. Errors are compared up to the last step that all runs reached.",
     "--numerics": "Also show drifts of energy and momentum, differences between Fortran and Python "
     "in units in the last place, the error amplification, the errors of SciPy's solve_ivp, and "
     "run times (JSON and CSV always have them).",
@@ -47,10 +48,9 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare original and corrected programs with the reference solution of a scene.
 
-    Return 1 if the results of Fortran and Python differ, or if a corrected program does not
-    converge with its order. With --strict, also return 1 if amplified rounding errors may exceed
-    the tolerance; with --method, if an error exceeds the limit derived from the tolerance. --ablate
-    runs every subset of defects.
+    Return 1 if the results of Fortran and Python differ, if a corrected program does not converge
+    with its order or, with --method, if an error exceeds the limit derived from the tolerance. With
+    --strict, also return 1 if amplified rounding errors may exceed the tolerance.
     """
     if options.method is not None:
         return _methods(options)

@@ -14,10 +14,10 @@ FORMATS = ("table", "json")
 OPTIONS = {
     "--program P": f"Write the deck of this program: {', '.join(PROGRAMS)} (required).",
     "--case N": "Put the data of this case of Table 1 of the thesis, 1 to 7, on the cards "
-    "(default, as published: Case 5 for runge-kutta, Case 2 for the others).",
+    "(default: the published data, Case 5 for runge-kutta and Case 2 for the others).",
     **{each: shared.LISTING[each] for each in list(shared.LISTING)[:5]},
     "--dialect D": f"Form of the deck: {', '.join(DIALECTS)} (default {DIALECTS[0]}, as printed). "
-    "gfortran has changes for that compiler; ftn is a batch job for the CDC's compiler FTN.",
+    "gfortran has changes for this compiler; ftn is a batch job for the CDC's compiler FTN.",
     "--system S": "Operating system of the CDC computer that runs the job of --dialect ftn: "
     f"{' or '.join(SYSTEMS)} (default nos).",
     "--round": "Let FTN round results instead of truncating them; needs --dialect ftn.",

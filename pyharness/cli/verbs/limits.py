@@ -1,4 +1,4 @@
-"""The verb `limits`: show what the original programs tend to as the step size goes to zero."""
+"""The verb `limits`: show what the original programs converge to as the step goes to zero."""
 
 import argparse
 

@@ -13,9 +13,9 @@ OPTIONS = {
     "chooses closed-form, quick or taylor).",
     "--tolerance E": "Largest allowed error of omega, relative to its largest component, at most "
     "1 (default: the method's own, 1e-9 for auto).",
-    "--velocity": "Include the computation of the translational velocity.",
-    "--times T1,T2,...": "Times of the results, s (default: only the end). Several times "
-    "require intermediate output.",
+    "--velocity": "Plan the computation of the translational velocity too.",
+    "--times T1,T2,...": "Times of the results, s (default: the end of the scene's last "
+    "step). Several times require intermediate output.",
     **shared.outputs(plot=""),
 }
 USAGE = shared.ONE_SCENE

@@ -22,11 +22,11 @@ OPTIONS = {
     "--velocity": "Enclose the translational velocity too; needs python-flint.",
     "--transition": "Enclose the derivatives of the solution with respect to the initial omega "
     "too; needs python-flint.",
-    "--certificate FILE": "Write the steps of the proof to this file (.json), a certificate that "
-    "--check verifies; for torques that depend on time alone.",
+    "--certificate FILE": "Write the steps of the proof to this file (.json) as a certificate that "
+    "--check can verify; only for torques that depend on time alone.",
     "--check FILE,...": "Verify the certificates in these files instead of proving anything; "
     "needs no scene and no third-party library.",
-    **shared.EFFORT,
+    **shared.EFFORT_WITHOUT_PROGRAMS,
     **shared.outputs(plot=""),
 }
 USAGE = "(--case N | --scene FILE | --check FILE,...)"

@@ -17,8 +17,8 @@ FORMATS = ("table", "json")
 _ACTIONS = ("new", "check", "schema")
 _NEW = Path(__file__).with_name("brick.toml")
 OPTIONS = {
-    "action ACTION": "One of new (write a sample scene file), check (check FILE) and schema "
-    "(print the JSON Schema of scene files, for an editor).",
+    "action ACTION": "One of new (write a sample scene file), check (check FILE) and schema (print "
+    "the JSON Schema of scene files, with which an editor can check them).",
     "file FILE": "The scene file to check.",
     "--case N": "With new, write this case of Table 1 of the thesis, 1 to 7 (default: a brick, "
     "with every section of a scene file).",

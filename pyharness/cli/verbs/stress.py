@@ -13,7 +13,7 @@ FORMATS = ("table", "json", "junit")
 _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
-    "begin with this text, as in shapes/auto. The output describes each trial.",
+    "begin with this text, as in shapes/auto. The output says what each trial tests.",
     "--scene FILE": f"In the trials {', '.join(SCENE_TRIALS)}, test the scene in this TOML file "
     "instead of ours. Its torque may depend on omega or attitude.",
     "--save DIR": "Save the scene with the worst result of each method in each trial as a TOML "

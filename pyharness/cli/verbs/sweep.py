@@ -23,9 +23,9 @@ OPTIONS = {
     "file FILE.toml": "Sweep file (TOML): a scene, the axes of a parameter grid, a solver, and "
     "the quantities to store for each scene (format: docs/how-to/sweeps.md).",
     "--out STORE": "Store the results in this folder, in the Zarr format (required); if an "
-    "earlier run of the sweep was interrupted, only what is missing is computed.",
-    "--repair": "Recompute damaged blocks (chunks) of the grid in the store, and rewrite damaged "
-    "metadata.",
+    "earlier run was interrupted, only the missing results are computed.",
+    "--repair": "Recompute damaged chunks (parts of the grid that are stored together), and "
+    "rewrite damaged metadata.",
     "--executor E": "Where to compute: here (in this process, the default), processes (in "
     "several processes of this machine) or dask (in a Dask cluster).",
     "--workers N": "Number of worker processes of --executor processes or dask, 1 to "
@@ -41,7 +41,7 @@ EXAMPLE = "sweep docs/tumbling.toml --out store"
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute the chunks (blocks of the grid) that the store lacks, and report on the store."""
+    """Compute the chunks (parts of the grid) that the store lacks, and report on the store."""
     if options.file is None:
         raise InputError("sweep: give a sweep file, as in 'sweep FILE.toml --out STORE'")
     if options.out is None:

@@ -23,7 +23,7 @@ _ABOUT = {
     "schemes": "single steps of the programs",
     "stops": "the stop test of the Runge-Kutta program",
     "methods": "errors of omega",
-    "prepared": "solvers of `prepare`",
+    "prepared": "solvers for many calls, made by `prepare`",
     "attitudes": "errors of the attitude",
     "orders": "orders of convergence",
     "random": "random scenes",
@@ -36,12 +36,12 @@ OPTIONS = {
     f"{', '.join(f'{kind} ({_ABOUT[kind]})' for kind in KINDS)}.",
     "--seed S": "Text that seeds the random scenes, so that a run can be repeated (default: the "
     "present year and week, as in 2026-W47).",
-    "--draws N": f"Number of random scenes (default: {DRAWS}; 0 with --port; 2 of each kind with "
-    "--integrator).",
-    "--external FILE": "Only compare our methods with the published results in this file "
+    "--draws N": f"Number of random scenes (default: {DRAWS}; 0 with --port; 2 for each kind "
+    "of torque with --integrator).",
+    "--external FILE": "Compare only our methods with the published results in this file "
     "(format: docs/how-to/external.md).",
-    "--listing-output FILE": "Find the floating-point arithmetic that reproduces the page in "
-    "this file, which one of the programs printed on some machine.",
+    "--listing-output FILE": "Find the floating-point arithmetic with which one of the programs "
+    "prints the page in this file, the output of an unknown machine.",
     "--port COMMAND": "Start a version of the programs in another language by this command, and "
     "compare it bit for bit with ours in Python (docs/how-to/ports.md).",
     "--integrator COMMAND": "Start an integrator of rigid bodies by this command, compare it "

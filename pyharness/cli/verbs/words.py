@@ -22,9 +22,9 @@ OPTIONS = {
     "whether CDC arithmetic changes the result.",
     "--all": f"Show each run in every precision from {LENGTHS[0]} to {LENGTHS[-1]} bits (about "
     "twelve minutes).",
-    "--vectors FILE": "Run no program, but check our emulation of the CDC's arithmetic against the "
+    "--vectors FILE": "Run no program; check our emulation of the CDC's arithmetic against the "
     "operations and results in this JSON file.",
-    **shared.outputs(FORMATS, plot="the error against the precision, for one --case,"),
+    **shared.outputs(FORMATS, plot="the error as a function of the precision, for one --case,"),
 }
 EXAMPLE = "words --case 2 --program runge-kutta"
 

@@ -1,4 +1,4 @@
-"""The atlas of claims: which claims of the thesis hold from which initial omega (start).
+"""The atlas of claims: which claims of the thesis hold for which initial omega (start).
 
 The starts cover the sphere of directions at several magnitudes of omega. A claim scores 1 point if
 it is reproduced, 1/2 if it is reproduced in part. The codes of verdicts are those of `over_starts`.
@@ -58,7 +58,7 @@ class Atlas:
     longitudes: Array
 
     def score(self, reading: int = 0, steps: int = 0) -> Array:
-        """Return the sum of points of each initial omega; `reading` and `steps` are indices."""
+        """Return each initial omega's sum of points over the claims; the arguments are indices."""
         return sum_of_points([codes[reading, steps] for codes in self.codes.values()])
 
     def none_fails(self, reading: int = 0, steps: int = 0) -> NDArray[np.bool_]:
@@ -252,7 +252,10 @@ def _percentage_turned(atlas: Atlas) -> Table:
 
 
 def atlas_picture(atlas: Atlas) -> Picture:
-    """Return a picture: sums of points over the sphere of directions, and means for each claim."""
+    """Return maps of the total score over directions of omega(0), beside mean scores.
+
+    The means are those of each claim at each magnitude of omega(0).
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.2), dpi=100, layout="constrained")

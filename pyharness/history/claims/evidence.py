@@ -107,7 +107,7 @@ def discriminating(found: list[Combination]) -> list[str]:
 
 
 def undecided(found: list[Combination]) -> dict[str, list[str]]:
-    """Return the values of each choice among the combinations with the highest score."""
+    """Return the values of each choice that occur in combinations with the highest score."""
     best = max(each.score for each in found)
     choices = [each.choices() for each in found if each.score == best]
     return {axis: sorted({each[axis] for each in choices}) for axis in choices[0]}

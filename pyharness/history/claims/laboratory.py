@@ -41,9 +41,9 @@ class Assumptions:
 class Laboratory:
     """The three programs, original or corrected, run on the cases under assumptions.
 
-    `parts` divides the step size of a run; `runs` and `error` have results only at the undivided
-    steps. `may_stop` switches the stop test of the Runge-Kutta program. `fixed` has the defects
-    that are corrected in the original programs. Errors are against the reference solution.
+    The step size of a run is divided by `parts`; `runs` and `error` have results only at the
+    undivided steps. `may_stop` switches the stop test of the Runge-Kutta program. `fixed` has the
+    defects that are corrected in the original programs. Errors are against the reference solution.
 
     The collocation model has n points at the times k DT/(n+1) in the step, k = 1 ... n. In the
     original programs DT grows by the step size in every step, so that the points move out of the
@@ -192,10 +192,10 @@ def by_literals(
 ) -> Array:
     """Return omega of an original collocation program with changed step literals.
 
-    The step size is divided by `parts` at the places `changed`, elements of `LITERALS`. A model
-    that is equivalent except for rounding integrates all scenes at once under constant torque. The
-    result (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after
-    an overflow.
+    The step size is divided by `parts` in the literals `changed`, elements of `LITERALS`. Under
+    constant torque a model, equal except for rounding, integrates all scenes at once. The result
+    (rad/s) is at the steps of the unchanged program, shape (scenes, steps, 3), and NaN after an
+    overflow.
     """
     h, steps = scenes[0].step_size, scenes[0].steps
     dt, end, growth = (h / parts if name in changed else h for name in LITERALS)

@@ -44,8 +44,8 @@ class Judgement:
 class Assignment:
     """An initial omega (rad/s) for a case in which the thesis gives none, with verdicts by claim.
 
-    It `holds` if the original programs reproduce, at least in part, all claims about this case.
-    Claims that fail with every start do not count.
+    It `holds` if the original programs reproduce, at least in part, all claims about this case,
+    except those that fail with every start.
     """
 
     case: int
@@ -90,7 +90,7 @@ def judgement(identity: str, word: str = BINARY64) -> Judgement:
 
 
 def judgements() -> list[Judgement]:
-    """Return our judgements of all claims."""
+    """Return all judgements."""
     return [judgement(entry["id"]) for entry in claims()]
 
 
@@ -265,7 +265,7 @@ def _record(judgements: Sequence[Judgement]) -> dict[str, Any]:
 
 
 def _supplied(judgements: Sequence[Judgement]) -> list[dict[str, Any]]:
-    """Return for JSON the assumptions on which the claims may depend; all depend on the units."""
+    """Return for JSON the assumptions on which the claims may depend; units affect all claims."""
     told = [each.claim for each in judgements]
     named = {name.rpartition(" ")[2] for each in told for name in each["assumptions"]}
     others = {name.partition(":")[0] for each in told for name in each.get("otherwise", {})}

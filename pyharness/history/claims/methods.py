@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about programs and methods over several cases.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
-decision. For the original programs, tests of weightings other than collocation return "not
-testable", because the thesis lists no such program.
+decision; `lab` runs the programs, original or corrected. For the original programs, tests of
+weightings other than collocation return "not testable", because the thesis prints no such program.
 """
 
 import math
@@ -30,8 +30,8 @@ _OTHERS = WEIGHTINGS[1:]
 def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Judged:
     """Judge the claim that collocation is superior to Runge-Kutta.
 
-    Errors are compared over the steps that all programs ran. The cases in `shown` add numbers, but
-    do not affect the verdict.
+    Errors are compared over the steps that all programs ran. The verdict depends on `cases` alone;
+    those in `shown` only add numbers.
     """
     numbers, wins = {}, 0
     for case in (*cases, *shown):
@@ -49,9 +49,9 @@ def superior(lab: Laboratory, cases: Sequence[int], shown: Sequence[int]) -> Jud
 def equation_19(lab: Laboratory, cases: Sequence[int]) -> Judged:
     """Judge the claim that eq. 19 of the thesis, the Lipschitz condition, ends unbounded runs.
 
-    The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the differential
-    equations. A quotient is the change of a derivative between two stages, divided by the change of
-    its variable. A Lipschitz quotient is at most the largest norm of the Jacobian, here along the
+    A quotient is the change of a derivative between two stages, divided by the change of its
+    variable. The stop test applies eq. 19 only if its quotients are Lipschitz quotients of the
+    differential equations, which are at most the largest norm of the Jacobian, here along the
     reference solution and the run.
     """
     numbers: dict[str, float] = {}
@@ -126,7 +126,7 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The cards repeat the step size as a literal. For the original programs, the numbers also count
+    The step size is a literal on several cards. For the original programs, the numbers also count
     the cases that improve when only some of these literals are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
@@ -137,7 +137,7 @@ def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
 
 
 def _by_literals(lab: Laboratory, cases: Sequence[int]) -> dict[str, float]:
-    """Return how many cases' errors at least halve if some `LITERALS` are divided by ten."""
+    """Return how many cases have at most half the error if some `LITERALS` are divided by ten."""
     scenes = tuple(lab.scene(case) for case in cases)
     numbers = {}
     for program, terms in zip(COLLOCATION, (2, 4), strict=True):
@@ -178,8 +178,8 @@ def execution_time(
 ) -> Judged:
     """Judge the claim that collocation takes about twice the time of Runge-Kutta.
 
-    The operations of a step, on the cards and in our LEQT1F, are weighted by `unit_times`. They are
-    counted in two ways: as written, and with repeated terms counted once.
+    The operations of a step, on the cards and in our linear solver LEQT1F, are weighted by
+    `unit_times`, and counted in two ways: as written, and with repeated terms counted once.
     """
     listings = {program: lab.listing(program) for program in PROGRAMS}
     counts = {name: operations_per_step(each) for name, each in listings.items()}
@@ -254,9 +254,9 @@ def computer_error(
 ) -> Judged:
     """Judge the claim that rounding error makes the weightings other than collocation fail.
 
-    Rounding error (rad/s) is measured in two ways: as the error in Case 1, with decreasing steps,
+    Rounding error (rad/s) is measured in two ways: as the error in Case 1 with decreasing steps,
     because every method solves this case exactly except for rounding; and as the difference between
-    runs in binary64 and in `words`, by the methods of section IV.2.
+    runs of the methods of section IV.2 in binary64 and in the arithmetics `words`.
     """
     if lab.is_original:
         return Judged(NOT_TESTABLE, {})

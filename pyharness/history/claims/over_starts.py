@@ -36,7 +36,7 @@ _EFFORT = 1e9  # so large that there is no limit; a sweep reports its expected t
 class Starts:
     """Runs for `rules` from n initial omegas, used in the cases whose omega(0) the thesis omits.
 
-    The reference is integrated by Taylor series with a relative tolerance of 1e-12. Arrays have the
+    The reference solution is a Taylor series with the relative tolerance 1e-12. Arrays have the
     shape (n, steps, 3), or (steps, 3) if the thesis gives omega(0).
     """
 
@@ -98,7 +98,7 @@ JUDGED = tuple(entry["id"] for entry in claims() if entry["test"] in vars(rules)
 def codes(identity: str, batch: Batch) -> NDArray[np.int8]:
     """Return the codes of the verdict on a claim for the scenes of a batch, shape (n,).
 
-    All codes are SILENT (not applicable) if the claims do not apply to the sweep.
+    All codes are SILENT if the claims do not apply to the sweep.
     """
     entry = claim(identity)
     chosen = Assumptions(readings=frozenset(batch.listing.readings if batch.listing else ()))

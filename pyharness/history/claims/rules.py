@@ -203,7 +203,7 @@ def _farthest(first: Array, second: Array) -> Array:
 
 
 def _by_component(omega: Array) -> Array:
-    """Return omega as a contiguous array (3, ..., steps), whose maxima are ten times as fast."""
+    """Return omega as a contiguous array (3, ..., steps), which makes maxima ten times as fast."""
     return np.ascontiguousarray(np.moveaxis(omega, -1, 0))
 
 

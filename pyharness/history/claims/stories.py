@@ -63,9 +63,9 @@ def power_of_ten(exponent: int) -> str:
 class Sentence(NamedTuple):
     """A sentence of the thesis with its claims.
 
-    `text` is the whole sentence, with formulas in LaTeX, and `quote` a few words of it. `why` gives
-    the reason if a sentence has no claims. `laboratory` names the run that shows the sentence best,
-    as in ``case=2&program=two-term``. `command` is a command that shows more than `claims
+    `text` is the whole sentence, with formulas in LaTeX, `quote` a few words of it, and `where` its
+    place. `why` says why a sentence has no claims. `laboratory` names the run that shows the
+    sentence best, as in ``case=2&program=two-term``. `command` is one that shows more than `claims
     --explain`.
     """
 

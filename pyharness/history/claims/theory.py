@@ -1,8 +1,8 @@
 """Tests of the thesis's claims about history, theory and orders, mostly in sections I to IV.
 
 Each function is the `test` of one or more claims in `data/claims.toml`, whose `rule` describes the
-decision. An error is the largest deviation of any omega component from the reference solution.
-`limit` is its allowed ratio to the largest omega.
+decision; `lab` runs the programs. An error is the largest deviation of any omega component from the
+reference solution. `limit` is its allowed ratio to the largest omega.
 """
 
 import math
@@ -208,8 +208,8 @@ def crandall_example(lab: Laboratory, best: list[str], rate: float) -> Judged:
 def _weighted(t: Array, weight: Array, factors: Weights, rate: float, by: Weights) -> Array:
     """Return the linear equations for c1 and c2 of Crandall's example, a row for each weight.
 
-    A row has the weighted integrals over (0, 1) of the two `factors` in the residual, and of
-    `rate`, each by quadrature on both halves of the interval.
+    A row has the weighted integrals over (0, 1) of the `factors` of c1 and c2 in the residual, and
+    of `rate`, each by quadrature on both halves of the interval.
     """
     halves = [(t / 2.0, weight / 2.0), ((t + 1.0) / 2.0, weight / 2.0)]
     rows = []

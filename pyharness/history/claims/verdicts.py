@@ -2,12 +2,13 @@
 
 Each function is the `test` of one or more claims in `data/claims.toml`; further tests are in
 `methods`, `theory` and `rules`. The claim's `rule` describes the decision, and its `parameters` are
-the keyword arguments. `lab` runs the programs under the chosen assumptions; `case` is a number of
-Table 1.
+the keyword arguments. `lab` runs the programs, original or corrected, with a value for each choice
+that the thesis leaves open; `case` is a number of Table 1.
 
 An error is the largest deviation of any omega component from the reference solution, over the steps
 that the program ran. The amplitude is half the largest range (largest minus smallest value) of a
-component of the reference omega. A claim that fails is "not reproduced" or, in some tests, "false".
+component of the reference omega. A claim that fails is "not reproduced"; a test that passes
+`otherwise` calls it "false".
 """
 
 from dataclasses import dataclass, replace
@@ -130,7 +131,7 @@ def error_constant(lab: Laboratory, case: int) -> Judged:
 def stopped_at(lab: Laboratory, case: int, step: int) -> Judged:
     """Judge the claim that the stop test ended the Runge-Kutta run at step `step`.
 
-    The numbers describe all subsets of defects with which the run stops at that step.
+    The numbers describe the subsets of defects with which the run stops at that step.
     """
     stop = lab.run("runge-kutta", case).stop
     name, readings = "runge-kutta", lab.listing("runge-kutta").readings
@@ -185,7 +186,8 @@ def more_reliable(lab: Laboratory, case: int) -> Judged:
 def too_fast(lab: Laboratory, case: int, same: float, worse: float) -> Judged:
     """Judge the claim that the two-term error is due to a motion too fast for two terms.
 
-    The corrected programs run from all initial omegas in `starts`, because the thesis omits some.
+    The corrected programs run from all initial omegas in `starts`, because the thesis omits that of
+    some cases.
     """
     numbers = {}
     for start in starts():

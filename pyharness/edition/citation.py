@@ -61,7 +61,7 @@ def check_publishable() -> None:
 def bibtex(place: str = "", path: str = "") -> str:
     """Return BibTeX entries of the thesis and of the edition, or of a `place` in the edition.
 
-    `path` is the path of the place in the pages; it follows their address, or stands alone if they
+    `path` is the path of the place in the pages; it follows their address, or is alone if they
     have none.
     """
     described = codemeta()

@@ -1,6 +1,6 @@
 """Switches of a recorded torque, such as floor, in decimal arithmetic; steps end at their jumps.
 
-`pyharness.model.tape` defines switches, tapes and slots.
+`pyharness.model.tape` explains tapes and slots.
 """
 
 from decimal import Decimal, getcontext

@@ -47,7 +47,7 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound for omega, rounded up to two digits, with unit and basis."""
+        """Return the bound for omega, rounded up to two significant digits, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":

@@ -1,7 +1,7 @@
 """`python -m tests.attitude_series 3000 [SEED]`: check that the joint series meets its tolerance.
 
-The series integrates omega and attitude of random scenes of `verify`, plain and nasty, with torque
-or not, each to a tolerance from `TOLERANCES`. The truth is the same series at 1e-14, which
+The series integrates omega and attitude of random scenes of `verify`, with torque or not, each
+to a tolerance from `TOLERANCES`. The truth is the same series at 1e-14, which
 `tests/engine/test_attitude.py` compares with SciPy's solution of all seven unknowns.
 """
 

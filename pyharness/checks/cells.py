@@ -1,12 +1,12 @@
-"""Checks that the Fortran programs and their Python twins agree bit for bit.
+"""Checks that the Fortran port of each program and its twin agree bit for bit.
 
-A twin is the Python version of a program. A cell is a combination of a program, a case of Table 1
-of the thesis, defects and readings. Our arithmetic of machine words reproduces the mantissa length
-and the rounding of a machine, such as the 48 bits of the CDC.
+The twin is the Python version. A cell is a combination of a program, a case of Table 1 of the
+thesis, defects and readings. The cells are also checked in our arithmetic of machine words, which
+has the mantissa length and the rounding of a machine, such as the 48 bits of the CDC.
 
-A deck, compiled from the author's cards, shares no code with Fortran port and twin. Its TAPE5, the
-file of all steps, is compared with the port bit for bit, its printed page as text. After an
-overflow the port ends its run; the deck continues, but must not produce finite omega.
+A deck, compiled from the author's cards, shares no code with port and twin. Its TAPE5, the file of
+all steps, is compared with the port bit for bit, its printed page as text. After an overflow the
+port ends its run; the deck continues, but must not produce finite omega.
 """
 
 from collections.abc import Iterator, Sequence
@@ -73,9 +73,9 @@ def _of_draw(seed: str, number: int, name: Name) -> Check:
 def _agreement(
     listing: Listing, scene: Scene, is_listed: bool, options: Sequence[Any], name: Name
 ) -> Check:
-    """Return the check that Fortran and Python agree or, if `is_listed`, that they still differ.
+    """Return the check that Fortran and Python agree or, if `is_listed` as different, still differ.
 
-    `is_listed` marks a known difference. `options` are the constant of the stop test (1/s), and
+    `options` are the constant of the stop test (1/s), and
     whether the test may end the run.
     """
     run = PROGRAM_REGISTRY[listing.program].run

@@ -38,9 +38,9 @@ class Name:
     """The name of a check, whose id joins the parts by slashes, as in ``cells/two-term``.
 
     `suite` is a kind of checks of `verify`, or a trial of `stress`. `subject` is a program or
-    method, `circumstance` the name of the problem in `scene`, `setting` a tolerance, step size or
-    listing, and `quantity` the compared number. `command` (``verify`` or ``stress``), the id and
-    `options` form the command that repeats the check.
+    method, `circumstance` names the problem (`scene` holds it, if it is one), `setting` is a
+    tolerance, step size or listing, and `quantity` the compared number. `command` (``verify`` or
+    ``stress``), the id and `options` form the command that repeats the check.
     """
 
     suite: str
@@ -250,7 +250,7 @@ def may_hold(id: str, only: Sequence[str]) -> bool:
 class Selection:
     """The checks that one run of `verify` makes."""
 
-    only: Sequence[str] = ()  # leading parts of ids, as in ``cells/two-term``; empty: all
+    only: Sequence[str] = ()  # beginnings of ids, as in ``cells/two-term``; empty: all
     seed: str = field(default_factory=weekly_seed)  # seed of the random draws
     draws: int = DRAWS
     record: Path = RECORD  # folder of the golden record

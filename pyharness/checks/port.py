@@ -90,7 +90,7 @@ def random_cells(
 ) -> list[Cell]:
     """Return runs in random scenes, named as in ``random/7/two-term`` and ordered by number.
 
-    `cells` has the leading parts of the names of the runs to return, or is empty for all `draws`
+    `cells` has the beginnings of the names of the runs to return, or is empty for all `draws`
     scenes. A number in `cells` may exceed `draws`.
     """
     named = {int(match[1]) for each in cells if (match := _DRAWN.match(each))}

@@ -27,7 +27,7 @@ named = partial(Name, command="stress")
 class Trial:
     """A group of checks of `stress` under one kind of extreme conditions.
 
-    `bound` is a text on the limits; the argument of `attempts` has leading parts of requested ids.
+    `bound` is a text on the limits; `attempts` takes the beginnings of the requested ids.
     """
 
     name: str

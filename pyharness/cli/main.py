@@ -21,7 +21,7 @@ _GROUPS = {
     },
     "the thesis": {
         "claims": "judge the statements of the thesis by its programs, with evidence",
-        "figures": "redraw Figures 6 to 12 of the thesis, original and corrected",
+        "figures": "redraw Figures 6 to 12 of the thesis by original and corrected programs",
         "cards": "show printed cards, the scanned text, our Fortran and Python, notes",
         "defects": "list defects and doubtful cards of the programs, and their effects",
         "deck": "write a program of the thesis as a deck of FORTRAN cards",

@@ -45,8 +45,8 @@ LISTING = {
     "--fix NAME,...": "Correct these defects of the original program and keep all others (names: "
     "`pyharness defects`).",
     "--keep NAME,...": "Keep these defects of the original program and correct all others.",
-    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the other "
-    "possible way, instead of ours (names: `pyharness defects --kind reading`).",
+    "--reading NAME,...": "Interpret these doubtful cards (lines of a program) in the way "
+    "that we did not adopt (names: `pyharness defects --kind reading`).",
     "--conjecture NAME,...": "Make these assumptions about statements missing from the original "
     "program (names: `pyharness defects --kind conjecture`; none: no assumption; default: "
     "torque-held, by which a varying torque is evaluated once in each step).",
@@ -63,8 +63,9 @@ _EFFORT = (
 EFFORT = {"--effort F": _EFFORT.format(", or about 30 seconds for a program of the thesis")}
 EFFORT_WITHOUT_PROGRAMS = {"--effort F": _EFFORT.format("")}
 STRICT = {
-    "--strict": "Exit with status 1 not only if the output reports an unexpected result, but also "
-    "if amplified rounding errors may exceed the tolerance."
+    "--strict": "Exit with status 1 also if amplified rounding errors may exceed the tolerance, "
+    "not only if Fortran and Python differ, a corrected program misses its order of convergence, "
+    "or a method misses its tolerance or ends early."
 }
 ALSO = {
     "--also FILE,...": "Write the result to these files too; the ending of a name sets the "
@@ -145,7 +146,7 @@ def check_known(what: str, name: str | None, allowed: Sequence[str]) -> None:
 
 
 def chosen_names(text: str | None, what: str, allowed: Sequence[str]) -> list[str]:
-    """Return the names in --only, leading parts of ids, as in ``cells/two-term``.
+    """Return the names in --only, beginnings of ids, as in ``cells/two-term``.
 
     Raise InputError if the part before the first slash is not in `allowed`.
     """
@@ -329,7 +330,7 @@ def warn(message: str) -> None:
 
 
 def also_files(options: argparse.Namespace) -> dict[str, str]:
-    """Return the format of each file in --also; raise InputError for an unknown ending."""
+    """Return each --also file's format; raise InputError for unknown endings or a repeated file."""
     found: dict[str, str] = {}
     for path in names(getattr(options, "also", None)):
         suffix = path[path.rfind(".") :] if "." in path else ""

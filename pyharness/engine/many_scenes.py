@@ -214,7 +214,7 @@ def checked_copies(arrays: dict[str, Any]) -> dict[str, Array]:
 
 
 def scene_of_row(scene: Scene, rows: Mapping[str, Array], i: int) -> Scene:
-    """Return the scene of body `i`, or raise InputError if its numbers are invalid."""
+    """Return `scene` with the values of row `i` of `rows`; raise InputError if one is invalid."""
     own = {name: row_of(each, i) for name, each in rows.items()}
     values = {name: own.pop(name) for name in rows if name.startswith(PARAMETER)}
     torque: dict[str, Any] = {

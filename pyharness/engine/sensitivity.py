@@ -70,7 +70,7 @@ def closed_form_estimate(
 ) -> tuple[float | None, float | None]:
     """Return the estimated error of a closed form at `t_end` (s), and its error amplification.
 
-    The error is the larger of those of omega, relative to the largest |omega| so far, and of the
+    The error is the larger of the errors of omega, relative to the largest |omega| so far, and
     attitude (rad). Both results are None if unknown.
     """
     growth: float | None = 1.0

@@ -76,7 +76,7 @@ def solve(
         Times of the results (s), strictly monotonic, on one or both sides of 0.
     method : str
         A name in `pyharness.engine.registry.METHODS`. `auto` uses a closed form if there is one,
-        else the Taylor series; for an opaque torque, `dop853`.
+        else the Taylor series; for a torque made by ``opaque``, `dop853`.
     tolerance : float
         Largest allowed error of a component of omega at `times`, relative to the largest |omega|
         since time 0. The default depends on the method; for `auto` it is 1e-9. Methods with a fixed

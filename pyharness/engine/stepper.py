@@ -324,7 +324,7 @@ def steps_to(
 def step_lengths(
     scene: Scene, attitude: bool, end: float, tolerance: float, bounds: Sequence[float]
 ) -> dict[float, float]:
-    """Return lengths (s) of the steps from 0 to `end` (s) by their ends, unless in `bounds`."""
+    """Return each step's length (s), from 0 to `end` (s), by its end if not in `bounds`."""
     cuts = frozenset(bounds)
     return {
         stepper.time: abs(stepper.time - before)

@@ -35,7 +35,7 @@ def table(times: Numbers, values: Iterable[Numbers], interpolation: str = "linea
     Parameters
     ----------
     times : iterable of numbers, shape (n,)
-        The times (s), ascending, 2 to 1 000 000.
+        2 to 1 000 000 ascending times (s).
     values : iterable of three numbers, shape (n, 3)
         The torque about the body axes (N m) at each time; an array, list or DataFrame.
     interpolation : str
@@ -91,7 +91,7 @@ def inertia_table(
     Parameters
     ----------
     times : iterable of numbers, shape (n,)
-        The times (s), ascending, 2 to 1 000 000.
+        2 to 1 000 000 ascending times (s).
     values : array, shape (n, 3) or (n, 3, 3)
         The principal moments, or the inertia matrices about the body axes, at each time (kg m2).
     interpolation : str
@@ -162,7 +162,7 @@ def pulses(starts: Numbers, durations: Numbers, torque: Numbers | Iterable[Numbe
     Parameters
     ----------
     starts : iterable of numbers, shape (n,)
-        The times (s) at which the pulses begin, in any order, 1 to 10 000.
+        1 to 10 000 times (s) at which the pulses begin, in any order.
     durations : iterable of numbers, shape (n,)
         The durations (s), above 0. A pulse may begin when another ends, not before. The impulse is
         torque times duration, even if the end of the pulse is rounded.

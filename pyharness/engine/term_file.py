@@ -1,4 +1,4 @@
-"""Reading of ready terms, the tables [[torque.terms]] of scene files."""
+"""Reading of the torques that the tables [[torque.terms]] of scene files describe."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ _LAW = ("constant", "rate", "sines", "cosines")
 
 
 def read_terms(tables: object, body: dict[str, Any]) -> list[StateTorque]:
-    """Return the ready terms of the tables [[torque.terms]], or raise InputError."""
+    """Return the torques that the tables describe, or raise InputError."""
     if not isinstance(tables, list):
         raise InputError(
             f"[torque] terms is {kind_of(tables)}; it must be a list of tables [[torque.terms]]"

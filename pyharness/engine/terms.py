@@ -63,7 +63,7 @@ def drag(coefficients: Iterable[MatrixLike], per_axis: bool = False) -> StateTor
 
     It is the sum over n = 0, 1, 2, ... of -C_n |omega|^(2n) omega. With `per_axis` it is the sum of
     -C_n v_n, where v_n has the components omega_i^(2n+1). Quadratic drag, -k |omega| omega, is not
-    smooth at 0; away from 0, it can be a Python function with ``numpy.sqrt``.
+    smooth at 0; for motions away from 0, write it as a Python function with ``numpy.sqrt``.
 
     Parameters
     ----------

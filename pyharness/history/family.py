@@ -265,7 +265,7 @@ def family_members() -> list[Member]:
 def order_table(
     scene: Scene, members: Sequence[Member] | None = None, progress: Progress = no_progress
 ) -> list[OrderFinding]:
-    """Return the orders of convergence and the errors of many methods, measured together.
+    """Return the order of convergence and the error of each method in `members`, by default all.
 
     Raise InputError if the solution is unbounded or the scene has more than `MOST_STEPS` steps.
     """

@@ -54,7 +54,7 @@ class Changing:
             )
 
     def matrix(self, time: Any) -> list[list[Any]]:
-        """Return the inertia matrix (kg m2) at a time (s), a symbol or an array."""
+        """Return the inertia matrix (kg m2) at a time (s): a float, a symbol or an array."""
         return self._values(self.elements, time)
 
     def matrix_rate(self, time: Any) -> list[list[Any]]:

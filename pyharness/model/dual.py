@@ -83,9 +83,9 @@ def with_derivatives(tape: Tape, slots: Sequence[int]) -> Tape:
 
 
 def with_parameters(tape: Tape, values: Sequence[float]) -> Tape:
-    """Return a tape of each output's derivatives with respect to m parameters, then of outputs.
+    """Return a tape of each output's derivatives with respect to the parameters, then the outputs.
 
-    The parameters are the last inputs of `tape`; the result has these `values` in their place.
+    The parameters are the last inputs of `tape`; the result has `values` in their place.
     """
     count = len(values)
     most, n_inputs = _FEWER * MOST_OPERATIONS, tape.n_inputs - count

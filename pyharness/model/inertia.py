@@ -32,7 +32,7 @@ _MOST_ROTATIONS = 500  # about ten suffice, because the convergence is quadratic
 
 @dataclass(frozen=True, eq=False)
 class PrincipalFrame:
-    """The principal moments (kg m2) and axes of a body, both rounded and with at least 30 digits.
+    """Principal moments (kg m2) and axes of a body, as floats and fractions (30 or more digits).
 
     The columns of `axes` form a right-handed frame, each near the body's own axis of the same
     number. `moments_low` is the exact minus the rounded moments.

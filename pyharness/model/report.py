@@ -31,7 +31,7 @@ def plain(value: Any) -> str:
 
 
 def short(x: "float | Decimal | None") -> str:
-    """Return a number as text with two digits, such as 1.2e-3; None is a dash."""
+    """Return a number as text with two significant digits, such as 1.2e-3; None is a dash."""
     if x is None:
         return "-"
     if math.isnan(x) or math.isinf(x) or x == 0:

@@ -20,7 +20,7 @@ from pyharness.model.torque_law import TorqueLaw
 from pyharness.model.values import integer
 
 _LARGEST_FILE = 1_000_000
-MOST_TERMS = 50  # ready terms of a scene file
+MOST_TERMS = 50  # tables [[torque.terms]] of a scene file
 _WAVES = ("sines", "cosines")
 
 
@@ -98,7 +98,7 @@ def scene_text(scene: Scene, comments: Iterable[str] = ()) -> str:
     """Return the text of a scene file, from which `read_scene` restores the scene bit for bit.
 
     Masses, forces and case are not written. Raise InputError for an opaque torque, a torque
-    recorded from Python, more than 50 ready terms, or more than 1 000 000 bytes.
+    recorded from Python, more than 50 [[torque.terms]], or more than 1 000 000 bytes.
     """
     import json
 

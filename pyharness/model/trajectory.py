@@ -66,8 +66,8 @@ class Stop:
         The variable that failed: `U1` to `U3` (omega), `V1` to `V3` (velocity), or the norm `U` (of
         omega) or `UV` (of both).
     quotient : float
-        The Lipschitz quotient (1/s): the change of the derivative between two stages over the
-        change of the variable; infinite if the variable did not change.
+        The Lipschitz quotient (1/s): the change of the derivative between two stages, divided by
+        the change of the variable; infinite if the variable did not change.
 
     Examples
     --------

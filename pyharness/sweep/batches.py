@@ -29,10 +29,10 @@ Columns = dict[str, Array]
 
 
 def solve_chunk(sweep: Sweep, chunk: int) -> Arrays:
-    """Solve chunk number `chunk`, from 0; every executor calls this function.
+    """Solve chunk number `chunk` (counted from 0); every executor calls this function.
 
-    The result maps each reduction to an array with the shape of the chunk, and one more dimension
-    if the reduction has several components.
+    The result maps the name of each reduction (stored quantity) to an array with the shape of the
+    chunk, and one more dimension if the reduction has several components.
     """
     box = sweep.box(chunk)
     shape = tuple(part.stop - part.start for part in box)

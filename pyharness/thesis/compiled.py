@@ -22,7 +22,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled program of a listing on a scene, and return its trajectory.
 
-    The arguments are those of `run_program`; they are not checked.
+    The arguments are those of `pyharness.thesis.programs.run_program`, but are not checked.
     """
     given = program_arguments(scene, listing, lipschitz, may_stop, velocity)
     rows, ier, n_rows, *ended = extension().run_program(*given)

@@ -1,7 +1,7 @@
 """Error of the reference solution: a proved bound where a proof is cheap, else the estimate.
 
 A proof encloses the solution in balls (intervals, given by middle and radius). The largest distance
-of the reference from a point of its ball bounds the error.
+between the reference and any point of the ball at the same time bounds the error.
 """
 
 import math
@@ -47,7 +47,7 @@ class ErrorBound(NamedTuple):
     warning: str = ""
 
     def text(self, unit: str = "rad/s") -> str:
-        """Return the bound for omega, rounded up to two digits, with unit and basis."""
+        """Return the bound for omega, rounded up to two significant digits, with unit and basis."""
         return f"{' '.join(filter(None, (at_most(self.value), unit)))} ({self.basis})"
 
     def over(self, scale: float) -> "ErrorBound":
@@ -77,7 +77,7 @@ class ErrorBound(NamedTuple):
 
 
 def at_most(x: float) -> str:
-    """Return a positive number as text with two digits, rounded up."""
+    """Return a positive number as text with two significant digits, rounded up."""
     if not math.isfinite(x):
         return short(x)
     with localcontext(rounding=ROUND_CEILING):

@@ -1,4 +1,7 @@
-"""Switches (jumps) of a recorded torque in decimal arithmetic; steps end where they change."""
+"""Switches of a recorded torque, such as floor, in decimal arithmetic; steps end at their jumps.
+
+`pyharness.model.tape` explains tapes and slots.
+"""
 
 from decimal import Decimal, getcontext
 
@@ -19,9 +22,9 @@ _TOGETHER = Decimal("1e-15")  # relative difference of roots that count as one
 class Switches:
     """The results of the switches of a tape, in `results` by slot.
 
-    A switch changes where its operand crosses a level: 0, or a whole number for a floor. Between
-    levels, the operand is in an interval. For each switch whose operand is at a level, `_levels`
-    has by slot -1 if the level is the lower end of this interval, 1 if it is the upper end.
+    A switch changes where its operand crosses a level: 0, or a whole number for a floor. While an
+    operand is at a level, `_levels` has by slot -1 if the result is the one above the level, 1 if
+    it is the one below.
     """
 
     def __init__(self, tape: TapeSeries) -> None:

@@ -2,7 +2,7 @@
 
 Omega is expressed by Jacobi's elliptic functions, and the attitude by a theta function (Jacobi
 1850; Whittaker, Analytical Dynamics, section 69). Formulas are chosen by exact comparison of
-fractions, not of balls (intervals). Import this module only where python-flint is installed.
+fractions, not of balls (intervals).
 """
 
 import math

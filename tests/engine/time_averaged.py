@@ -1,9 +1,9 @@
 """Time of the method `averaged` beside the Taylor series, under weak torques.
 
-The command is ``python -m tests.engine.time_averaged``. A row of the table has a scene, and a
-number of rotations. The times are processor times, of `averaged` the least of ten, at a tolerance
-of 1e-9. The first rows are those of one scene whose torque is 1e-6 of the gyroscopic terms. The
-last row has the medians of random scenes with the same ratio, as far as `averaged` solves them.
+The command is ``python -m tests.engine.time_averaged``. Each row of the table has a scene and
+a number of rotations. Times are processor times at a tolerance of 1e-9, of `averaged` the least of
+ten calls. The first rows are for one scene whose torque is 1e-6 of the gyroscopic terms. The last
+row has the medians of the random scenes with this ratio that `averaged` solves.
 """
 
 import time

@@ -2,9 +2,9 @@
 
 The command is ``python -m tests.engine.time_ivp``. For ten textbook problems, each at the
 tolerances 1e-6, 1e-9 and 1e-12 (rtol and atol), the table has the largest error of a component at
-the end over the largest component, and the run time, which is the least of several calls of all in
-turn. If heyoka is installed, its integrators get the same operations. They are compiled before the
-time is measured. The last column has the time of this, if heyoka's cache on the disk is empty.
+the end, divided by the largest component, and the shortest run time of several interleaved calls.
+If heyoka is installed, its integrators get the same operations, compiled before the run time is
+measured. The last column has the time of compilation if heyoka's cache on the disk is empty.
 """
 
 import importlib.util

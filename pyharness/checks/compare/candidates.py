@@ -149,7 +149,7 @@ def program_candidate(
 
 
 def unstopped(listing: Listing) -> Candidate:
-    """Return a candidate that runs a compiled program without stop test or velocity."""
+    """Return a compiled program without stop test and translational velocity as candidate."""
     return program_candidate(listing, may_stop=False, velocity=False)
 
 

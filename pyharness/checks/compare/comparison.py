@@ -88,7 +88,8 @@ def compare_programs(
     Returns
     -------
     Comparison
-        All results; its property `unexpected` is empty if all results are as expected.
+        All results; its property `unexpected` is empty if Fortran and Python agree, and no
+        corrected program misses its order of convergence.
 
     Raises
     ------

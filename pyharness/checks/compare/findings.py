@@ -43,7 +43,7 @@ class ProgramFinding:
 
 @dataclass(frozen=True, eq=False)
 class MethodFinding:
-    """The results of one method, or the reason of its failure."""
+    """The results of one method, or why it failed."""
 
     method: str
     tolerance: float

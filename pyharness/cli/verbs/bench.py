@@ -31,8 +31,9 @@ OPTIONS = {
     "instead of the cases.",
     "--ensemble": "Measure calls that solve many bodies at once: bodies per second, time per "
     "body as a function of the number of bodies, and memory.",
-    "--terms": "Measure run times under torques that depend on omega (angular velocity), time and "
-    "attitude, ready-made ones (pyharness.torques) and Python functions, for one body and many.",
+    "--terms": "Measure run times, for one body and many, under torques that depend on omega "
+    "(angular velocity), time and attitude: ready-made ones (pyharness.torques) and Python "
+    "functions.",
     "--bodies N": f"Number of bodies of --ensemble or --terms, 1 to {_MOST_BODIES} (default "
     f"{_BODIES} with --ensemble, {_TERM_BODIES} with --terms).",
     "--seed S": "Text that seeds the random scenes or bodies, so that a run can be repeated "

@@ -48,9 +48,8 @@ EXAMPLE = "compare --case 3 --listing original --plot case-3.png"
 def run(options: argparse.Namespace) -> int:
     """Compare original and corrected programs with the reference solution of a scene.
 
-    Return 1 if the results of Fortran and Python differ, if a corrected program does not converge
-    with its order or, with --method, if an error exceeds the limit derived from the tolerance. With
-    --strict, also return 1 if amplified rounding errors may exceed the tolerance.
+    Return 1 if a result is unexpected (`Comparison.unexpected`) or, with --strict, if amplified
+    rounding errors may exceed the tolerance.
     """
     if options.method is not None:
         return _methods(options)

@@ -21,8 +21,8 @@ OPTIONS = {
     "--system S": "Operating system of the CDC computer that runs the job of --dialect ftn: "
     f"{' or '.join(SYSTEMS)} (default nos).",
     "--round": "Let FTN round results instead of truncating them; needs --dialect ftn.",
-    "--terms N": "Derive a collocation deck with N terms, 3 or 5, from the four-term deck; it is "
-    "a conjecture, because the thesis prints no such deck.",
+    "--terms N": "Write a collocation deck with N terms, 3 or 5, derived from the four-term deck; "
+    "a conjecture, because the thesis prints no such deck. Needs --program four-term.",
     **shared.outputs(FORMATS, plot=""),
 }
 USAGE = "--program P"

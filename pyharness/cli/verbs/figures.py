@@ -1,4 +1,4 @@
-"""The verb `figures`: redraw Figures 6 to 12 of the thesis, original and corrected."""
+"""The verb `figures`: redraw Figures 6 to 12 of the thesis by original and corrected programs."""
 
 import argparse
 

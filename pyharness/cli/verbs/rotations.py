@@ -14,7 +14,7 @@ OPTIONS = {
     "rotation about the middle axis reverses omega about this axis.",
     **shared.outputs(
         plot="the polhodes (curves of omega without torque), and the growth rates of perturbations "
-        "of bodies with any moments of inertia,"
+        "for all ratios of the moments of inertia,"
     ),
 }
 USAGE = shared.ONE_SCENE

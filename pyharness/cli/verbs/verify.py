@@ -38,10 +38,10 @@ OPTIONS = {
     "present year and week, as in 2026-W47).",
     "--draws N": f"Number of random scenes (default: {DRAWS}; 0 with --port; 2 for each kind "
     "of torque with --integrator).",
-    "--external FILE": "Compare only our methods with the published results in this file "
-    "(format: docs/how-to/external.md).",
+    "--external FILE": "Do nothing but compare our methods with the published results in "
+    "this file (format: docs/how-to/external.md).",
     "--listing-output FILE": "Find the floating-point arithmetic with which one of the programs "
-    "prints the page in this file, the output of an unknown machine.",
+    "prints the page in this file, which an unknown machine printed.",
     "--port COMMAND": "Start a version of the programs in another language by this command, and "
     "compare it bit for bit with ours in Python (docs/how-to/ports.md).",
     "--integrator COMMAND": "Start an integrator of rigid bodies by this command, compare it "

@@ -284,7 +284,7 @@ def _hangs_on(judgement: Judgement) -> list[str]:
 
 
 def written(x: float) -> str:
-    """Return a number as text: whole numbers below a million exactly, others with three digits."""
+    """Return a number as text: whole ones below a million exactly, others to three figures."""
     if not math.isfinite(x):
         return short(x)
     return f"{x:.0f}" if x == int(x) and abs(x) < 1e6 else f"{x:.3g}"

@@ -126,8 +126,9 @@ def guard(lab: Laboratory, cases: Sequence[int], bounded: float) -> Judged:
 def small_step(lab: Laboratory, cases: Sequence[int], exception: int) -> Judged:
     """Judge the claim that collocation improves if the step size is divided by ten.
 
-    The step size is a literal on several cards. For the original programs, the numbers also count
-    the cases that improve when only some of these literals are changed.
+    The two-term program must not improve in case `exception`. The step size is a literal on several
+    cards; for the original programs, the numbers also count the cases of constant torque that
+    improve when only some of these literals are changed.
     """
     found = judged(rules.small_step(lab, cases, exception))
     if lab.is_original:

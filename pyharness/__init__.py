@@ -41,9 +41,9 @@ __all__ = sorted(name for names in _SUBMODULES.values() for name in names)
 def __getattr__(name: str) -> object:
     from importlib import import_module
 
-    for room, names in _SUBMODULES.items():
+    for module, names in _SUBMODULES.items():
         if name in names:
-            return getattr(import_module(f"pyharness.{room}"), name)
+            return getattr(import_module(f"pyharness.{module}"), name)
     if name in _MODULES:
         return import_module(f"pyharness.{name}")
     if name == "__version__":

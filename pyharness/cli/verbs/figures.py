@@ -3,7 +3,7 @@
 import argparse
 
 from pyharness.cli import options as shared
-from pyharness.history import figures as room
+from pyharness.history import figures as history
 from pyharness.model.errors import InputError
 
 FORMATS = ("table", "json")
@@ -23,17 +23,17 @@ def run(options: argparse.Namespace) -> int:
 
     if options.out is None:
         raise InputError("figures: give --out DIR, a folder for the files")
-    plans = room.plans()
+    plans = history.plans()
     check_folder(options.out, [name for plan in plans for name in plan.files], "--out")
     check_matplotlib("figures")
 
     content: dict[str, bytes] = {}
     drawn = []
-    for number, finding in enumerate(room.findings(), 1):
+    for number, finding in enumerate(history.findings(), 1):
         shared.progress(number - 1, len(plans), finding.plan.title)
         svg, png, _ = finding.plan.files
-        content |= saved(room.figure_picture(finding), svg, png)
+        content |= saved(history.figure_picture(finding), svg, png)
         drawn.append(finding)
     shared.end_progress()
     write_folder(options.out, content, "--out")
-    return shared.show(room.figures_report(drawn), shared.without_out(options))
+    return shared.show(history.figures_report(drawn), shared.without_out(options))

@@ -97,9 +97,9 @@ def judgements() -> list[Judgement]:
 def outcome(entry: dict[str, Any], laboratory: Laboratory) -> Judged:
     """Return the verdict of the test of a claim, the entry `entry` of `data/claims.toml`."""
     name, parameters = entry["test"], entry.get("parameters", {})
-    for room in (verdicts, methods, theory):
-        if name in vars(room):
-            judged: Judged = vars(room)[name](laboratory, **parameters)
+    for module in (verdicts, methods, theory):
+        if name in vars(module):
+            judged: Judged = vars(module)[name](laboratory, **parameters)
             return judged
     return verdicts.judged(vars(rules)[name](laboratory, **parameters))
 

@@ -124,12 +124,12 @@ def test_a_seed_gives_the_same_draw_and_another_seed_another() -> None:
 @pytest.mark.campaign
 def test_a_draw_can_be_restricted_to_parts_of_file_names(monkeypatch: pytest.MonkeyPatch) -> None:
     # Few and short files, because each file that is drawn is parsed.
-    short = ("engine/system.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
+    short = ("engine/steps.py", "modern/tape.f90", "checks/kinds.py", "engine/sides.py")
     some = [each for each in files() if each.endswith(short)]
     assert len(some) == len(short)
     monkeypatch.setattr(sample, "files", lambda: some)
-    drawn = list(islice(draw("1", "system,modern/tape"), 8))
-    assert all("system" in each.file or "modern/tape" in each.file for each in drawn)
+    drawn = list(islice(draw("1", "steps,modern/tape"), 8))
+    assert all("steps" in each.file or "modern/tape" in each.file for each in drawn)
     assert {each.is_compiled for each in drawn} == {False, True}
     whole = {(each.file, each.id) for each in islice(draw("1"), 50)}
     assert {(each.file, each.id) for each in drawn} < whole
@@ -154,7 +154,7 @@ def test_every_language_has_its_share() -> None:
     assert lines["Python"] > lines[FORTRAN] > lines[C]
     core = {"pyharness/engine/gauss.py", "pyharness/sweep/store.py", "web/port.js",
             "pyharness/thesis/word.py", "fortran/modern/taylor.f90", "pyharness/model/tape.py",
-            "pyharness/engine/system.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
+            "pyharness/engine/steps.py", "fortran/modern/tape_solve.f90"}  # fmt: skip
     assert core <= set(files())
     assert not any("report" in file or "picture" in file for file in files())
 

@@ -3,7 +3,7 @@
 
 #include "tape.h"
 
-enum { AT_ONCE = 24, REGISTERS = AT_ONCE / IN_REGISTER };
+enum { REGISTERS = AT_ONCE / IN_REGISTER };
 
 /* Compute the sums of terms, which are `stride` numbers apart, from the first power on. */
 void OF_LEVEL(sum_at_nodes, LEVEL)(const double *terms, int stride, int order, const double *parts,

@@ -2,10 +2,9 @@ module step_nodes
   !! Polynomials at the nodes of a step, side by side.
   use, intrinsic :: iso_c_binding, only: c_double, c_int
   use kinds, only: dp
+  use storage, only: AT_ONCE
   implicit none(type, external)
   private
-
-  integer, parameter, public :: AT_ONCE = 24
 
   interface
     pure subroutine sum_at_nodes(terms, stride, order, parts, sums) &
@@ -20,7 +19,7 @@ module step_nodes
     end subroutine sum_at_nodes
   end interface
 
-  public :: parts_from, powers_of, sum_at_nodes
+  public :: AT_ONCE, parts_from, powers_of, sum_at_nodes
 
 contains
 

@@ -301,14 +301,12 @@ def prepare(
         fixed step and of Gauss collocation. If the motion amplifies perturbations by a factor K, no
         method has a relative error below some 1e-15 K.
     effort : float
-        Factor on the work limit of a call, some ten seconds. Beyond the limit the status is `gave
-        up`.
+        Factor on the work limit of a call (some ten seconds); beyond it the status is `gave up`.
     attitude : bool
         Whether calls return the attitude too, as in `solve`.
     compiled : bool
-        Whether a C compiler translates the series of a recorded torque, in some 0.1 s, unless the
-        user's cache has the result. Without a compiler the torque is interpreted. `Solver.leaves`
-        says which of these applies.
+        Whether a C compiler translates a recorded torque, in some 0.1 s, unless the user's cache
+        has the result; without a compiler it is interpreted. `Solver.leaves` says which.
 
     Returns
     -------

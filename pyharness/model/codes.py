@@ -79,11 +79,12 @@ class Blocks:
 
 
 class Storage:
-    """Lengths of arrays in which the kernel of a tape keeps series."""
+    """Lengths of arrays in which kernels keep series and their values."""
 
     SERIES_LENGTH = 40  # terms of a slot
     PERTURBATION_LENGTH = 29  # terms of a perturbation
     MOST_UNKNOWNS = 15
+    AT_ONCE = 24  # nodes of a step, which are evaluated together
 
 
 class Operations:

@@ -151,7 +151,7 @@ class Orbit:
 
 
 def integer_near(x: arb) -> int:
-    """Return an integer near the middle of `x`; any will do for an exact reduction."""
+    """Return an integer near the middle of `x`; with any integer the reduction is exact."""
     mantissa, exponent = map(int, x.mid().man_exp())
     return round(mantissa * Fraction(2) ** exponent)
 

@@ -1,6 +1,6 @@
 """Proved enclosures of the solution of any scene with a recorded torque, by Taylor steps.
 
-In each step a polynomial p approximates the solution of y' = f(t, y). Any p will do, because its
+In each step a polynomial p approximates the solution of y' = f(t, y). Any p is allowed, because its
 residual p' - f(t, p) is bounded on the whole step in ball (interval) arithmetic.
 
 The unknowns form blocks, such as omega and attitude. The norms of the blocks of y - p form the

@@ -14,7 +14,7 @@ _FOLDER = "worst"
 OPTIONS = {
     "--only ID,...": f"Run only these trials: {', '.join(TRIALS)}; or only the checks whose ids "
     "begin with this text, as in shapes/auto. The output says what each trial tests.",
-    "--scene FILE": "Test the scene in this TOML file instead of ours in the trials "
+    "--scene FILE": "Test the scene in this TOML file instead of our own in the trials "
     f"{', '.join(SCENE_TRIALS[:-1])} and {SCENE_TRIALS[-1]}. Its torque may depend on omega or "
     "attitude.",
     "--save DIR": "Save the scene with the worst result of each method in each trial as a TOML "

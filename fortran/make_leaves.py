@@ -21,7 +21,8 @@ def main(root: str, target: str, header: str) -> None:
     from pyharness.model.constant_body import with_constant_body
 
     three = (0.1, 0.2, 0.3)
-    turning = TorqueLaw(three, sines=[(three, 0.4)], frame="space")
+    waves = [(three, 0.4), (three, 0.5), (three, 0.6)]
+    turning = TorqueLaw(three, sines=waves[:1], frame="space")
     terms: list[Any] = [
         torques.damping(three),
         torques.drag([0.1]),
@@ -37,7 +38,7 @@ def main(root: str, target: str, header: str) -> None:
         torques.magnetic_damping(0.1, three),
         torques.magnetic_damping(0.1, turning),
         torques.in_space(three),
-        turning,
+        *(TorqueLaw(three, three, waves[:n], frame="space") for n in range(4)),
     ]
     structures = {}
     for term in terms:

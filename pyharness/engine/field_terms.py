@@ -7,7 +7,7 @@ import numpy as np
 
 from pyharness.engine.term_input import inertia_of, is_diagonal, law_of_vector, ready_term
 from pyharness.model.changing import Changing
-from pyharness.model.state_torque import StateTorque
+from pyharness.model.state_torque import StateTorque, turned_law
 from pyharness.model.torque_law import TorqueLaw, law_derivative, law_value, to_body
 from pyharness.model.values import Number, Numbers, finite, three
 
@@ -203,6 +203,6 @@ def in_space(torque: TorqueLaw | Numbers) -> StateTorque:
     law = law_of_vector("[torque] in space", torque, "space")
     return ready_term(
         "in_space",
-        lambda time, omega, attitude: to_body(law_value(law, time), attitude),
+        lambda time, omega, attitude: turned_law(law, time, attitude),
         torque=law,
     )

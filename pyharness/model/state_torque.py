@@ -16,7 +16,13 @@ from pyharness.model.numpy_calls import called_once, symbol_array
 from pyharness.model.own_states import OwnState
 from pyharness.model.symbols import SYMBOLS, Recorder, Symbol, recorded_twice
 from pyharness.model.tape import N_INPUTS, TIME, Tape, evaluate, float_outputs
-from pyharness.model.torque_law import FRAMES, TorqueLaw, body_torque
+from pyharness.model.torque_law import (
+    FRAMES,
+    TorqueLaw,
+    body_torque,
+    law_value,
+    to_body,
+)
 from pyharness.model.values import Triple, converted, three_floats, triple
 
 Function = Callable[..., Any]
@@ -171,7 +177,19 @@ def _recorded_with(recorder: Recorder, function: Function) -> Tape:
 @lru_cache(maxsize=64)
 def of_law(law: TorqueLaw) -> StateTorque:
     """Return a torque law about axes of body or space as a recorded torque."""
-    return replayed(lambda time, omega, attitude: body_torque(law, time, attitude))
+    given = turned_law if law.in_space else body_torque
+    return replayed(lambda time, omega, attitude: given(law, time, attitude))
+
+
+def turned_law(law: TorqueLaw, time: Symbol, attitude: Any) -> Array:
+    """Return the components about the body axes of a law about the axes of space.
+
+    Laws with equally many frequencies have the same operations, and share compiled leaves.
+    """
+    angles = [frequency * time for _, frequency in (*law.sines, *law.cosines)]
+    terms = [time, *(wave(each) for each in angles for wave in (np.sin, np.cos))]
+    value = law_value(law, time)
+    return to_body([x.with_terms_of(terms) for x in value] if law.varies else value, attitude)
 
 
 def recorded(function: Function, states: Sequence[str] = ()) -> StateTorque:

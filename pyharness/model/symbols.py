@@ -7,7 +7,7 @@ a repeated operation has the same slot.
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any
@@ -370,6 +370,14 @@ class Symbol:
         """Return 1 if this symbol is positive, else -1."""
         return 2.0 * (self > 0.0) - 1.0
 
+    def with_terms_of(self, others: "Iterable[Symbol]") -> "Symbol":
+        """Record this sum with the terms of `others` too, whose factors are 0; 0 stays 0."""
+        if not (self._terms or self._constant):
+            return self
+        terms = {slot: 0.0 for each in others for slot in each._terms} | self._terms
+        linear = Linear(self._constant, tuple(sorted(terms.items())))
+        return self.recorder.result("linear", (), linear)
+
     def is_time(self) -> bool:
         """Return whether this symbol is the time."""
         return not self._constant and self._terms == {TIME: 1.0}
@@ -503,11 +511,30 @@ def _selected(condition: Any, x: Any, y: Any) -> Any:
     return select(condition if known else _condition(condition), x, y)
 
 
+def _combined(linear: Linear, values: Sequence[Any]) -> Any:
+    """Return a linear combination of symbols and numbers, with its terms whose factor is 0."""
+    terms: dict[int, float] = {}
+    constant, recorder = 0.0, None
+    for slot, factor in linear.terms:
+        value = values[slot]
+        if not isinstance(value, Symbol):
+            constant += factor * value
+            continue
+        recorder = value.recorder
+        constant += factor * value._constant
+        for inner, x in value._terms.items():
+            total = terms.pop(inner, 0.0) + factor * x
+            if total or not factor:
+                terms[inner] = total
+    constant += linear.constant
+    return constant if recorder is None else Symbol(recorder, constant, terms)
+
+
 SYMBOLS: Functions[Any] = Functions(
     float, np.sqrt, np.exp, np.tanh, np.sin, np.cos, lambda table, time: time.of_table(table),
     np.log, np.arctan, np.arcsin,
     lambda x: x.switch() if isinstance(x, Symbol) else FLOATS.switch(x),
-    lambda x: x.floor() if isinstance(x, Symbol) else FLOATS.floor(x), _selected,
+    lambda x: x.floor() if isinstance(x, Symbol) else FLOATS.floor(x), _selected, _combined,
 )  # fmt: skip
 
 

@@ -132,6 +132,24 @@ def test_ready_torques_have_leaves_that_were_built() -> None:
     assert kernel_tape(system_of(scene_of()))[7] == 0.0
 
 
+def test_laws_about_space_share_leaves_that_were_built() -> None:
+    random = Random(27)
+    for number in range(8):
+        laws = [[0.0] * 3 for _ in range(3)]
+        for axis in range(3):  # at least one number of each axis
+            laws[random.randrange(3)][axis] = random.gauss(0.0, 0.3)
+        constant, rate, amplitude = laws
+        waves = [(amplitude, random.uniform(0.3, 3.0)), ((0.0, 0.1, 0.0), 0.5), ((0.2, 0, 0), 0.9)]
+        law = TorqueLaw(constant, rate, waves[: 1 + number % 3], waves[1:], frame="space")
+        scene = scene_of(law, attitude=(1.0, 0.0, 0.0, 0.0))
+        solver = prepare(scene, attitude=True)
+        assert solver.leaves == "built"
+        truth = reference(with_constant_body(scene), [2.0]).omega[0]
+        assert np.hstack(solver(scene.omega, 2.0))[:3] == pytest.approx(truth, rel=0.0, abs=1e-9)
+    single = TorqueLaw((0.1, 0.0, 0.0), (0.1, 0.0, 0.0), frame="space")
+    assert prepare(scene_of(single, attitude=(1, 0, 0, 0)), attitude=True).leaves == "interpreter"
+
+
 def test_switches_are_interpreted() -> None:
     solver = prepare(scene_of(lambda t, w: -np.clip(w, -0.1, 0.1)), compiled=True)
     assert solver.leaves == "interpreter: switches and torques of 500 operations are not compiled"

@@ -15,7 +15,7 @@ enum { SIDE_BY_SIDE = IN_REGISTER };
 typedef reg lanes;
 typedef reg_bits bits;
 
-enum { LEAST_ORDER = 8, MOST_ORDER = 27, TERMS = MOST_ORDER + 1 };
+enum { LEAST_ORDER = 8, TERMS = LANE_TERMS, MOST_ORDER = TERMS - 1 };
 enum { MANY = 3 };                            /* factors of a product that may not show early */
 enum { FEW_TERMS = 5 };                       /* of values amid a step */
 enum { CARRIED = 6 };                         /* terms of an exponential */
@@ -82,6 +82,7 @@ struct group {
   series *a;                      /* terms of each slot */
   struct operation *operations;
   lanes **terms;                  /* series of each term of the combinations */
+  const struct leaves *leaves;    /* compiled for these registers; or NULL */
   int *depends;                   /* of each slot: the unknowns on which it depends, as bits */
   lanes *middle, *tangents, *noises; /* of each slot: value amid the step, tangent, rounding error */
   lanes y[WITH_ATTITUDE], low[WITH_ATTITUDE]; /* unknowns and their rounding errors */
@@ -270,8 +271,13 @@ static inline void multiply(lanes *out, const lanes *x, const lanes *y, int k)
 /* Compute the terms of all slots, and those of the unknowns up to the order. */
 static void expand(struct group *g)
 {
-  const int derivatives = g->all->tape.n_combinations - g->n;
-  const struct operation *const end = g->operations + g->all->tape.n_operations;
+  const struct tape *tape = &g->all->tape;
+  const int derivatives = tape->n_combinations - g->n;
+  if (g->leaves) {
+    g->leaves->expand_lanes(*g->a, tape->coefficients, tape->constants, &g->h, g->order);
+    return;
+  }
+  const struct operation *const end = g->operations + tape->n_operations;
   for (int k = 0; k < g->order; k++) {
     const double whole = k;
     for (const struct operation *o = g->operations; k > 0 && o < end; o++) {
@@ -429,6 +435,10 @@ static void set_jacobian(struct group *g, lanes factor, lanes jacobian[][WITH_AT
 {
   const struct tape *tape = &g->all->tape;
   const lanes half = 0.5 * factor, step = factor * g->h;
+  if (g->leaves) {
+    g->leaves->set_lane_jacobian(*g->a, tape->coefficients, tape->constants, &half, &step, jacobian);
+    return;
+  }
   for (int n = 0; n < g->all->n_slots; n++) {
     lanes sum = {0.0};
     /* The order is above the number of these terms. */
@@ -853,6 +863,8 @@ void OF_LEVEL(solve_tape_bodies, LEVEL)(struct bodies *all)
   memset(memory, 0, n_slots * of_slot * sizeof(lanes));
   g.all = all;
   g.n = all->tape.n_unknowns;
+  g.leaves = all->tape.leaves;
+  if (g.leaves && (g.leaves->expand_lanes == NULL || g.leaves->width != SIDE_BY_SIDE)) g.leaves = NULL;
   g.a = (series *)memory;
   g.middle = memory + n_slots * TERMS;
   g.tangents = g.middle + n_slots;

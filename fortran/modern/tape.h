@@ -2,6 +2,8 @@
 #ifndef TAPE_H
 #define TAPE_H
 
+#include <stdint.h>
+
 #include "codes.h"
 
 #define JOINED(name, level) name##_##level
@@ -30,6 +32,11 @@ struct leaves {
   /* As set_columns of tape_terms.c, for all columns at four parts of the step. */
   void (*set_jacobian)(const double *terms, const double *, const double *, const double *parts,
                        double h, double *jacobian);
+  /* As expand and set_jacobian of tape_lanes.c, for registers of `width` numbers; or NULL. */
+  void (*expand_lanes)(reg *terms, const double *, const double *, const reg *h, int order);
+  void (*set_lane_jacobian)(const reg *terms, const double *, const double *, const reg *factor,
+                            const reg *h, reg (*jacobian)[WITH_ATTITUDE]);
+  intptr_t width;
 };
 
 /* Numbers of slots and combinations begin with 1. */

@@ -15,7 +15,8 @@ from hashlib import sha256
 from itertools import takewhile
 from pathlib import Path
 
-from pyharness.engine.leaves import Structure, source, structure
+from pyharness.engine.lane_leaves import whole_source
+from pyharness.engine.leaves import Structure, structure
 from pyharness.engine.recorded import has_ready_leaves, listing, system_of
 from pyharness.model.constant_body import with_constant_body
 from pyharness.model.scene import Scene
@@ -26,7 +27,9 @@ _MOST_SECONDS = 60.0  # of a compilation
 _FORGOTTEN = 3600.0  # age (s) from which files of a killed compilation are deleted
 _FLAGS = ("-O2", "-ffp-contract=fast", "-fPIC", "-shared")
 _NATIVE = "-march=native"
-_FUNCTIONS = ("expand", "set_jacobian")  # the order of struct leaves in fortran/modern/tape.h
+
+
+_LIBRARIES: list[CDLL] = []  # a library must not be closed
 
 
 class LeavesError(Exception):
@@ -73,22 +76,22 @@ def leaves_of(tape: Tape) -> tuple[int, str]:
     if shape is None:
         return 0, "interpreter: switches and torques of 500 operations are not compiled"
     try:
-        return ctypes.addressof(loaded(shape, str(folder()))), "compiled"
+        return loaded(shape, str(folder())), "compiled"
     except _FAILURES as error:
         return 0, f"interpreter: {error}"
 
 
 @cache  # a kernel may use what has been loaded for as long as the process lives
-def loaded(tape: Structure, place: str) -> ctypes.Array[ctypes.c_void_p]:
-    """Return the addresses of a tape's leaves in the order of `_FUNCTIONS`; raise LeavesError."""
+def loaded(tape: Structure, place: str) -> int:
+    """Return the address of a tape's leaves, a structure of tape.h; raise LeavesError."""
     try:
-        found = _found(Path(place), _key(source(tape)))
-        library = CDLL(str(found or compiled_file(Path(place), source(tape))))
-        functions = [ctypes.cast(getattr(library, name), ctypes.c_void_p) for name in _FUNCTIONS]
-    except (OSError, AttributeError) as error:
+        text = whole_source(tape)
+        library = CDLL(str(_found(Path(place), _key(text)) or compiled_file(Path(place), text)))
+        _LIBRARIES.append(library)
+        return ctypes.addressof(ctypes.c_void_p.in_dll(library, "leaves"))
+    except (OSError, AttributeError, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise LeavesError(f"leaves can't be loaded from or stored in {place}: {reason}") from None
-    return (ctypes.c_void_p * len(functions))(*(each.value for each in functions))
 
 
 @cache

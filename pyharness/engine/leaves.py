@@ -23,11 +23,12 @@ _NODES = 3  # of the Jacobian
 _TERMS_AMID = 8  # terms of a series at a node
 _SIZE = -(-Storage.MOST_UNKNOWNS // _BLOCK) * Storage.MOST_UNKNOWNS * _BLOCK  # of a Jacobian
 _MOST_OPERATIONS = 499  # whose products fit on the stack of a thread
-_TIME, _FIRST_UNKNOWN = 1, 2  # slots, from 1
+TIME, FIRST_UNKNOWN = 1, 2  # slots, from 1
 
 _HEADER = (
     f"""
-enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};"""
+enum {{ PARTS = {_NODES}, SIZE = {_SIZE} }};
+#define A(slot, k) a[(slot - 1) * {Storage.SERIES_LENGTH} + k]"""
     + """
 typedef double abreast __attribute__((vector_size(32)));
 typedef long long bits __attribute__((vector_size(32)));
@@ -145,8 +146,9 @@ def _slots(operation: _Listed) -> dict[str, int]:
     return {"x": x, "y": y, "o": out, "p": out + 1, "q": out + 2}
 
 
-def _place(slot: int, k: str) -> str:
-    return f"a[{(slot - 1) * Storage.SERIES_LENGTH} + {k}]"
+def place(slot: int, k: str) -> str:
+    """Return term k of a slot, as C."""
+    return f"A({slot}, {k})"
 
 
 def _written(text: str, operation: _Listed) -> str:
@@ -155,13 +157,13 @@ def _written(text: str, operation: _Listed) -> str:
 
     def name(match: re.Match[str]) -> str:
         what, slot = match[1], slots[match[2]]
-        place = {"b": "k - 1", "f": "1", "l": "k"}.get(what)
-        return _place(slot, place) if place else f"{what}{slot}"
+        term = {"b": "k - 1", "f": "1", "l": "k"}.get(what)
+        return place(slot, term) if term else f"{what}{slot}"
 
     return re.sub(r"\b([tzmbfl])_([xyopq])\b", name, text)
 
 
-def _combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
+def combined(tape: Structure, number: int, name: str, *, is_value: bool) -> str:
     """Return a linear combination of C variables, such as "t4" for slot 4 and the `name` "t"."""
     parts = [f"d[{number - 1}]"] * is_value
     parts += [f"c[{i}]*{name}{slot}" for i, slot in _terms(tape, number)]
@@ -177,46 +179,64 @@ def _rates(tape: Structure) -> range:
     return range(len(tape.combinations) - tape.n_unknowns + 1, len(tape.combinations) + 1)
 
 
-def _unknowns(tape: Structure) -> range:
-    return range(_FIRST_UNKNOWN, _FIRST_UNKNOWN + tape.n_unknowns)
+def unknowns_of(tape: Structure) -> range:
+    return range(FIRST_UNKNOWN, FIRST_UNKNOWN + tape.n_unknowns)
 
 
-def _expand(tape: Structure) -> Iterator[str]:
-    """Yield the function that computes the terms of all slots, order by order."""
+def recurrences(tape: Structure) -> tuple[list[str], list[tuple[int, int]]]:
+    """Return the statements that compute term k of all results, and the pairs of their sums."""
     pairs: dict[tuple[int, int], int] = {}
-    terms = []  # of order k
+    terms = []
     for operation in tape.operations:
         slots = _slots(operation)
         if operation[0] == Operations.LINEAR:
-            rule = Operation((f"t_o = {_combined(tape, operation[1], 't', is_value=False)}",))
+            rule = Operation((f"t_o = {combined(tape, operation[1], 't', is_value=False)}",))
         else:
             rule = _of(operation)
         both = [sorted(slots[letter] for letter in pair) for pair in rule.pairs]
         sums = [f"sum[{pairs.setdefault((x, y), len(pairs))}]" for x, y in both]
         for line in rule.series:
             text = _written(line, operation)
-            for number, place in enumerate(sums):
-                text = text.replace(f"s{number}", place)
+            for number, each in enumerate(sums):
+                text = text.replace(f"s{number}", each)
             terms.append(f"const double {text};")
-            terms.append(f"{_place(slots[line[2]], 'k')} = t{slots[line[2]]};")
-    groups = [list(pairs)[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
+            terms.append(f"{place(slots[line[2]], 'k')} = t{slots[line[2]]};")
+    return terms, list(pairs)
+
+
+def rates_of_term(tape: Structure) -> tuple[list[str], list[str]]:
+    """Return the rates of the unknowns: term 0, and term k, as C."""
+    return (
+        [combined(tape, number, "z", is_value=True) for number in _rates(tape)],
+        [combined(tape, number, "t", is_value=False) for number in _rates(tape)],
+    )
+
+
+def slots_read(lines: list[str]) -> list[int]:
+    """Return the slots whose term 0 is read."""
+    return sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(lines))})
+
+
+def _expand(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes the terms of all slots, order by order."""
+    terms, pairs = recurrences(tape)
+    groups = [pairs[i : i + _ABREAST] for i in range(0, len(pairs), _ABREAST)]
     for g, group in enumerate(groups):
         terms.append(f"x[{g}][k] = {_vector([f't{x}' for x, _ in group])};")
         terms.append(f"y[{g}][k] = {_vector([f't{y}' for _, y in group])};")
-    unknowns = _unknowns(tape)
-    first = [_combined(tape, number, "z", is_value=True) for number in _rates(tape)]
-    later = [_combined(tape, number, "t", is_value=False) for number in _rates(tape)]
+    unknowns = unknowns_of(tape)
+    first, later = rates_of_term(tape)
     shape = f"[{max(1, len(groups))}][{Storage.SERIES_LENGTH}]"
     yield "void expand(double *restrict a, const double *restrict c, const double *restrict d,"
     yield "            double *restrict unknowns, double h, int order)\n{"
     yield f"  abreast x{shape}, y{shape}, sums[{max(1, len(groups))}];"
     yield "  const double *const sum = (const double *)sums;"
-    for slot in sorted({int(each) for each in re.findall(r"\bz(\d+)", " ".join(terms + first))}):
-        yield f"  const double z{slot} = {_place(slot, '0')};"
+    for slot in slots_read(terms + first):
+        yield f"  const double z{slot} = {place(slot, '0')};"
     for slot, rate in zip(unknowns, first, strict=True):
         yield f"  double t{slot} = h*({rate});"
     yield from _kept(unknowns, "1")
-    yield f"  double t{_TIME} = {_place(_TIME, '1')};"
+    yield f"  double t{TIME} = {place(TIME, '1')};"
     yield "  for (int k = 1; k < order; k++) {"
     yield "    const double i = 1.0/k, part = h/(k + 1);"
     for begin in range(0, len(groups), _CHUNK):
@@ -234,7 +254,7 @@ def _expand(tape: Structure) -> Iterator[str]:
         yield f"    const double next{slot} = part*({rate});"
     yield from (f"    t{slot} = next{slot};" for slot in unknowns)
     yield from _kept(unknowns, "k + 1")
-    yield f"    t{_TIME} = 0.0;\n  }}\n}}"
+    yield f"    t{TIME} = 0.0;\n  }}\n}}"
 
 
 def _vector(names: list[str]) -> str:
@@ -243,54 +263,62 @@ def _vector(names: list[str]) -> str:
 
 def _kept(unknowns: range, k: str) -> Iterator[str]:
     """Yield the statements that store term k, one by one and in groups."""
-    yield from (f"  {_place(slot, k)} = t{slot};" for slot in unknowns)
+    yield from (f"  {place(slot, k)} = t{slot};" for slot in unknowns)
     for begin in unknowns[::_ABREAST]:
-        at = (begin - _FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
+        at = (begin - FIRST_UNKNOWN) * Storage.PERTURBATION_LENGTH
         names = [f"t{slot}" for slot in range(begin, min(begin + _ABREAST, unknowns.stop))]
         yield f"  *(abreast *)(unknowns + {at} + {_ABREAST}*({k})) = {_vector(names)};"
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:
     """Yield the function that computes the Jacobian of the rates at the nodes."""
-    # By slot: the names of its derivatives, by unknown.
-    by = {slot: {slot: "one"} for slot in _unknowns(tape)}
     yield "void set_jacobian(const double *restrict a, const double *restrict c,"
     yield "                  const double *restrict d, const double *restrict parts, double h,"
     yield "                  double *restrict jacobian)\n{"
     yield "  const abreast u = *(const abreast *)parts, zero = {0.0}, one = zero + 1.0;"
-    yield from (_summed(slot) for slot in (_TIME, *_unknowns(tape)))
+    lines, rows = derivatives(tape, _TERMS_AMID)
+    yield from (f"  const abreast {each};" for each in lines)
+    for i, texts in enumerate(rows):
+        for column in range(0, _BLOCK * -(-tape.n_unknowns // _BLOCK), _ABREAST):
+            begin = (column // _BLOCK * Storage.MOST_UNKNOWNS + i) * _BLOCK + column % _BLOCK
+            row = [texts.get(FIRST_UNKNOWN + column + j, "zero") for j in range(_ABREAST)]
+            yield f"  put(jacobian + {begin}, h, {', '.join(row)});"
+    yield "}"
+
+
+def derivatives(tape: Structure, count: int) -> tuple[list[str], list[dict[int, str]]]:
+    """Return definitions of values and slopes, and by unknown the derivatives of each rate.
+
+    The values are those at the part u of a step, by `count` terms of the series.
+    """
+    # By slot: the names of its derivatives, by unknown.
+    by = {slot: {slot: "one"} for slot in unknowns_of(tape)}
+    lines = [_summed(slot, count) for slot in (TIME, *unknowns_of(tape))]
     for operation in tape.operations:
         kind, x, y, out = operation
         if kind == Operations.LINEAR:
-            yield f"  const abreast m{out} = zero + {_combined(tape, x, 'm', is_value=True)};"
+            lines.append(f"m{out} = zero + {combined(tape, x, 'm', is_value=True)}")
             slopes = {out: _slopes_of_combination(tape, x, by)}
         else:
             rule = _of(operation)
             value = _written(rule.value, operation)
-            yield f"  const abreast m{out} = {value};" if value else _summed(out)
+            lines.append(f"m{out} = {value}" if value else _summed(out, count))
             if "m_p" in rule.slopes:
-                yield _summed(out + 1)
+                lines.append(_summed(out + 1, count))
             slopes = {out: _products(zip((x, y), rule.slopes, strict=False), operation, by)}
             if rule.second:
                 slopes[out + 1] = _products([(x, rule.second)], operation, by)
         for slot, texts in slopes.items():
             by[slot] = {unknown: f"v{slot}_{unknown}" for unknown in texts}
-            for unknown, text in texts.items():
-                yield f"  const abreast {by[slot][unknown]} = {text};"
-    for i, number in enumerate(_rates(tape)):
-        texts = _slopes_of_combination(tape, number, by)
-        for column in range(0, _BLOCK * -(-tape.n_unknowns // _BLOCK), _ABREAST):
-            place = (column // _BLOCK * Storage.MOST_UNKNOWNS + i) * _BLOCK + column % _BLOCK
-            row = [texts.get(_FIRST_UNKNOWN + column + j, "zero") for j in range(_ABREAST)]
-            yield f"  put(jacobian + {place}, h, {', '.join(row)});"
-    yield "}"
+            lines += [f"{by[slot][unknown]} = {text}" for unknown, text in texts.items()]
+    return lines, [_slopes_of_combination(tape, number, by) for number in _rates(tape)]
 
 
-def _summed(slot: int) -> str:
-    sum_of = _place(slot, str(_TERMS_AMID - 1))
-    for k in reversed(range(_TERMS_AMID - 1)):
-        sum_of = f"({_place(slot, str(k))} + u*{sum_of})"
-    return f"  const abreast m{slot} = {sum_of};"
+def _summed(slot: int, count: int) -> str:
+    sum_of = place(slot, str(count - 1))
+    for k in reversed(range(count - 1)):
+        sum_of = f"({place(slot, str(k))} + u*{sum_of})"
+    return f"m{slot} = {sum_of}"
 
 
 def _slopes_of_combination(

@@ -82,6 +82,7 @@ class Storage:
     """Lengths of arrays in which kernels keep series and their values."""
 
     SERIES_LENGTH = 40  # terms of a slot
+    LANE_TERMS = 28  # terms of a slot of many bodies
     PERTURBATION_LENGTH = 29  # terms of a perturbation
     MOST_UNKNOWNS = 15
     AT_ONCE = 24  # nodes of a step, which are evaluated together

@@ -1,0 +1,173 @@
+"""Compiled leaves for many bodies, one in each lane of a register, as in fortran/many/tape_lanes.c.
+
+The parts of four sums of products that are known before term k are computed together, which saves
+loads.
+"""
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+
+from pyharness.engine.leaves import (
+    FIRST_UNKNOWN,
+    TIME,
+    Structure,
+    derivatives,
+    place,
+    rates_of_term,
+    recurrences,
+    slots_read,
+    source,
+    unknowns_of,
+)
+from pyharness.model.codes import Storage
+
+_UNKNOWNS = (3, 7)  # without and with attitude: the bodies that have lanes
+_TOGETHER = 4  # sums
+_TERMS_AMID = 5  # terms of a series amid a step
+_ROW = 7  # length of a row of the Jacobian
+
+_HEADER = (
+    f"""
+#undef A
+#define A(slot, k) a[(slot - 1) * {Storage.LANE_TERMS} + k]"""
+    + """
+#if defined(__AVX512F__)
+enum { IN_REGISTER = 8 };
+#elif defined(__AVX__)
+enum { IN_REGISTER = 4 };
+#else
+enum { IN_REGISTER = 2 };
+#endif
+typedef double reg __attribute__((vector_size(8 * IN_REGISTER)));
+typedef long long reg_bits __attribute__((vector_size(8 * IN_REGISTER)));
+static reg half_in_lanes(reg x, reg root) { return (reg)((reg_bits)(x / (2.0 * root)) & (x != 0.0)); }
+static reg root_slope_in_lanes(reg root) { return (reg)((reg_bits)(0.5 / root) & (root != 0.0)); }
+/* The sum of the products of terms 1 to k - 1. */
+static reg sum_in_lanes(const reg *x, const reg *y, int k)
+{
+  reg sum = {0.0};
+  for (int j = 1; j < k; j++) sum += x[j] * y[k - j];
+  return sum;
+}
+/* The parts of four such sums, from number k, of products of terms before k. */
+static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, int k, reg *sums)
+{
+  reg y1 = y[k - 1], y2 = y[k - 2], y3 = y[k - 3];
+  reg a = x[1] * y1, b = x[2] * y1, c = x[3] * y1, d = {0.0};
+  reg a2 = x[2] * y2, b2 = x[3] * y2, c2 = {0.0}, d2 = {0.0};
+  a += x[3] * y3;
+  { const reg last = y1; y1 = y3; y3 = last; }
+  for (int j = 4; j < k; j += 4) {
+    const reg u0 = y[k - j], u1 = y[k - j - 1], u2 = y[k - j - 2], u3 = y[k - j - 3];
+    a += x[j] * u0, b += x[j] * y1, c += x[j] * y2, d += x[j] * y3;
+    a2 += x[j + 1] * u1, b2 += x[j + 1] * u0, c2 += x[j + 1] * y1, d2 += x[j + 1] * y2;
+    a += x[j + 2] * u2, b += x[j + 2] * u1, c += x[j + 2] * u0, d += x[j + 2] * y1;
+    a2 += x[j + 3] * u3, b2 += x[j + 3] * u2, c2 += x[j + 3] * u1, d2 += x[j + 3] * u0;
+    y1 = u3, y2 = u2, y3 = u1;
+  }
+  sums[0] = a + a2, sums[1] = b + b2, sums[2] = c + c2, sums[3] = d + d2;
+}
+"""
+)
+
+
+@lru_cache(maxsize=64)
+def whole_source(tape: Structure) -> str:
+    """Return the C source of all leaves of a tape, with `leaves`, a structure of tape.h."""
+    functions = "(void *)expand, (void *)set_jacobian"
+    lines = [source(tape)]
+    if tape.n_unknowns in _UNKNOWNS:
+        lines += [_HEADER, *_expand(tape), *_set_jacobian(tape)]
+        functions += ", (void *)expand_lanes, (void *)set_lane_jacobian, (void *)IN_REGISTER"
+    return "\n".join([*lines, f"const void *const leaves[5] = {{{functions}}};"]) + "\n"
+
+
+def _in_lanes(text: str) -> str:
+    """Return statements for numbers as statements for registers."""
+    # An exponential in lanes is never constant.
+    for old, new in {
+        "const double t": "const reg t",
+        "z_p ? 0.0 : ": "",
+        "halved(": "half_in_lanes(",
+        "slope_of_root(": "root_slope_in_lanes(",
+    }.items():
+        text = text.replace(old, new)
+    text = re.sub(r"\bz\d+ \? 0\.0 : ", "", text)
+    return re.sub(r"\bk\*", "whole*", text)
+
+
+def _inputs(tape: Structure, texts: list[str], letter: str) -> list[int]:
+    """Return the slots of inputs that are read under a letter: time, unknowns and parameters."""
+    end = min((operation[3] for operation in tape.operations), default=FIRST_UNKNOWN + 7)
+    read = {int(each) for each in re.findall(rf"\b{letter}(\d+)", " ".join(texts))}
+    return sorted(slot for slot in read if slot < end)
+
+
+def _expand(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes the terms of all slots, order by order."""
+    terms, pairs = recurrences(tape)
+    terms = [_in_lanes(each) for each in terms]
+    first, later = rates_of_term(tape)
+    body = [f"const reg t{x} = {place(x, 'k')};" for x in _inputs(tape, terms + later, "t")]
+    body += terms
+    for slot, rate in zip(unknowns_of(tape), later, strict=True):
+        body.append(f"{place(slot, 'k + 1')} = part*({rate});")
+    yield "void expand_lanes(reg *restrict a, const double *restrict c, const double *restrict d,"
+    yield "                  const reg *restrict step, int order)\n{"
+    yield "  const reg h = *step;"
+    yield f"  reg sums[{max(1, len(pairs))}][{_TOGETHER}];"
+    for slot in slots_read(terms + first):
+        yield f"  const reg z{slot} = {place(slot, '0')};"
+    for slot, rate in zip(unknowns_of(tape), first, strict=True):
+        yield f"  {place(slot, '1')} = h*({rate});"
+    yield f"  for (int k = 1; k < {_TOGETHER}; k++) {{"
+    early = [f"sum_in_lanes(&{place(x, '0')}, &{place(y, '0')}, k)" for x, y in pairs]
+    yield from _term(body, early)
+    yield "  }"
+    yield f"  for (int from = {_TOGETHER};; from += {_TOGETHER}) {{"
+    for number, (x, y) in enumerate(pairs):
+        yield f"    sums_in_lanes(&{place(x, '0')}, &{place(y, '0')}, from, sums[{number}]);"
+    for late in range(_TOGETHER):
+        yield f"    {{ const int k = from + {late};"
+        yield from _term(
+            body, [" + ".join([f"sums[{n}][{late}]", *_late(*p, late)]) for n, p in enumerate(pairs)]
+        )
+        yield "      if (k + 1 == order) return;\n    }"
+    yield "  }\n}"
+
+
+def _term(body: list[str], sums: list[str]) -> Iterator[str]:
+    """Yield the statements that compute term k, where `sums` are those of products."""
+    yield "      const double whole = k, i = 1.0/whole; const reg part = h/(whole + 1.0);"
+    yield from (f"      const reg sum{n} = {each};" for n, each in enumerate(sums))
+    yield from ("      " + re.sub(r"\bsum\[(\d+)\]", r"sum\1", each) for each in body)
+
+
+def _late(x: int, y: int, late: int) -> Iterator[str]:
+    """Yield the products of a sum that the parts known before do not have."""
+    for j in range(1, late + 1):
+        if x == y:
+            yield f"2.0*{place(x, f'k - {j}')}*{place(y, str(j))}"
+        else:
+            yield f"{place(x, f'k - {j}')}*{place(y, str(j))}"
+            yield f"{place(x, str(j))}*{place(y, f'k - {j}')}"
+
+
+def _set_jacobian(tape: Structure) -> Iterator[str]:
+    """Yield the function that computes the Jacobian of the rates amid the step."""
+    lines, rows = derivatives(tape, _TERMS_AMID)
+    lines = [_in_lanes(each) for each in lines]
+    known = {TIME, *unknowns_of(tape)}
+    yield "void set_lane_jacobian(const reg *restrict a, const double *restrict c,"
+    yield "                       const double *restrict d, const reg *restrict amid,"
+    yield f"                       const reg *restrict step, reg (*restrict jacobian)[{_ROW}])\n{{"
+    yield "  const reg u = *amid, h = *step, zero = {0.0}, one = zero + 1.0;"
+    for slot in _inputs(tape, lines, "m"):
+        if slot not in known:
+            yield f"  const reg m{slot} = {place(slot, '0')};"
+    yield from (f"  const reg {each};" for each in lines)
+    for i, texts in enumerate(rows):
+        for j, slot in enumerate(unknowns_of(tape)):
+            yield f"  jacobian[{i}][{j}] = h*({texts.get(slot, 'zero')});"
+    yield "}"

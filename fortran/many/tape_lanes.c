@@ -525,11 +525,14 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
                                                            lanes vectors[][WITH_ATTITUDE])
 {
   lanes sums[VECTORS][WITH_ATTITUDE], next[VECTORS][WITH_ATTITUDE];
-  memcpy(sums, vectors, sizeof sums);
+  for (int v = 0; v < VECTORS; v++)
+    for (int i = 0; i < n; i++) sums[v][i] = vectors[v][i];
   for (int k = CARRIED; k > 0; k--) {
     const double part = 1.0 / k;
+#pragma GCC unroll 7
     for (int i = 0; i < n; i++) {
       lanes a = {0.0}, b = {0.0}, c = {0.0}, d = {0.0};
+#pragma GCC unroll 7
       for (int j = 0; j < n; j++) {
         const lanes element = matrix[i][j];
         a += element * sums[0][j];
@@ -542,9 +545,11 @@ static inline __attribute__((always_inline)) void carry_of(const int n,
       next[2][i] = vectors[2][i] + part * c;
       next[3][i] = vectors[3][i] + part * d;
     }
-    memcpy(sums, next, sizeof sums);
+    for (int v = 0; v < VECTORS; v++)
+      for (int i = 0; i < n; i++) sums[v][i] = next[v][i];
   }
-  memcpy(vectors, sums, sizeof sums);
+  for (int v = 0; v < VECTORS; v++)
+    for (int i = 0; i < n; i++) vectors[v][i] = sums[v][i];
 }
 
 static void carry(int n, lanes matrix[][WITH_ATTITUDE],
@@ -578,23 +583,19 @@ static void check_derivatives(struct group *g)
 }
 
 /* Return the step, as a factor on the one that was tried, so that it ends at the next stop. */
-static lanes ended(struct group *g, lanes factor, bits *arrives, bits *at_end, lanes *stop)
+static lanes ended(const struct group *g, lanes factor, bits *arrives, bits *at_end, lanes *stop)
 {
-  for (int i = 0; i < SIDE_BY_SIDE; i++) {
-    const double end = g->end[i];
-    double to_stop = g->rest[i];
-    (*stop)[i] = end;
-    if (g->all->n_tables > 0) {
-      (*stop)[i] = next_break(g->all, g->t[i], end);
-      if ((*stop)[i] != end) to_stop = ((*stop)[i] - g->t[i]) - g->t_low[i];
-    }
-    const double step = fabs(factor[i] * g->h[i]);
-    (*arrives)[i] = fabs(to_stop) <= step * (1.0 + 1e-3) ? -1 : 0;
-    (*at_end)[i] = (*arrives)[i] && (*stop)[i] == end ? -1 : 0;
-    if ((*arrives)[i]) factor[i] = to_stop / g->h[i];
-    else if (fabs(to_stop) < 2.0 * step) factor[i] = 0.5 * (to_stop / g->h[i]);
+  lanes to_stop = g->rest;
+  *stop = g->end;
+  for (int i = 0; i < SIDE_BY_SIDE && g->all->n_tables > 0; i++) {
+    (*stop)[i] = next_break(g->all, g->t[i], g->end[i]);
+    if ((*stop)[i] != g->end[i]) to_stop[i] = ((*stop)[i] - g->t[i]) - g->t_low[i];
   }
-  return factor;
+  const lanes step = absolute(factor * g->h), whole = to_stop / g->h;
+  *arrives = absolute(to_stop) <= step * (1.0 + 1e-3);
+  *at_end = *arrives & (*stop == g->end);
+  factor = select_of(absolute(to_stop) < 2.0 * step, 0.5 * whole, factor);
+  return select_of(*arrives, whole, factor);
 }
 
 /* Take a step in each lane, or shorten the step that the lane tries next. */
@@ -626,10 +627,11 @@ static void step(struct group *g)
   }
   factor = converged(g, factor);
   set_jacobian(g, factor, jacobian);
+  for (int j = 0; j < n; j++) size[j] = 1.0 / g->weights[j];
   for (int i = 0; i < n; i++) {
     lanes row = {0.0};
-    for (int j = 0; j < n; j++) row += absolute(jacobian[i][j]) * (g->weights[i] / g->weights[j]);
-    norm = larger(norm, row);
+    for (int j = 0; j < n; j++) row += absolute(jacobian[i][j]) * size[j];
+    norm = larger(norm, g->weights[i] * row);
   }
   const lanes tried = factor;
   factor = select_of(norm > A_STEP, factor * (A_STEP / norm), factor);
@@ -641,13 +643,16 @@ static void step(struct group *g)
   lanes reached = g->scale, terms = {0.0}, turned = {0.0}, rounded = all_of(1.0), noises = {0.0};
   for (int i = 0; i < n; i++) {
     const lanes *a = g->a[FIRST_UNKNOWN + i];
-    change[i] = slope[i] = size[i] = all_of(0.0);
+    lanes sum = {0.0}, of_slopes = {0.0}, of_sizes = {0.0};
     for (int k = order; k > 0; k--) {
-      change[i] = factor * (change[i] + a[k]);
-      slope[i] = factor * (slope[i] + (double)k * a[k]);
-      size[i] = factor * (size[i] + (double)k * absolute(a[k]));
+      const lanes weighted = (double)k * a[k];
+      sum = factor * sum + a[k];
+      of_slopes = factor * of_slopes + weighted;
+      of_sizes = factor * of_sizes + absolute(weighted);
     }
-    size[i] = absolute(size[i]);
+    change[i] = factor * sum;
+    slope[i] = factor * of_slopes;
+    size[i] = absolute(factor * of_sizes);
     if (i < 3) {
       reached = larger(reached, absolute(g->y[i] + change[i]));
       terms = larger(terms, size[i]);
@@ -697,7 +702,7 @@ static void step(struct group *g)
   g->allowed = select_of(accepted, allowed, g->allowed);
   g->previous = select_of(accepted, h, g->previous);
   g->scale = select_of(accepted, reached, g->scale);
-  for (int i = 0; i < 3; i++) g->weights[i] = 1.0 / g->scale;
+  g->weights[0] = g->weights[1] = g->weights[2] = 1.0 / g->scale;
   /* The time at a stop is exact. */
   const lanes moved = h + g->t_low, later = g->t + moved, part = later - g->t;
   const lanes later_low = (g->t - (later - part)) + (moved - part);

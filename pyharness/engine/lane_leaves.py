@@ -50,6 +50,14 @@ static reg sum_in_lanes(const reg *x, const reg *y, int k)
   for (int j = 1; j < k; j++) sum += x[j] * y[k - j];
   return sum;
 }
+/* The sum, whose part of products of terms before k - late is known. */
+static inline reg late_sum(const reg *x, const reg *y, int k, int late, const reg *sums)
+{
+  if (k == late) return sum_in_lanes(x, y, k);
+  reg sum = sums[late];
+  for (int j = 1; j <= late; j++) sum += x[k - j] * y[j] + y[k - j] * x[j];
+  return sum;
+}
 /* The parts of four such sums, from number k, of products of terms before k. */
 static __attribute__((noinline)) void sums_in_lanes(const reg *x, const reg *y, int k, reg *sums)
 {
@@ -121,37 +129,18 @@ def _expand(tape: Structure) -> Iterator[str]:
         yield f"  const reg z{slot} = {place(slot, '0')};"
     for slot, rate in zip(unknowns_of(tape), first, strict=True):
         yield f"  {place(slot, '1')} = h*({rate});"
-    yield f"  for (int k = 1; k < {_TOGETHER}; k++) {{"
-    early = [f"sum_in_lanes(&{place(x, '0')}, &{place(y, '0')}, k)" for x, y in pairs]
-    yield from _term(body, early)
-    yield "  }"
-    yield f"  for (int from = {_TOGETHER};; from += {_TOGETHER}) {{"
-    for number, (x, y) in enumerate(pairs):
-        yield f"    sums_in_lanes(&{place(x, '0')}, &{place(y, '0')}, from, sums[{number}]);"
-    for late in range(_TOGETHER):
-        yield f"    {{ const int k = from + {late};"
-        yield from _term(
-            body, [" + ".join([f"sums[{n}][{late}]", *_late(*p, late)]) for n, p in enumerate(pairs)]
-        )
-        yield "      if (k + 1 == order) return;\n    }"
+    yield "  for (int k = 1; k < order; k++) {"
+    yield f"    const int late = k % {_TOGETHER};"
+    yield "    const double whole = k, i = 1.0/whole;"
+    yield "    const reg part = h/(whole + 1.0);"
+    yield "    if (k > late && late == 0) {"
+    for n, (x, y) in enumerate(pairs):
+        yield f"      sums_in_lanes(&{place(x, '0')}, &{place(y, '0')}, k, sums[{n}]);"
+    yield "    }"
+    for n, (x, y) in enumerate(pairs):
+        yield f"    const reg sum{n} = late_sum(&{place(x, '0')}, &{place(y, '0')}, k, late, sums[{n}]);"
+    yield from ("    " + re.sub(r"\bsum\[(\d+)\]", r"sum\1", each) for each in body)
     yield "  }\n}"
-
-
-def _term(body: list[str], sums: list[str]) -> Iterator[str]:
-    """Yield the statements that compute term k, where `sums` are those of products."""
-    yield "      const double whole = k, i = 1.0/whole; const reg part = h/(whole + 1.0);"
-    yield from (f"      const reg sum{n} = {each};" for n, each in enumerate(sums))
-    yield from ("      " + re.sub(r"\bsum\[(\d+)\]", r"sum\1", each) for each in body)
-
-
-def _late(x: int, y: int, late: int) -> Iterator[str]:
-    """Yield the products of a sum that the parts known before do not have."""
-    for j in range(1, late + 1):
-        if x == y:
-            yield f"2.0*{place(x, f'k - {j}')}*{place(y, str(j))}"
-        else:
-            yield f"{place(x, f'k - {j}')}*{place(y, str(j))}"
-            yield f"{place(x, str(j))}*{place(y, f'k - {j}')}"
 
 
 def _set_jacobian(tape: Structure) -> Iterator[str]:

@@ -13,10 +13,10 @@ subroutine taylor_rows(coefficients, m_constant, m_rate, n_sines, sines, n_cosin
   use problem, only: problem_t, request_nodes, request_t, solution_t
   implicit none
   real(8), intent(in) :: coefficients(3)        ! A, B, C
-  real(8), intent(in) :: m_constant(3)          ! torque over moment, 1/s2
-  real(8), intent(in) :: m_rate(3)              ! 1/s3
+  real(8), intent(in) :: m_constant(3)          ! torque over moment, rad/s2
+  real(8), intent(in) :: m_rate(3)              ! rad/s3
   integer(4), intent(in) :: n_sines
-  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3) in 1/s2, frequency in rad/s
+  real(8), intent(in), target :: sines(4, n_sines)      ! amplitude (3), rad/s2; frequency, rad/s
   integer(4), intent(in) :: n_cosines
   real(8), intent(in), target :: cosines(4, n_cosines)  ! as sines
   real(8), intent(in) :: omega0(3)              ! rad/s
@@ -153,7 +153,7 @@ subroutine sphere_solution(m_constant, m_rate, n_sines, sines, n_cosines, cosine
   use problem, only: problem_t, request_t, solution_t
   use sphere, only: sphere_rows
   implicit none
-  real(8), intent(in) :: m_constant(3)        ! torque over moment, 1/s2; its rate below, 1/s3
+  real(8), intent(in) :: m_constant(3)        ! torque over moment, rad/s2; its rate below, rad/s3
   real(8), intent(in) :: m_rate(3)
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)  ! amplitude (3), frequency in rad/s
@@ -186,7 +186,7 @@ subroutine torque_noise_ratio(m_constant, m_rate, n_sines, sines, n_cosines, cos
   use problem, only: problem_t
   use torque_noise, only: torque_noise_of
   implicit none
-  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, 1/s2, and its rate, 1/s3
+  real(8), intent(in) :: m_constant(3), m_rate(3) ! torque over moment, rad/s2, and its rate, rad/s3
   integer(4), intent(in) :: n_sines
   real(8), intent(in), target :: sines(4, n_sines)
   integer(4), intent(in) :: n_cosines

@@ -22,7 +22,7 @@ module bodies
   !! takes any number
 
   type, public :: bodies_t
-    logical :: by_moments       !! body in kg m2, torque in N m; else A, B, C and 1/s2
+    logical :: by_moments       !! body in kg m2, torque in N m; else A, B, C and rad/s2
     real(dp) :: tolerance       !! relative
     real(dp) :: step            !! s, of the methods with a fixed step
     real(dp) :: effort          !! factor on the work limit of each body

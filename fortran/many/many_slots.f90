@@ -41,7 +41,7 @@ module many_slots
   type, public :: slots_t
     real(dp), dimension(SLOTS, 3) :: w, low   !! omega and its rounding error, rad/s
     real(dp), dimension(SLOTS, 3) :: a        !! A, B, C
-    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment: 1/s2, 1/s3
+    real(dp), dimension(SLOTS, 3) :: constant, rate !! torque over moment: rad/s2, rad/s3
     real(dp), dimension(SLOTS, 3) :: error    !! truncation error, propagated so far, rad/s
     real(dp), dimension(SLOTS) :: worst       !! its largest size so far, as it may decrease again
     real(dp) :: small(SLOTS, 3, 3)            !! state-transition matrix from time 0: row, column

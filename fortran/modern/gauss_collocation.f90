@@ -43,7 +43,7 @@ contains
     type(solution_t), intent(inout) :: solution    !! without steps and estimates
     real(dp), intent(out) :: reached(4)            !! time and omega after the last successful step
     type(state_t) :: now
-    real(dp) :: m(MOST_STAGES, 3)    ! torque over moment at the nodes, 1/s2
+    real(dp) :: m(MOST_STAGES, 3)    ! torque over moment at the nodes, rad/s2
     real(dp) :: at_node(3)
     real(dp) :: begin, h
     real(dp) :: h_low                ! rounding error of the step, s
@@ -140,7 +140,7 @@ contains
     real(dp) :: states(MOST_STAGES, 3)
     real(dp) :: low(MOST_STAGES, 3)     ! contribution of MATRIX_LOW
     real(dp) :: change, change_before, scale
-    real(dp) :: push                    ! largest torque over moment, 1/s2
+    real(dp) :: push                    ! largest torque over moment, rad/s2
     real(dp) :: increment, total, part, back, rest
     integer :: axis, iteration, k
 

@@ -235,7 +235,7 @@ contains
     real(dp), intent(in) :: bits       !! bits of the target error
     real(dp) :: c(3), root(3) ! squares of the rates per omega, and the rates
     real(dp) :: fastest      ! frequency, rad/s
-    real(dp) :: rate         ! largest rate of the torque in the unknowns, 1/s3
+    real(dp) :: rate         ! largest rate of the torque in the unknowns, rad/s3
     real(dp) :: turn_0, turn ! as in solve, rad
     real(dp) :: both         ! squares of these two, summed
     real(dp) :: frequencies(MOST_WAVES) ! which differ, rad/s

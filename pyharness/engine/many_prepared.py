@@ -103,8 +103,8 @@ def solve_each(
 ) -> None:  # fmt: skip
     """Solve the bodies in `piece` side by side, or else by single calls.
 
-    Single calls solve bodies whose error the first way can't measure; and all bodies if the torque
-    is neither recorded nor in space, or the inertia matrix is full.
+    A single call solves each body whose error can't be measured side by side. It solves every body
+    if the torque is neither recorded nor about the axes of space, or if the inertia matrix is full.
     """
     left = list(range(piece.start, piece.stop))
     if solver.packed[Places.METHOD] == Methods.TAPE and solver.scene.inertia is None:

@@ -96,9 +96,9 @@ def integrate(
 def rescaling_factor(scene: Scene, time: float) -> float:
     """Return the factor, a power of 2, that brings omega near 1 rad/s.
 
-    Omega is the larger of the initial one and of that which the torque may cause until `time` (s):
-    a bound, or for a torque that depends on the state an estimate. The factor is 1 if no rescaling
-    is needed or, as for an opaque torque, possible.
+    This omega is the initial omega, or the omega that the torque may cause until `time` (s) if that
+    is larger. The latter is a bound; for a torque that depends on the state, an estimate. The
+    factor is 1 if no rescaling is needed, or if none is possible, as for an opaque torque.
     """
     if is_ordinary(scene.omega):
         return 1.0
@@ -127,7 +127,7 @@ def rescaling_factor(scene: Scene, time: float) -> float:
 
 
 def omega_by_torque(scene: Scene, time: float) -> float:
-    """Return a bound on omega (rad/s) from rest until `time` (s), without gyroscopic torques."""
+    """Return a bound on omega (rad/s) after `time` (s) from rest, without gyroscopic torques."""
     law, span = scene.law, abs(time)
     moments = scene.moments or (1.0, 1.0, 1.0)
     if law.in_space:

@@ -44,10 +44,10 @@ def torque_noise(
 ) -> float:
     """Return the rounding error of torque terms that nearly cancel, divided by that of omega.
 
-    It is the omega that each term alone would cause until `t_end` (s), with rounding in each of
-    `steps` steps, over `scale` (rad/s). By default, the scale is the initial |omega| or the omega
-    that the whole torque causes. The result is 0 if no terms nearly cancel, or if the torque
-    depends on the state.
+    Let each term alone cause an omega until `t_end` (s), with rounding in each of `steps` steps.
+    The result is the ratio of these omegas, added up, to `scale` (rad/s), by default the initial
+    |omega| or the omega that the whole torque causes. It is 0 if no terms nearly cancel, or if the
+    torque depends on the state.
     """
     if isinstance(scene.torque, StateTorque) or not (scene.law.sines or scene.law.cosines):
         return 0.0

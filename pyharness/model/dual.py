@@ -9,8 +9,8 @@ import numpy as np
 from pyharness.model.symbols import MOST_OPERATIONS, SYMBOLS, Recorder
 from pyharness.model.tape import Functions, Table, Tape, evaluate, selected, step, whole
 
-# Factors on the largest number of operations of a recorded torque: for a tape that no kernel reads,
-# and for a tape that a kernel reads, whose memory is proportional to it.
+# Factors on the largest number of operations of a recorded torque. _MORE is for tapes that no
+# kernel reads, _FEWER for tapes of a kernel, whose memory is proportional to the number.
 _MORE, _FEWER = 100, 10
 
 

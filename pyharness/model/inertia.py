@@ -35,7 +35,7 @@ class PrincipalFrame:
     """Principal moments (kg m2) and axes of a body, as floats and fractions (30 or more digits).
 
     The columns of `axes` form a right-handed frame, each near the body's own axis of the same
-    number. `moments_low` is the exact minus the rounded moments.
+    number. `moments_low` is the exact moments minus `moments`.
     """
 
     moments: Triple

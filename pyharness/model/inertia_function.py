@@ -157,7 +157,7 @@ def inertia_of_texts(place: str, values: Any) -> InertiaFunction:
 def inertia_of_tables(
     place: str, tables: Iterable[Table], written: tuple[Any, ...]
 ) -> InertiaFunction:
-    """Return the moments or inertia whose elements are `tables` of time; a file has `written`."""
+    """Return the inertia whose elements are `tables` of time; scene files have `written`."""
     recorder = Recorder(place=f"[body] {place}")
     time, *_ = recorder.inputs()
     values = [value_of_table(without_equal_constants(each), time) for each in tables]
